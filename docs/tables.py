@@ -8,7 +8,9 @@ from __future__ import annotations
 import ast
 import inspect
 import math
+import tomllib
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from pkgutil import iter_modules
@@ -223,33 +225,68 @@ def public_text() -> str:
     return table(("name", "what it is"), rows)
 
 
-REASONED = ("infer", "diagnosis", "identify", "contrasts")
-"""Rooms whose numbers are listed with their reasons."""
-DECIDING = {
-    "UNUSUAL_LEVEL",
-    "CLAIM_LEVEL",
-    "DRIVEN_LEVEL",
-    "CERTAIN_LEVEL",
-    "ABSORBED_BELOW",
-    "RUNAWAY",
-    "FORM_SHARE",
-    "SMALL_SHARE",
-    "AVERAGED_S",
-    "WHITE_SHARE",
-    "SHORT_NOISE",
-    "FULL_NOISE",
-    "MOST_CAUSES",
-    "AS_WELL",
-    "SMOOTH",
+REASONED = ("infer", "identify", "diagnosis", "contrasts", "walk", "comparison", "cohort", "verdict")
+"""Rooms of inference, whose numbers are listed with their reasons."""
+DECIDING = "infer/levels.py"
+"""File of the numbers that decide what is claimed."""
+KINDS = {
+    "decides": "Numbers that decide what is claimed",
+    "how": "How widely, how long and how finely it is searched",
+    "guard": "Guards of arithmetic and of what is read",
+    "measurement": "Properties of sensors, people and machines",
 }
-"""Those that say what is claimed, what is left and what is not testable; the others say how and how finely."""
 
 
-def numbers() -> list[tuple[str, str, str, str]]:
-    """File, name, value and reason of every number that a room's files name, in their order."""
+@dataclass(frozen=True)
+class Number:
+    """A number that a file names: its value as it is written, and its reason."""
+
+    file: str
+    name: str
+    value: str
+    reason: str
+
+
+def numbers() -> list[Number]:
+    """Every number that a file of the rooms of inference names, in their order."""
     root = Path(fes_pin.__file__).parent
     files = [path for room in REASONED for path in sorted((root / room).rglob("*.py"))]
-    return [(str(path.relative_to(root)), *one) for path in files for one in _named(path)]
+    return [Number(str(path.relative_to(root)), *one) for path in files for one in _named(path)]
+
+
+def kinds() -> dict[str, str]:
+    """The kind of each number by "file:NAME": those of `DECIDING` decide, the others as data/numbers.toml says."""
+    table = tomllib.loads((Path(__file__).parent / "data" / "numbers.toml").read_text())
+    found = {f"{n.file}:{n.name}": "decides" for n in numbers() if n.file == DECIDING}
+    for kind, files in table.items():
+        for file, names in files.items():
+            for name in names.split():
+                assert f"{file}:{name}" not in found, f"{file}:{name} has two kinds"
+                found[f"{file}:{name}"] = kind
+    return found
+
+
+def unnamed_numbers() -> list[str]:
+    """Numbers that stand in a comparison, or as a default of an argument, without a name: "file:line value".
+
+    Those that say empty, first, one, a pair, a half or percent, and those that only guard arithmetic, are none.
+    """
+    root, found = Path(fes_pin.__file__).parent, []
+    for path in sorted(path for room in REASONED for path in (root / room).rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text())):
+            parts: list[ast.expr] = []
+            if isinstance(node, ast.Compare):
+                parts = [x for one in (node.left, *node.comparators) for x in ast.walk(one) if isinstance(x, ast.expr)]
+            elif isinstance(node, ast.arguments):
+                parts = [d for d in (*node.defaults, *node.kw_defaults) if d is not None]
+            for x in parts:
+                if isinstance(x, ast.Constant) and type(x.value) in (int, float) and not _says_nothing(x.value):
+                    found.append(f"{path.relative_to(root)}:{x.lineno} {x.value}")
+    return found
+
+
+def _says_nothing(value: float) -> bool:
+    return value in (0, 1, -1, 2, 0.5, 100) or abs(value) < 1e-5
 
 
 def _named(path: Path) -> Iterable[tuple[str, str, str]]:
@@ -257,7 +294,12 @@ def _named(path: Path) -> Iterable[tuple[str, str, str]]:
     for one, after in zip(body, [*body[1:], None], strict=True):
         target = one.targets[0] if isinstance(one, ast.Assign) else getattr(one, "target", None)
         value = getattr(one, "value", None)
-        if not isinstance(target, ast.Name) or not target.id.isupper() or not _is_numeric(value):
+        if (
+            not isinstance(target, ast.Name)
+            or not target.id.isupper()
+            or target.id.startswith("_")
+            or not _is_numeric(value)
+        ):
             continue
         reason = after.value.value if isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant) else ""
         yield target.id, ast.unparse(value), " ".join(str(reason).split())
@@ -269,11 +311,11 @@ def _is_numeric(value: ast.AST | None) -> bool:
 
 
 def numbers_text() -> str:
-    """Numbers that decide, then the others, with their reasons."""
-    found = numbers()
-    parts = []
-    for title, wanted in (("Numbers that decide", True), ("How, how long, how finely", False)):
-        rows = [(f"`{n}`", f"`{v}`", reason, f"`{file}`") for file, n, v, reason in found if (n in DECIDING) == wanted]
+    """The numbers by their kinds, with their reasons."""
+    found, of, parts = numbers(), kinds(), []
+    for kind, title in KINDS.items():
+        own = [n for n in found if of.get(f"{n.file}:{n.name}") == kind]
+        rows = [(f"`{n.name}`", f"`{n.value}`", n.reason, f"`{n.file}`") for n in own]
         parts.append(
             f"## {title}\n\n{len(rows)} of {len(found)}.\n\n" + table(("name", "value", "reason", "file"), rows)
         )

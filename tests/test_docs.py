@@ -206,14 +206,27 @@ def test_what_the_documentation_needs_is_pinned():
     assert {re.split(r"[<>=]", one)[0] for one in wanted} <= pinned
 
 
-@pytest.mark.parametrize("number", tables.numbers(), ids=lambda n: f"{n[0]}:{n[1]}")
+@pytest.mark.parametrize("number", tables.numbers(), ids=lambda n: f"{n.file}:{n.name}")
 def test_every_number_of_a_verdict_has_its_reason(number):
-    assert number[3], f"{number[1]} = {number[2]} in {number[0]}: expected a reason beneath it"
+    assert number.reason, f"{number.name} = {number.value} in {number.file}: expected a reason beneath it"
 
 
-def test_the_numbers_that_decide_are_there():
-    assert {n for _, n, _, _ in tables.numbers()} >= tables.DECIDING
-    assert len(tables.DECIDING) <= 15  # a further one must take another's place
+def test_every_number_has_a_kind_and_none_that_is_gone_has_one():
+    assert set(tables.kinds()) == {f"{n.file}:{n.name}" for n in tables.numbers()}
+    assert set(tables.kinds().values()) == set(tables.KINDS)
+
+
+def test_no_number_decides_without_a_name():
+    assert tables.unnamed_numbers() == []
+
+
+def test_few_numbers_decide_and_each_says_where_it_comes_from():
+    deciding = [n for n in tables.numbers() if n.file == tables.DECIDING]
+    assert 20 < len(deciding) <= 45  # a further one must take another's place
+    sources = re.compile("Theory|Literature|Simulation|By convention")
+    assert [n.name for n in deciding if not sources.search(n.reason)] == []
+    scripts = [path for n in deciding for path in re.findall(r"`((?:scripts|tests)/[\w/.]+)", n.reason)]
+    assert scripts and [path for path in scripts if not (ROOT / path).exists()] == []
 
 
 def test_the_page_of_decisions_names_files_that_are_there():

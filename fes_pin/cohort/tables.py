@@ -10,12 +10,10 @@ from typing import Any
 from fes_pin.cohort.keep import Kept
 from fes_pin.cohort.pool import discovery_rates, pooled, share_interval
 from fes_pin.identify.error_measures import MEASURES
+from fes_pin.infer.levels import UNUSUAL_LEVEL
 from fes_pin.models.catalogue import Catalogue
 
 Row = Mapping[str, Any]
-RATE = 0.05
-"""False discovery rate below which a cause counts as found in the cohort."""
-
 
 ERRORS = {f"{model}_{n}_percent": (model, n) for model in ("nominal", "extended") for n in MEASURES}
 """Columns of errors E, by model and name in `diagnosis.json`: see `identify.error_measures`."""
@@ -125,7 +123,7 @@ def prevalence_rows(causes: Sequence[Row], studies: int) -> list[Row]:
                 "cause": cause,
                 "stage": next(iter(rows.values()))["stage"],
                 "studies": len(rows),
-                "certain": sum(r["false_discovery_rate"] <= RATE for r in rows.values()),
+                "certain": sum(r["false_discovery_rate"] <= UNUSUAL_LEVEL for r in rows.values()),
                 "share_percent": 100.0 * len(rows) / max(studies, 1),
                 "share_low": low,
                 "share_high": high,

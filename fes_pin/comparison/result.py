@@ -15,10 +15,8 @@ from fes_pin.data.results import Recorded, Saveable
 from fes_pin.data.show import by_columns
 from fes_pin.data.study import Study
 from fes_pin.identify.fit import Fit
+from fes_pin.infer.levels import UNUSUAL_LEVEL
 from fes_pin.infer.result import shown
-
-LEVEL = 0.05
-"""Family-wise error of calling any model worse than the best when it is not."""
 
 
 @dataclass(frozen=True)
@@ -189,7 +187,7 @@ def apart_from(best: np.ndarray, other: np.ndarray, rivals: int, folds: int) -> 
     best, other
         Shape (trials,): errors of both on the same trials.
     rivals
-        Models that are held against the best, which share `LEVEL` (Bonferroni).
+        Models that are held against the best, which share `UNUSUAL_LEVEL` (Bonferroni).
     folds
         Parts that trials were dealt to, 1 for trials that no fit has had. Fits of folds share trials, and the variance
         of the mean is 1 + folds / (folds - 1) times that of independent differences: Nadeau and Bengio, Machine
@@ -202,7 +200,7 @@ def apart_from(best: np.ndarray, other: np.ndarray, rivals: int, folds: int) -> 
         return Apart(mean, -math.inf, math.inf)
     wider = 1.0 + folds / (folds - 1.0) if folds > 1 else 1.0
     deviation = float(more.std(ddof=1)) * math.sqrt(wider / count)
-    half = float(special.stdtrit(count - 1, 1.0 - 0.5 * LEVEL / max(rivals, 1))) * deviation
+    half = float(special.stdtrit(count - 1, 1.0 - 0.5 * UNUSUAL_LEVEL / max(rivals, 1))) * deviation
     return Apart(mean, mean - half, mean + half)
 
 

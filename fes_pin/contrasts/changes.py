@@ -10,13 +10,10 @@ from fes_pin.contrasts.screen import ItemScore
 from fes_pin.contrasts.words import of_cause, of_nominal
 from fes_pin.diagnosis.misread import NAME, Misread
 from fes_pin.infer.distributions import normal_quantile
-from fes_pin.infer.levels import ABSORBED_BELOW, CLAIM_LEVEL, SEPARABLE
+from fes_pin.infer.levels import ABSORBED_BELOW, CLAIM_LEVEL, SEEN_POWER, SEPARABLE
 from fes_pin.infer.result import Change, Evidence, ParameterEstimate
 from fes_pin.models.catalogue import Catalogue
 from fes_pin.models.stage import Effect
-
-SEEN = 0.95
-"""Power at which a change that was not found is called excluded."""
 
 
 def change_of(
@@ -91,7 +88,7 @@ def not_changed(
         Both by name, and the names of what could have changed unseen.
     """
     single = 1.0 - (1.0 - CLAIM_LEVEL) ** (1.0 / models.family.tests)
-    reach, changed = normal_quantile(1.0 - 0.5 * single) + normal_quantile(SEEN), {i.name for i in best.items}
+    reach, changed = normal_quantile(1.0 - 0.5 * single) + normal_quantile(SEEN_POWER), {i.name for i in best.items}
     others = [s for s in models.screen.scores(best).scored if s.item.group is not None and s.item.name not in changed]
     sizes = [(s, reach * s.deviation * math.sqrt(max(s.spread.phi, 1.0))) for s in others]
     shares = _largest([(s, size / abs(v)) for s, size in sizes if s.effect is None and (v := _value(best, s))])

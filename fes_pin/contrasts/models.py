@@ -15,7 +15,7 @@ from fes_pin.diagnosis.search.likelihood_forms import demanded_form
 from fes_pin.diagnosis.search.starts import STARTS, forms_beside, refinements
 from fes_pin.infer.distributions import chi2_tail
 from fes_pin.infer.fits import Candidate, FittedSets, more_degrees
-from fes_pin.infer.levels import CLAIM_LEVEL, DRIVEN_LEVEL
+from fes_pin.infer.levels import CLAIM_LEVEL, DRIVEN_LEVEL, MOST_ITEMS
 from fes_pin.infer.scatter import excess_scatter
 from fes_pin.infer.search import Names, Policy, Search, SearchResult
 from fes_pin.infer.spread import ByUnit, Spread
@@ -23,8 +23,6 @@ from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
 from fes_pin.workers import Progress, in_parallel
 
-MOST_ITEMS = 5
-"""Common causes and changes together."""
 FITTED, FITTED_DRIVEN = 10, 6
 """Items that are fitted with a set, those of largest score; on driven rigs a fit is some five times as long."""
 

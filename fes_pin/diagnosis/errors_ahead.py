@@ -9,23 +9,18 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.decide.folds import FOLDS
 from fes_pin.identify.ahead import SquaredErrors, forecast, forecasts, one_step, reach_of
 from fes_pin.identify.likelihood import is_simulated
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.per_trial import predictions
 from fes_pin.identify.process_noise import driving_size, first_guess
-from fes_pin.infer.held_out import Errors, joined_errors, percent_of_spread, within
-from fes_pin.infer.levels import RUNAWAY, SMALL_SHARE
+from fes_pin.infer.held_out import FOLDS, Errors, joined_errors, percent_of_spread, within
+from fes_pin.infer.levels import AVERAGED_S, RUNAWAY, SMALL_SHARE
 from fes_pin.infer.noise import NoiseModel
 from fes_pin.models.autoregression import weights_ahead
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt
 from fes_pin.workers import in_parallel
-
-AVERAGED_S = 0.05
-"""Time over which a random effort is averaged before it is compared, s: what is faster moves no limb, and of what is
-much faster than the rig data tell the intensity 2 std^2 time alone, not deviation and time one by one."""
 
 TENTHS = 10
 """Pieces of a trial that is simulated freely, where there are fewer than `FOLDS` trials."""

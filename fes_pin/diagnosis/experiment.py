@@ -263,16 +263,20 @@ def _shapes(time: np.ndarray) -> Sequence[np.ndarray]:
     t = time / time[-1]
     rng = np.random.default_rng(45)
     held = np.repeat(rng.random(40), -(-len(time) // 40))[: len(time)]
-    on = (t > 0.1) & (t < 0.6)
+    on, moving = _between(t, 0.1, 0.6), _between(t, -1.0, 0.9)
     return [
         np.where(on, 0.3, 0.0),
         np.where(on, 0.6, 0.0),
         np.where(on, 1.0, 0.0),
         np.clip(np.floor(10.0 * t) / 8.0, 0.0, 1.0),
         1.0 - np.abs(2.0 * t - 1.0),
-        np.where(t < 0.9, 0.5 + 0.5 * np.sin(2 * np.pi * 0.5 * time), 0.0),
-        np.where(t < 0.9, 0.5 + 0.3 * np.sin(2 * np.pi * 1.5 * time), 0.0),
-        np.where((time % 1.0 < 0.5) & (t < 0.9), 0.8, 0.0),
-        np.where((time % 0.4 < 0.2) & (t < 0.9), 0.5, 0.0),
-        np.where(t < 0.9, held, 0.0),
+        np.where(moving, 0.5 + 0.5 * np.sin(2 * np.pi * 0.5 * time), 0.0),
+        np.where(moving, 0.5 + 0.3 * np.sin(2 * np.pi * 1.5 * time), 0.0),
+        np.where(_between(time % 1.0, -1.0, 0.5) & moving, 0.8, 0.0),
+        np.where(_between(time % 0.4, -1.0, 0.2) & moving, 0.5, 0.0),
+        np.where(moving, held, 0.0),
     ]
+
+
+def _between(t: np.ndarray, low: float, high: float) -> np.ndarray:
+    return (low < t) & (t < high)

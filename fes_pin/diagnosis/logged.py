@@ -87,7 +87,7 @@ class LogFaults:
         if not (isinstance(nominal, LikelihoodFit) and isinstance(extended, LikelihoodFit)):
             return None
         row_s = min(t.dt for t in extended.trials)
-        as_logged = row_s < 1.5 * min(t.dt for t in self.trials)
+        as_logged = round(row_s / min(t.dt for t in self.trials)) == 1
         late = lateness_of(extended, row_s, as_logged)
         if late is None and diagnosis.causes:
             late = lateness_of(nominal, row_s, as_logged)

@@ -22,7 +22,7 @@ from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit, fit_multistart, fit_problem, noise_of, rough_noise
 from fes_pin.identify.per_trial import halves
 from fes_pin.identify.problem import Problem
-from fes_pin.infer.levels import CLAIM_LEVEL
+from fes_pin.infer.levels import CLAIM_LEVEL, EXPLAINED_AS_WELL, FEWEST_STATED, MISREAD_SCORE
 from fes_pin.infer.noise import NoiseModel, as_white
 from fes_pin.infer.problem import Linearized, normal_equations
 from fes_pin.infer.projection import without_locals
@@ -38,22 +38,16 @@ DESCRIBED = f"""{NAME} (rig; rigs: ankle, joint, muscle)
     value, of the condition that the trial states
 """
 """As `fes-pin effects` tells it: it is of a trial, not of the rig, and no effect of a model."""
-FEWEST = 4
-"""Trials that state something: the others must tell how much trials differ anyway."""
 CANDIDATES = 3
 """Trials that are left out in turn, those that the screen finds oddest."""
 UNFELT = 1e-7
 """Share of an answer's spread that a step of a condition moves it by where only rounding does."""
-LEAST_SCORE = 10.0
-"""Drop in twice the log-likelihood under white noise that a trial must promise: three deviations."""
 ENDS = 0.01
 """Step, in standard deviations of the value, with which its search ends."""
 STEPS = 8
 """Gauss-Newton steps of one value, which half a step of its own size usually ends."""
 SHARE = 1e-4
 """Step of a numerical derivative, of the spread of what trials state, or of its size where all state the same."""
-AS_WELL = 2.0
-"""Times the mean square that the worst explained other trial leaves, beyond which a restated one is not explained."""
 
 
 @dataclass(frozen=True)
@@ -120,7 +114,7 @@ def find_misread(model: Model, trials: Sequence[Trial]) -> Misread | None:
     first = {(t.kind, n): t for t in reversed(trials) for n in model.rig.stated(t)}
     felt = {key: _is_felt(model, t, key[1], sizes[key[1]]) for key, t in first.items()}
     wanted = [(i, n) for i, t in enumerate(trials) for n in model.rig.stated(t) if felt[t.kind, n]]
-    if len({i for i, _ in wanted}) < FEWEST:
+    if len({i for i, _ in wanted}) < FEWEST_STATED:
         return None
     whole = fit_multistart(Problem(model, trials, rough_noise(model, trials)), model.parameters())
     if not math.isfinite(whole.sse):
@@ -183,7 +177,7 @@ def _screen(
         return along**2 / power if power > 1e-9 * max(float(column[:, 0] @ column[:, 0]), 1e-300) else 0.0
 
     scores = in_parallel(score, list(wanted))
-    return [wanted[k] for k in np.argsort(scores)[::-1][:CANDIDATES] if scores[k] > LEAST_SCORE]
+    return [wanted[k] for k in np.argsort(scores)[::-1][:CANDIDATES] if scores[k] > MISREAD_SCORE]
 
 
 def _column(model: Model, trial: Trial, name: str, fitted: Fit, noise: NoiseModel, step: float) -> np.ndarray:
@@ -217,13 +211,13 @@ def _left_out(
     own = _step(fitted, trials[i], name, noise, sizes[name])
     steps = [_step(fitted, trials[k], n, noise, sizes[n], 1) for k, n in wanted if k != i]
     told = [s for s in steps if math.isfinite(s.z)]
-    if len(told) < FEWEST - 1 or not math.isfinite(own.z):
+    if len(told) < FEWEST_STATED - 1 or not math.isfinite(own.z):
         return None
     phi = max(1.0, float(np.mean([s.z**2 for s in told])))
     t = abs(own.z) / math.sqrt(phi)
     p = min(1.0, 2.0 * len(wanted) * float(special.stdtr(len(told), -t)))
     usual = max(float(part.residual @ part.residual) / len(part.residual) for part in fitted.parts)
-    if not p < CLAIM_LEVEL or own.left > AS_WELL * max(usual, 1.0):
+    if not p < CLAIM_LEVEL or own.left > EXPLAINED_AS_WELL * max(usual, 1.0):
         return None
     stated = whole.model.rig.stated(trials[i])[name]
     told_by = [_step(fitted, trials[i], name, noise, sizes[name], half=k).value for k in (0, 1)]

@@ -9,7 +9,7 @@ import numpy as np
 
 from fes_pin.data.stuck import piece
 from fes_pin.data.trial import Trial
-from fes_pin.identify.ahead import HORIZON_S
+from fes_pin.infer.levels import HORIZON_S
 from fes_pin.models.compile.layout import WIDTH
 from fes_pin.models.rigs.base import Rig
 

@@ -22,27 +22,19 @@ from fes_pin.diagnosis.search.score import Scores, score_test
 from fes_pin.identify.feedback import is_fed_back
 from fes_pin.identify.fit import Fit, fit_multistart, rough_noise
 from fes_pin.identify.problem import Problem
-from fes_pin.infer.levels import ABSORBED_BELOW
+from fes_pin.infer.levels import ABSORBED_BELOW, ALIKE_COSINE, LEAST_SHIFT_S, REVERSED_LEAVES, SMALL_SHARE
 from fes_pin.models.catalogue import Catalogue, installed
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.simulate import simulated_trial
 from fes_pin.workers import OutOfTime, one_thread_each
 
-ALIKE = 0.99
-"""Cosine of two causes' sensitivities from which they look alike: to tell them apart at 95 % either must then stand out
-by 23 standard deviations (1.645 sqrt(2 / (1 - cosine)))."""
 LONGEST_SHIFT = 0.25
 """Share of a trial that it is tried to be shifted by, either way."""
+FEWEST = 3
+"""Trials that a shifted one is told by: two others."""
 MOST_LOOKED_AT = 8
 """Trials that are looked at for a shift, the worst fitted first: each takes a fit of the others."""
-LEAST_SHIFT_S = 0.1
-"""Seconds by which a trial must be shifted beyond the others: muscles answer within a tenth of a second, and dry
-friction delays a motion by some hundredths."""
-SHIFTED = 0.1
-"""Share of its squared error that a shifted trial must be left with to be called so."""
-REVERSED = 0.3
-"""Share of the squared error, and of the variance, that is left at most with an effort that counts the other way."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,7 +149,7 @@ def _alike(scores: Scores, kept: Mapping[str, float]) -> tuple[tuple[str, ...], 
     groups: list[set[str]] = []
     for (name, i), (other, j) in itertools.combinations(single, 2):
         size = math.sqrt(scores.gram[i, i] * scores.gram[j, j])
-        if name == other or not size > 0.0 or abs(scores.gram[i, j]) < ALIKE * size:
+        if name == other or not size > 0.0 or abs(scores.gram[i, j]) < ALIKE_COSINE * size:
             continue
         if not any({name, other} <= group for group in groups):
             groups.append({name, other})
@@ -170,7 +162,9 @@ def _reversed(model: Model, trials: Sequence[Trial], fitted: Fit) -> list[str]:
         return []
     turned = [t.with_columns(effort=-t["effort"]) if "effort" in t else t for t in trials]
     other = _fitted(model, turned)
-    if not (math.isfinite(other.sse) and other.sse < REVERSED * fitted.sse and _unexplained(other) < REVERSED):
+    if not (
+        math.isfinite(other.sse) and other.sse < REVERSED_LEAVES * fitted.sse and _unexplained(other) < REVERSED_LEAVES
+    ):
         return []  # a rig whose effort answers its reading is explained by neither
     share = 100.0 * other.sse / fitted.sse
     return [
@@ -181,15 +175,15 @@ def _reversed(model: Model, trials: Sequence[Trial], fitted: Fit) -> list[str]:
 
 def _shifted(model: Model, trials: Sequence[Trial], fitted: Fit) -> list[str]:
     """Trials whose readings the model of the others foretells far better a while earlier or later than the others'."""
-    if len(trials) < 3:
+    if len(trials) < FEWEST:
         return []
     sums = [float(p.residual @ p.residual) / len(p.residual) for p in fitted.parts]
     worst = [trials[i] for i in np.argsort(sums)[::-1][:MOST_LOOKED_AT]]
     shifts = [_shift(_fitted(model, [t for t in trials if t is not one]).model, one) for one in worst]
-    usual = float(np.median([shift if share < SHIFTED else 0.0 for shift, share in shifts]))
+    usual = float(np.median([shift if share < SMALL_SHARE else 0.0 for shift, share in shifts]))
     out = []
     for trial, (shift, share) in zip(worst, shifts, strict=True):
-        if share < SHIFTED and abs(shift - usual) > LEAST_SHIFT_S:
+        if share < SMALL_SHARE and abs(shift - usual) > LEAST_SHIFT_S:
             way = "later" if shift > usual else "earlier"
             out.append(
                 f"trial {trial.name} answers {abs(shift - usual):.2g} s {way} than the others: is it shifted in time?"
@@ -210,6 +204,6 @@ def _shift(model: Model, trial: Trial) -> tuple[float, float]:
     if not np.isfinite(errors).all():
         return 0.0, 1.0
     best, none = int(np.argmin(errors)), int(np.argmin(np.abs(lags)))
-    if errors[best] > SHIFTED * np.var(measured):  # a rig that falls over is foretold at no time
+    if errors[best] > SMALL_SHARE * np.var(measured):  # a rig that falls over is foretold at no time
         return 0.0, 1.0
     return float(lags[best] * trial.dt), float(errors[best] / max(errors[none], 1e-300))

@@ -23,6 +23,6 @@ def left_out_text(left_out: Mapping[str, Mapping[str, Sequence[int]]], trials: S
             found.setdefault(name, {})[trial] = len(samples)
     return ", ".join(
         f"{sum(counts.values())} of {sum(lengths[t] for t in counts)} samples of {name} in "
-        + (" and ".join(counts) if len(counts) < 3 else f"{len(counts)} trials")
+        + (" and ".join(counts) if len(counts) <= 2 else f"{len(counts)} trials")
         for name, counts in found.items()
     )

@@ -23,7 +23,7 @@ from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit, noise_of
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.per_trial import foretold_unknowns, predictions
-from fes_pin.infer.levels import RUNAWAY
+from fes_pin.infer.levels import HORIZON_S, RUNAWAY
 from fes_pin.infer.noise import Noise, NoiseModel, thin, thinning
 from fes_pin.models.autoregression import weights_ahead
 from fes_pin.models.foretold import ForetoldOutput
@@ -34,8 +34,6 @@ from fes_pin.models.simulate import Simulator
 Random = Doubt | NoiseModel
 """What is random about a rig: in its effort and readings, or in its readings alone."""
 
-HORIZON_S = 0.3
-"""How far ahead a horizon looks by default, s, or a tenth of the shortest trial if that is less."""
 STRIDE = 0.25
 """Of the horizon: how much older than asked the newest sample that a prediction uses may be."""
 SEEN_AGAIN = 3

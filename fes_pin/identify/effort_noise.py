@@ -15,15 +15,12 @@ from fes_pin.data.answered import ControllerAnswer
 from fes_pin.data.log import quiet
 from fes_pin.data.trial import Trial
 from fes_pin.identify.likelihood_fit import LikelihoodFit, maximum_from
-from fes_pin.infer.levels import CERTAIN_GAIN
+from fes_pin.infer.levels import CERTAIN_GAIN, EFFORT_NOISE_SHARE
 from fes_pin.workers import in_parallel
 
 TRIED = (0.1, 0.25, 0.5, 0.75)
 """Shares of the samples whose answer leaves less than a noise that is tried: noise is the same everywhere, and what it
 is not foretold by is not, so that where an answer is known at all it leaves little else."""
-
-LEAST_SHARE = 1e-3
-"""Of the random effort's spectrum at rest, 2 std^2 time, from which that of a noise, noise^2 dt, is any beside it."""
 
 Prepared = Callable[[Sequence[Trial]], Sequence[Trial]]
 """What a search makes of recorded trials before it fits them."""
@@ -53,7 +50,7 @@ def effort_noise_of(
 def _least(fitted: LikelihoodFit, trials: Sequence[Trial]) -> float:
     """The least noise that is anything beside the random effort of a fit, in the effort's unit."""
     std, time = (part.get("effort", 0.0) for part in (fitted.noise.std, fitted.noise.time))
-    return float(np.sqrt(LEAST_SHARE * 2.0 * std**2 * time / min(t.dt for t in trials)))
+    return float(np.sqrt(EFFORT_NOISE_SHARE * 2.0 * std**2 * time / min(t.dt for t in trials)))
 
 
 def quieted(trials: Sequence[Trial], answers: Sequence[ControllerAnswer], noise: float) -> list[Trial]:

@@ -49,7 +49,7 @@ from fes_pin.data.trial import Trial, derived_trial
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit, maximum_from
 from fes_pin.infer.covariance import covariance_of, widened
-from fes_pin.infer.levels import CERTAIN_GAIN
+from fes_pin.infer.levels import CERTAIN_GAIN, LEAST_LATE_ROWS, MOST_EARLY_ROWS, MOST_LATE_ROWS
 from fes_pin.infer.problem import Linearized, normal_equations, whitened_sse
 from fes_pin.infer.scatter import at_rest, scores_of, with_honest_intervals
 from fes_pin.models.parameters import parameter
@@ -57,12 +57,6 @@ from fes_pin.models.predictor import are_news
 from fes_pin.models.stage import Effect, Stage
 from fes_pin.workers import in_parallel
 
-LEAST_ROWS = 0.25
-"""The least: of a log that asks in every second sample of a controller, which holds for half a row."""
-MOST_ROWS = 2.0
-"""Rows of a log by which an effort may be late: one that it is held when it is written down, and one until the next."""
-MOST_EARLY_ROWS = 0.5
-"""Rows by which it may act later than written: what is more is a lag, see `SensorLag.smallest`."""
 SPACING = 40
 """Rows from one pulse by which H is measured to the next: by then the response to the last one is smooth."""
 PULSE = 1e-3
@@ -118,7 +112,7 @@ def lateness_of(fitted: LikelihoodFit, row_s: float, as_logged: bool = False) ->
         return at(float(found.x))
 
     ways = _WAYS if as_logged else _WAYS[:1]
-    begun = in_parallel(lambda way: moved(way[0](LEAST_ROWS * row_s)).sse, ways)
+    begun = in_parallel(lambda way: moved(way[0](LEAST_LATE_ROWS * row_s)).sse, ways)
     if min(begun) > fitted.sse - CERTAIN_GAIN:
         return None
     worth = [way for way, sse in zip(ways, begun, strict=True) if sse < fitted.sse]
@@ -131,7 +125,7 @@ def lateness_of(fitted: LikelihoodFit, row_s: float, as_logged: bool = False) ->
 
 
 _WAYS: tuple[_Way, ...] = (
-    (lambda late_s: Log(effort_late_s=late_s), MOST_ROWS),
+    (lambda late_s: Log(effort_late_s=late_s), MOST_LATE_ROWS),
     (lambda early_s: Log(effort_late_s=-early_s), MOST_EARLY_ROWS),
     (lambda late_s: Log(effort_over_s=2.0 * late_s), MOST_EARLY_ROWS),
 )

@@ -10,17 +10,13 @@ import numpy as np
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
 from fes_pin.infer.distributions import chi2_tail, f_tail
-from fes_pin.infer.levels import CERTAIN_LEVEL
+from fes_pin.infer.levels import ANSWERED, CERTAIN_LEVEL
 from fes_pin.models.rigs.base import Rig
 
 SHORTEST = 20
 """Samples for each lag below which nothing is tested."""
 LAGS = 4
 """Samples that a controller's answer is sought in: it acts in the sample in which it reads, or a few later."""
-ANSWERED = 1.0 / 6.0
-"""Share of a stimulus, beyond what its past foretells, that readings tell where it answers them. Of trials that a
-script stimulated it was 0.01 in the median, 0.10 at most (`tests/identify/test_feedback.py`); of a controller's it is
-0.23 even where pulse widths come in steps of 10 us (`tests/driven/test_stimulated.py`)."""
 JUMP = 5.0
 """Deviations beyond which a second difference is a jump, not noise."""
 

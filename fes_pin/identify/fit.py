@@ -25,6 +25,7 @@ from fes_pin.infer.problem import Linearized, Unknowns, whitened_sse
 from fes_pin.infer.problem import Problem as AnyProblem
 from fes_pin.infer.profile import profile_interval
 from fes_pin.infer.result import shown
+from fes_pin.infer.scoring import LITTLE
 from fes_pin.models.accepted import accepted_trials
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt
@@ -127,7 +128,7 @@ class Fit(Optimum, Saveable):
         with one_thread_each():
             return profile_interval(problem, name, self.values, self.unknowns, reach, name in self.at_bound)
 
-    def is_optimal(self, tolerance: float = 0.1) -> bool:
+    def is_optimal(self, tolerance: float = LITTLE) -> bool:
         """True if no free parameter's Newton step would gain more than `tolerance` in twice the log-likelihood."""
         return self.converged and self.gradient_norm <= tolerance
 

@@ -18,12 +18,9 @@ from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial, derived_trial
 from fes_pin.identify.fit import Fit, fit_multistart, fit_problem, noise_of, rough_noise
 from fes_pin.identify.problem import Problem
-from fes_pin.infer.levels import SMALL_SHARE
+from fes_pin.infer.levels import SMALL_SHARE, SMOOTH
 from fes_pin.models.model import Model
 
-SMOOTH = 0.3
-"""Noise from sample to sample as a share of all that the nominal model leaves, from which a record is as it was read.
-Of ten samples' averages it is below 0.15, of a sensor's noise above 0.5 (`tests/diagnosis/test_low_passed.py`)."""
 PERIODS, MOST = 10.0, 0.2
 """Cut-offs that are tried: from so many periods in the shortest trial, of which the ends are one or two, to this share
 of the sampling rate."""

@@ -11,7 +11,7 @@ import numpy as np
 import scipy.linalg
 from numpy.lib.stride_tricks import as_strided
 
-from fes_pin.infer.levels import PARAMETER_PRICE
+from fes_pin.infer.levels import PARAMETER_PRICE, WHITE_SHARE
 
 ORDERS = (0, 1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48)
 """Orders tried. Sensor noise is whitened by a few; random torque under white sensor noise is slow and needs 24 to 48:
@@ -19,10 +19,6 @@ on the ankle, order 12 leaves 2.2 times too much power below 0.5 Hz, order 24 no
 
 SAMPLES_EACH = 10
 """Samples of the shortest trial for each coefficient, at least (Box and Jenkins)."""
-WHITE_SHARE = 0.003
-"""Share of the residual's variance that is taken for white on top of it. It keeps a filter from becoming a resonator
-that swallows whatever a model gets wrong; slow noise weighs as before. It is no bound on the range of the spectrum: a
-sinusoid still leaves a deep notch."""
 
 
 @dataclass(frozen=True)

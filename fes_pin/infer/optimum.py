@@ -9,14 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from fes_pin.infer.covariance import covariance_of, single_gain
-from fes_pin.infer.levels import CONFIDENCE_95, PARAMETER_PRICE
+from fes_pin.infer.levels import CONFIDENCE_95, PARAMETER_PRICE, SEPARABLE
 from fes_pin.infer.optimize import Descent
 from fes_pin.infer.problem import Linearized, Problem, Unknowns, normal_equations
 
 MAX_ITERATIONS = 60
 """Steps of a fit, at most; what has not converged then says so."""
-RISE_AT_A_BOUND = 1.6448536269514722**2
-"""The normal's 95 % quantile, squared: twice the log-likelihood at the end of a one-sided interval."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -167,4 +165,4 @@ def reach_at_bound(parts: Sequence[Linearized], k: int, held: Sequence[bool]) ->
         return math.inf
     known = np.isfinite(np.diag(covariance))
     slope = abs(float(covariance[k, known] @ system.gradient[known])) / covariance[k, k]
-    return float(RISE_AT_A_BOUND / (slope + math.sqrt(slope**2 + RISE_AT_A_BOUND / covariance[k, k])))
+    return float(SEPARABLE / (slope + math.sqrt(slope**2 + SEPARABLE / covariance[k, k])))

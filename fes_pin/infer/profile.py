@@ -19,9 +19,8 @@ from collections.abc import Callable, Mapping
 
 from scipy.optimize import brentq
 
-from fes_pin.infer.levels import CONFIDENCE_95
+from fes_pin.infer.levels import CONFIDENCE_95, SEPARABLE
 from fes_pin.infer.optimize import Descent
-from fes_pin.infer.optimum import RISE_AT_A_BOUND
 from fes_pin.infer.problem import Problem, Unknowns
 
 RISE = CONFIDENCE_95**2
@@ -48,7 +47,7 @@ def profile_interval(
     step
         About how far an end is away; only the time depends on it.
     """
-    rise = RISE_AT_A_BOUND if at_bound else RISE
+    rise = SEPARABLE if at_bound else RISE
     here, limits = values[name], problem.limits
     least = Descent(problem, values, unknowns).sse
 

@@ -8,6 +8,12 @@ LEAST_P, LEAST_PERCENT = 1e-12, 1e-3
 """Below these a p-value and a percentage are printed as smaller than that."""
 
 
+MOST_DIGITS = 6
+"""Decimals that are printed."""
+LARGE = 1e5
+"""A value that is printed with three digits."""
+
+
 def probability(value: float) -> str:
     """A p-value as printed; never zero."""
     if math.isnan(value):
@@ -32,7 +38,7 @@ def quantity(value: float, std: float, unit: str) -> str:
     if std <= 0.0:
         return f"{value:.4g} {unit} (held)".replace("  ", " ")
     digits = max(0, 1 - math.floor(math.log10(std)))
-    if digits > 6 or abs(value) >= 1e5:
+    if digits > MOST_DIGITS or abs(value) >= LARGE:
         return f"{value:.3g} +- {std:.2g} {unit}".strip()
     return f"{value:.{digits}f} +- {std:.{digits}f} {unit}".strip()
 

@@ -9,17 +9,20 @@ from typing import Any
 import numpy as np
 
 from fes_pin.data.read_only import ReadOnly
+from fes_pin.infer.levels import STRONG_EVIDENCE
 from fes_pin.infer.search import SearchResult
 from fes_pin.walk.banks import Banks
 from fes_pin.walk.dynamics import about, centre_of_mass, required
-from fes_pin.walk.models import STRONG_EVIDENCE, WalkFit, WalkModels
+from fes_pin.walk.models import WalkFit, WalkModels
 from fes_pin.walk.motion import Motion
 from fes_pin.walk.plates import Plates
 from fes_pin.walk.scene import Scene
 
 NEXT_FILE = "next_trial.csv"
 CARRIED_KG = 10.0
+"""Load that is carried in the trial that is proposed."""
 SLOWER = 0.6
+"""Share of the usual speed in the trial that is proposed."""
 
 
 @dataclass(frozen=True)

@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from fes_pin.infer.distributions import f_tail
+from fes_pin.infer.levels import SEEN_DEVIATIONS
 from fes_pin.walk.banks import Banks
 from fes_pin.walk.likelihood import FLOOR_N, by_frequency
 from fes_pin.walk.models import WalkFit
 
-SEEN = 3.0
-"""A cause is testable if an effect of plausible size is so many standard deviations from zero, the nuisance fitted."""
 WAVES = ("mean", "once a stride", "twice a stride")
 CHANNELS = ("forward force", "leftward force", "vertical force", "moment about forward", "moment about left",
             "moment about vertical")  # fmt: skip
@@ -66,7 +65,7 @@ def lack_of_fit(banks: Banks, one: WalkFit) -> tuple[float, str]:
 
 
 def not_testable(banks: Banks, one: WalkFit) -> list[str]:
-    """Causes whose every form, at its plausible size, stands out of noise and nuisance by less than `SEEN`."""
+    """Causes whose every form, at its plausible size, stands out by less than `SEEN_DEVIATIONS`."""
     noise, variance = banks.noise, one.fitted.variance
     root = 1.0 / np.sqrt(variance).ravel()
     taken = np.concatenate([noise.nuisance, banks.columns(one.names)], axis=3).reshape(variance.size, -1)
@@ -80,4 +79,4 @@ def not_testable(banks: Banks, one: WalkFit) -> list[str]:
     found = {banks.forms[n].cause for n in one.names}
     if banks.strides.count > 1:  # what differs from stride to stride shows noise
         found.add("marker_noise")
-    return sorted(name for name, size in best.items() if size < SEEN and name not in found)
+    return sorted(name for name, size in best.items() if size < SEEN_DEVIATIONS and name not in found)

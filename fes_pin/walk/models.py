@@ -11,10 +11,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fes_pin.infer.fits import Candidate, FittedSets
+from fes_pin.infer.levels import POSSIBLE_SIZES, STRONG_EVIDENCE, WALK_LEVEL
 from fes_pin.infer.search import Names, Policy, Search, SearchResult
 from fes_pin.walk.banks import Banks
 from fes_pin.walk.likelihood import Fitted, fit_many
-from fes_pin.walk.nulls import LEVEL, Nulls, simulated_nulls
+from fes_pin.walk.nulls import Nulls, simulated_nulls
 from fes_pin.workers import check_limit
 
 POLICY = Policy(beam=4, fitted=None, pairs=0, judged=4)
@@ -25,11 +26,6 @@ ALIKE = 2
 """Sets of the same causes, at other sites, that the search extends."""
 TOGETHER = 64
 """Fits that are made at once: as many as a processor's cache holds."""
-STRONG_EVIDENCE = 6.0
-"""Twice the log of the odds at which one set of causes is preferred to another: 20 to 1 (R. E. Kass and A. E. Raftery,
-Bayes factors, J. Am. Stat. Assoc. 90:773, 1995). The likelihood holds the priors of sizes, and so such odds."""
-POSSIBLE = 3.0
-"""Sizes beyond this many times the plausible one are no explanation."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,8 +145,8 @@ class WalkModels(FittedSets[WalkFit, None]):
         return float(gain <= 0.0) if self.null is None else self.null.family.p_value(gain)
 
     def level(self, fitted: WalkFit) -> float:
-        """See `LEVEL`."""
-        return LEVEL
+        """See `WALK_LEVEL`."""
+        return WALK_LEVEL
 
     def near_rivals(self, found: SearchResult[WalkFit], name: str) -> list[WalkFit]:
         """Sets with another form in the place of one whose odds against the best set are not strong, best first."""
@@ -180,7 +176,7 @@ class WalkModels(FittedSets[WalkFit, None]):
         found = fit_many(np.broadcast_to(y, (len(group), *y.shape)), x, prior, noise)
         out = []
         for names, fitted in zip(group, found, strict=True):
-            possible = bool((np.abs(fitted.believed) <= POSSIBLE * self.banks.plausible(names)).all())
+            possible = bool((np.abs(fitted.believed) <= POSSIBLE_SIZES * self.banks.plausible(names)).all())
             owners = [n for n in names for _ in forms[n].parameters]
             possible &= all(self._may_be(n, v) for n, v in zip(owners, fitted.believed.tolist(), strict=True))
             out.append(WalkFit(names, fitted, fitted.deviance if possible else math.inf))
@@ -191,7 +187,7 @@ class WalkModels(FittedSets[WalkFit, None]):
         if self.banks.forms[name].positive and value < 0.0:
             return False
         known = self.readings.get(name)
-        return known is None or abs(value - known[0]) <= POSSIBLE * known[1]
+        return known is None or abs(value - known[0]) <= POSSIBLE_SIZES * known[1]
 
 
 class WalkSearch(Search[WalkFit]):

@@ -85,7 +85,7 @@ def pelvis_to_hip(body: Body, table: Mapping | None = None) -> np.ndarray:
             centre = np.array(place, dtype=float)
         except (TypeError, ValueError):
             centre = np.zeros(0)
-        if centre.shape != (3,) or not np.isfinite(centre).all():
+        if centre.shape != PELVIS_TO_HIP.shape or not np.isfinite(centre).all():
             raise InputError("must be three finite numbers in m", column="joints.hip_r.loc_in_parent")
         return centre
     if body.height_m is None:

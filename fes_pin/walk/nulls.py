@@ -12,10 +12,8 @@ from fes_pin.walk.likelihood import fit_many
 
 SIMULATED = 100
 """Residuals without a cause that the law of the largest gain is taken from."""
-LEVEL = 1e-4
-"""Chance that anything is named where nothing is wrong, over the whole library, in soft tissue as it is simulated. That
-is one law among many, and the channels' rotation has seen the data: what is counted in walks made otherwise is more."""
 SIMULATED_ROUNDS = 4
+"""Alternations of weights and sizes in a fit of a simulated residual."""
 FLOOR_SHARE = 0.3
 """Share of the fitted noise, as an amplitude, that is simulated in addition to soft tissue."""
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from fes_pin.infer.distributions import chi2_tail, normal_quantile
 from fes_pin.infer.held_out import speaks_for
-from fes_pin.infer.levels import CERTAIN_LEVEL, CLAIM_LEVEL
+from fes_pin.infer.levels import CERTAIN_LEVEL, CLAIM_LEVEL, WALK_LEVEL
 from fes_pin.infer.result import FITTED, NO_GAIN, Cause, Evidence, ParameterEstimate, Remainder
 from fes_pin.infer.search import SearchResult
 from fes_pin.infer.verdict import State, Verdict, Weighed
@@ -16,7 +16,6 @@ from fes_pin.walk.effect import STAGE
 from fes_pin.walk.errors import StrideErrors
 from fes_pin.walk.judge import lack_of_fit, other_leg
 from fes_pin.walk.models import WalkFit, WalkSearch
-from fes_pin.walk.nulls import LEVEL
 from fes_pin.walk.white_noise import white_noise
 
 ORDINARY_MM = 2.0
@@ -75,7 +74,7 @@ class WalkVerdict(Verdict[WalkFit, WalkWeighed]):
     def _is_supported(self, state: Judgement, name: str) -> bool:
         weighed, p_value, alone = state.weighed, state.found.p_values[name], len(state.names) == 1
         other = weighed.other_leg[name]
-        if p_value >= (LEVEL if weighed.evidence else CERTAIN_LEVEL) or (other is not None and other <= 0.0):
+        if p_value >= (WALK_LEVEL if weighed.evidence else CERTAIN_LEVEL) or (other is not None and other <= 0.0):
             return False
         return not weighed.evidence or speaks_for(weighed.evidence[name], weighed.gains[name], alone)
 

@@ -16,12 +16,12 @@ from fes_pin.diagnosis.remainder.bursts import burst_p_value
 from fes_pin.diagnosis.remainder.heteroscedastic import heteroscedastic_p_value
 from fes_pin.diagnosis.remainder.innovations import Innovations, channels, under_own_noise
 from fes_pin.diagnosis.remainder.lines import line_p_value
-from fes_pin.diagnosis.remainder.open_set import FULL_NOISE, unexplained_remainder
+from fes_pin.diagnosis.remainder.open_set import unexplained_remainder
 from fes_pin.diagnosis.remainder.play import play_p_value
 from fes_pin.diagnosis.remainder.repeated import repeated_p_value
 from fes_pin.diagnosis.remainder.slips import slip_p_value
 from fes_pin.identify.fit import fit
-from fes_pin.infer.levels import CLAIM_LEVEL
+from fes_pin.infer.levels import CLAIM_LEVEL, FULL_NOISE
 from fes_pin.infer.noise import Noise, estimate_noise
 from fes_pin.infer.projection import Projection
 from fes_pin.models.model import Model

@@ -7,16 +7,8 @@ import pytest
 import scipy.signal
 import scipy.stats
 
-from fes_pin.infer.noise import (
-    ORDERS,
-    WHITE_SHARE,
-    Noise,
-    estimate_noise,
-    first_order_low_pass,
-    noise_step,
-    thin,
-    thinning,
-)
+from fes_pin.infer.levels import WHITE_SHARE
+from fes_pin.infer.noise import ORDERS, Noise, estimate_noise, first_order_low_pass, noise_step, thin, thinning
 
 TRUE = {0: (), 1: (0.6,), 2: (1.2, -0.5), 3: (0.5, -0.3, 0.4)}
 

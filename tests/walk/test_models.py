@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from fes_pin.data.study import read_study
+from fes_pin.infer.levels import POSSIBLE_SIZES, WALK_LEVEL
 from fes_pin.walk.banks import Banks
-from fes_pin.walk.models import ALIKE, POSSIBLE, WalkModels, WalkSearch
-from fes_pin.walk.nulls import LEVEL
+from fes_pin.walk.models import ALIKE, WalkModels, WalkSearch
 from fes_pin.walk.recording import recordings_of
 from fes_pin.walk.verdict import WalkVerdict, marker_noise
 from fes_pin.workers import OutOfTime, noting_stops, time_limit
@@ -51,7 +51,7 @@ def test_few_sets_of_the_same_causes_are_extended(models):
 
 def test_sizes_that_cannot_be_are_no_explanation(models):
     for names, fitted in models.fits.items():
-        possible = np.abs(fitted.fitted.believed) <= POSSIBLE * models.banks.plausible(names)
+        possible = np.abs(fitted.fitted.believed) <= POSSIBLE_SIZES * models.banks.plausible(names)
         assert math.isfinite(fitted.price) <= possible.all()
     shown = [n for n, f in models.fits.items() if not models.is_possible(f)]
     assert not set(shown) & set(models.near(1))
@@ -71,7 +71,7 @@ def test_evidence_decides_until_the_noise_is_known(models):
     assert known.most_candidates > models.most_candidates
     p_values = [known.noise_p_value(gain, 1) for gain in (-1.0, 1.0, 10.0, 100.0)]
     assert p_values == sorted(p_values, reverse=True)
-    assert p_values[0] == 1.0 and p_values[-1] < LEVEL
+    assert p_values[0] == 1.0 and p_values[-1] < WALK_LEVEL
 
 
 def test_a_limit_of_time_ends_the_fits_and_is_noted(models):

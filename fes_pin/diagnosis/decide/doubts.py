@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fes_pin.diagnosis.decide.folds import FOLDS
+from fes_pin.infer.held_out import FOLDS
 
 
 def few_trials(count: int) -> list[str]:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from fes_pin.diagnosis.decide.significance import level_of
-from fes_pin.diagnosis.remainder.open_set import beside_smooth, inflation_by_signs, trial_shares
+from fes_pin.diagnosis.remainder.open_set import KEPT, beside_smooth, inflation_by_signs, trial_shares
 from fes_pin.identify.fit import fit
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit
@@ -28,8 +28,6 @@ from fes_pin.models.stage import Effect
 
 TRIED = (1.0, 0.5, 0.25, 0.1)
 """Shares of the step to where slopes promise the most at which the cost is looked at."""
-KEPT = 1e-3
-"""Share of a feature's norm that what was fitted must leave for it to be judged."""
 
 
 def driven_remainder(fitted: LikelihoodFit, seed: int = 0) -> Remainder:

@@ -11,6 +11,8 @@ from fes_pin.infer.distributions import f_tail
 
 SCALES_S = (0.0, 0.08, 0.3, 1.0)
 """Lengths that the innovations are averaged over, s; 0 takes them as they are."""
+FEWEST = 4
+"""Lengths in a trial, at least."""
 
 
 def heteroscedastic_p_value(innovations: Sequence[np.ndarray], driver: Sequence[np.ndarray], dt: float) -> float:
@@ -37,7 +39,7 @@ def heteroscedastic_p_value(innovations: Sequence[np.ndarray], driver: Sequence[
 
 def _one(scores: Sequence[np.ndarray], driver: Sequence[np.ndarray], count: int) -> float | None:
     window = np.ones(count) / count
-    pairs = [(e, d) for e, d in zip(scores, driver, strict=True) if len(e) >= 4 * count]
+    pairs = [(e, d) for e, d in zip(scores, driver, strict=True) if len(e) >= FEWEST * count]
     if not pairs:
         return None
     z, x = ([np.convolve(one[k], window, "valid") for one in pairs] for k in (0, 1))

@@ -25,7 +25,7 @@ from fes_pin.diagnosis.remainder.repeated import repeated_p_value
 from fes_pin.diagnosis.remainder.slips import slip_p_value
 from fes_pin.identify.fit import Fit
 from fes_pin.infer.distributions import chi2_quantile, chi2_tail
-from fes_pin.infer.levels import CERTAIN_LEVEL, CLAIM_LEVEL
+from fes_pin.infer.levels import CERTAIN_LEVEL, CLAIM_LEVEL, FULL_NOISE, SHORT_NOISE, UNFELT
 from fes_pin.infer.noise import Noise, NoiseModel, first_order_low_pass
 from fes_pin.infer.projection import Projection
 from fes_pin.infer.result import Remainder
@@ -33,13 +33,10 @@ from fes_pin.models.model import Model
 from fes_pin.models.simulate import Simulator
 from fes_pin.workers import in_parallel
 
-SHORT_NOISE = 2
-"""Order of the noise that bursts, repeated and heteroscedastic deviations are looked for under: these tests hold for
-noise of any spectrum, and a longer autoregression learns slow deviations as noise."""
-FULL_NOISE = 24
-"""Order of the noise that slips and play are looked for under. It whitens a random torque down to the lowest
-frequencies, also where a criterion finds it too weak to be worth the coefficients, and reaches back too short a time,
-0.12 s, to learn a jump that lasts."""
+KEPT = 1e-3
+"""Share of its norm that a feature must keep, once what was fitted is projected off."""
+FEWEST_SIGNS = 4
+"""Trials whose signs are drawn, at least."""
 SIGN_DRAWS = 400
 """Random signs of trials that a statistic's inflation is averaged over."""
 
@@ -202,10 +199,10 @@ def smooth_remainder(fitted: Fit, seed: int = 0) -> Remainder:
     columns = projection(made.columns)
     gram = columns.T @ columns
     before, after = np.einsum("mi,mi->i", made.columns, made.columns) ** 0.5, np.diag(gram) ** 0.5
-    good = after > 1e-3 * np.where(before > 0, before, 1.0)
+    good = after > KEPT * np.where(before > 0, before, 1.0)
     names, scale = [n for n, g in zip(made.names, good, strict=True) if g], 1.0 / after[good]
     values, vectors = np.linalg.eigh(gram[np.ix_(good, good)] * np.outer(scale, scale))
-    kept = values > 1e-4 * values.max(initial=1e-300)
+    kept = values > UNFELT * values.max(initial=1e-300)
     by_trial = trial_shares(columns, projection.residual, fitted)[:, good] * scale
     shares = by_trial @ vectors[:, kept] / np.sqrt(values[kept])
     rank, statistic = int(kept.sum()), float(np.sum(shares.sum(axis=0) ** 2))
@@ -231,7 +228,7 @@ def trial_shares(columns: np.ndarray, residual: np.ndarray, fitted: Fit) -> np.n
 
 def inflation_by_signs(shares: np.ndarray, rank: int, seed: int) -> float:
     """How much larger than its rank the statistic is with random signs of the trials; 1 with fewer than 4 trials."""
-    if len(shares) < 4 or not rank:
+    if len(shares) < FEWEST_SIGNS or not rank:
         return 1.0
     signs = np.random.default_rng(seed).choice((-1.0, 1.0), size=(SIGN_DRAWS, len(shares)))
     return max(1.0, float(np.mean(np.sum((signs @ shares) ** 2, axis=1))) / rank)

@@ -11,6 +11,8 @@ from fes_pin.infer.distributions import f_tail
 
 SCALES_S = (0.0, 0.03, 0.08, 0.2, 0.5)
 """Lengths that the innovations are averaged over, s; 0 takes them as they are."""
+LENGTHS = 16
+"""Lengths in a trial, at least."""
 FEWEST = 3
 """Trials that differences are judged from."""
 
@@ -34,7 +36,7 @@ def repeated_p_value(innovations: Sequence[np.ndarray], dt: float) -> float:
         return 1.0
     size = min(map(len, innovations))
     e = np.clip([one[:size] for one in innovations], -CLIP, CLIP)
-    found = [_one(e, count) for s in SCALES_S if size >= 16 * (count := max(1, round(s / dt)))]
+    found = [_one(e, count) for s in SCALES_S if size >= LENGTHS * (count := max(1, round(s / dt)))]
     return min([1.0, *(len(found) * p for p in found)])
 
 

@@ -5,9 +5,6 @@ from __future__ import annotations
 from fes_pin.identify.fit import Fit
 from fes_pin.infer.search import Names
 
-MOST_CAUSES = 3
-"""Causes that are named at most: every further one multiplies the sets."""
-
 
 def names_of(fitted: Fit) -> Names:
     """The causes in a fit."""

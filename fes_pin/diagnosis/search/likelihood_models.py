@@ -11,14 +11,14 @@ from fes_pin.diagnosis.decide.gains_ahead import Fold, gains_of
 from fes_pin.diagnosis.decide.significance import level_of
 from fes_pin.diagnosis.errors_ahead import are_large, random_parts
 from fes_pin.diagnosis.remainder.driven import driven_remainder
-from fes_pin.diagnosis.search.cause_sets import MOST_CAUSES, Names
+from fes_pin.diagnosis.search.cause_sets import Names
 from fes_pin.diagnosis.search.likelihood_fits import MEASUREMENT, PROCESS, WHITE, LikelihoodFits
 from fes_pin.diagnosis.search.score import Scored
 from fes_pin.identify.ahead import default_horizon
 from fes_pin.identify.likelihood import is_simulated
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.distributions import chi2_tail
-from fes_pin.infer.levels import FORM_SHARE
+from fes_pin.infer.levels import FORM_SHARE, MOST_CAUSES
 from fes_pin.infer.scatter import excess_scatter
 from fes_pin.infer.search import Search, SearchResult
 from fes_pin.models.model import Model
