@@ -82,8 +82,9 @@ def contrast(
     """
     began = time.perf_counter()
     tell = asked(study, seed, limit, progress)
-    catalogue, made = catalogue_of(library), _provenance(study, after, seed)
+    catalogue = catalogue_of(library)
     measured = measured_study(grouped_study(study, after, by, groups))
+    made = _provenance(study, after, seed)
     warnings = [*measured.warnings, *check_study(measured.study, nominal_model(measured.study))]
     with one_thread_each(), noting_stops() as stops:
         end = math.inf if limit is None else began + limit
