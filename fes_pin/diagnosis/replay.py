@@ -31,6 +31,8 @@ class Replay:
         The measured columns that both models predict.
     nominal_error, extended_error
         E of eq. (2) of this trial alone, percent; all channels in units of their noise.
+    has_cause
+        Whether the extended model is to be shown: it has causes that are named.
     """
 
     measured: Trial
@@ -39,6 +41,21 @@ class Replay:
     outputs: tuple[str, ...]
     nominal_error: float
     extended_error: float
+    has_cause: bool
+
+    @property
+    def models(self) -> dict[str, Trial]:
+        """What is to be shown of the models, by name."""
+        return {**({"extended": self.extended} if self.has_cause else {}), "nominal": self.nominal}
+
+    @property
+    def errors(self) -> tuple[float, ...]:
+        """Errors E of the nominal and, if it is to be shown, of the extended model."""
+        return (self.nominal_error, self.extended_error)[: 1 + self.has_cause]
+
+    def residuals(self, name: str) -> dict[str, np.ndarray]:
+        """Residuals of an output by model, each of shape (n,)."""
+        return {of: self.measured.residual(simulated, name) for of, simulated in self.models.items()}
 
 
 def replayed_trials(diagnosis: Diagnosis) -> tuple[Replay, ...]:
@@ -49,8 +66,8 @@ def replayed_trials(diagnosis: Diagnosis) -> tuple[Replay, ...]:
     made = []
     for trial, before, after in zip(trials, nominal, extended, strict=True):
         outputs = tuple(n for n in diagnosis.model.rig.outputs(trial.kind) if n in trial)
-        errors = (trial_error_percent(trial, one, outputs, noise) for one in (before, after))
-        made.append(Replay(trial, before, after, outputs, *errors))
+        one, other = (trial_error_percent(trial, simulated, outputs, noise) for simulated in (before, after))
+        made.append(Replay(trial, before, after, outputs, one, other, bool(diagnosis.causes)))
     return tuple(made)
 
 

@@ -51,6 +51,13 @@ def tick_text(value: float, step: float) -> str:
     return f"{value:.{digits}f}".replace("-", "\N{MINUS SIGN}")
 
 
+def limits_of(*curves: np.ndarray) -> tuple[float, float]:
+    """What an axis shows of curves: all of them, and some room."""
+    low, high = min(float(v.min()) for v in curves), max(float(v.max()) for v in curves)
+    room = 0.05 * (high - low) or 1.0
+    return low - room, high + room
+
+
 @dataclass
 class Panel:
     """A rectangle with two axes.

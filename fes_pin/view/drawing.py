@@ -29,18 +29,13 @@ class Drawing:
     csv: str
     note: str = ""
 
-
-def every(count: int, rows: int = ROWS) -> int:
-    """One in how many samples stands in the data of a figure."""
-    return max(1, -(-count // rows))
-
-
-def csv_of(columns: Mapping[str, np.ndarray | Sequence[float]], step: int = 1) -> str:
-    """Columns of numbers as CSV, every `step`-th row."""
-    arrays = [np.asarray(v, dtype=float)[::step].tolist() for v in columns.values()]
-    lines = [",".join(columns)]
-    lines += [",".join(f"{v:.6g}" for v in row) for row in zip(*arrays, strict=True)]
-    return "\n".join(lines) + "\n"
+    @classmethod
+    def of(cls, svg: str, columns: Mapping[str, np.ndarray], rows: int = ROWS) -> Drawing:
+        """Of columns of numbers, of which at most about so many rows stand in the data."""
+        step = max(1, -(-len(next(iter(columns.values()))) // rows))
+        arrays = [np.asarray(v, dtype=float)[::step].tolist() for v in columns.values()]
+        csv = rows_csv(tuple(columns), list(zip(*arrays, strict=True)))
+        return cls(svg, csv, f"one sample in {step}" if step > 1 else "")
 
 
 def rows_csv(head: Sequence[str], rows: Sequence[Sequence[str | float]]) -> str:

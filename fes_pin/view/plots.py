@@ -13,8 +13,8 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.replay import Replay
 from fes_pin.infer.noise import NoiseModel
 from fes_pin.infer.text import percent
-from fes_pin.view.chart import Panel, svg, tick_text
-from fes_pin.view.drawing import Drawing, csv_of, every, rows_csv
+from fes_pin.view.chart import Panel, limits_of, svg, tick_text
+from fes_pin.view.drawing import Drawing, rows_csv
 from fes_pin.view.missing import Missing, binned, explained, smoothed
 from fes_pin.view.style import WIDTHS, label, milli, thin_curve, unit_of
 
@@ -38,14 +38,9 @@ def points_of(trials: int) -> int:
 
 
 def trial_drawing(
-    one: Replay,
-    noise: NoiseModel,
-    position_unit: str = "rad",
-    extended: bool = True,
-    points: int = POINTS,
-    alone: bool = False,
+    one: Replay, noise: NoiseModel, position_unit: str = "rad", points: int = POINTS, alone: bool = False
 ) -> Drawing:
-    """One trial: measured over simulated, the residual (measured - simulated) beneath, the stimulus as a strip.
+    """One trial: measured over simulated, the residual (measured - simulated) below, the stimulus as a strip.
 
     The residual is drawn as it is, faint, and smoothed.
 
@@ -57,47 +52,44 @@ def trial_drawing(
         Of each output; the residual's band is twice its standard deviation.
     position_unit
         "rad" or "m".
-    extended
-        False where the extended model is the nominal one.
     points
         Stretches of each curve that keep their extremes.
     alone
         True for a file of its own.
     """
-    time = one.measured.time
-    span, top, panels = (float(time[0]), float(time[-1])), 8.0, []
+    time, top, panels = one.measured.time, 8.0, []
+    columns = {"time_s": time}
     for name in one.outputs:
-        panel = Panel(LEFT, top, WIDE - LEFT - 8, 130, span, _limits(one, name, extended))
-        _curves(panel, one, name, extended, points)
+        curves = {of: trial[name] for of, trial in (*one.models.items(), ("measured", one.measured))}
+        columns |= {f"{name}_{of}": values for of, values in reversed(curves.items())}
+        panel = Panel(LEFT, top, WIDE - LEFT - 8, 130, (time[0], time[-1]), limits_of(*curves.values()))
+        for of, values in curves.items():
+            panel.line(*thin_curve(time, values, points), of, WIDTHS[of])
         panel.y_axis(label(name, position_unit))
-        factor, unit = milli(one.measured.residual(one.nominal, name), unit_of(name, position_unit))
-        beneath = _residuals(one, name, extended, factor, points, top + 130 + GAP)
+        factor, unit = milli(one.residuals(name)["nominal"], unit_of(name, position_unit))
         band = factor * 2.0 * noise[name].std if name in noise else 0.0
-        beneath.box(span, (-band, band), "band")
-        beneath.parts.insert(0, beneath.parts.pop())
+        beneath = _residuals(one, name, factor, band, points, top + 130 + GAP)
         beneath.y_axis(f"residual\n({unit})", title_at=26)
         panels += [panel, beneath]
         top += 130 + GAP + 76 + GAP
     for name in (n for n in one.measured.columns if n not in one.outputs):
+        columns[name] = one.measured[name]
         panels.append(_strip(one.measured, name, top, position_unit, points))
         top += 28 + GAP
     panels[-1].x_axis("time (s)")
-    drawn = svg(panels, WIDE, top + 28, described(one, position_unit, extended), alone)
-    step = every(len(time), 2 * points)
-    return Drawing(drawn, csv_of(_columns(one, extended), step), f"one sample in {step}" if step > 1 else "")
+    drawn = svg(panels, WIDE, top + 28, described(one, position_unit), alone)
+    return Drawing.of(drawn, columns, 2 * points)
 
 
-def described(one: Replay, position_unit: str, extended: bool) -> str:
+def described(one: Replay, position_unit: str) -> str:
     """A trial in words: what was measured, and by how much each model misses it."""
     trial, words = one.measured, []
     for name in one.outputs:
         what, unit = label(name, position_unit).partition(" (")[0], unit_of(name, position_unit)
+        missed = [f"{of} model at most {_short(np.abs(r).max())} {unit} off" for of, r in one.residuals(name).items()]
         low, high = _short(trial[name].min()), _short(trial[name].max())
-        missed = f"nominal model at most {_largest(one, one.nominal, name)} {unit} off"
-        if extended:
-            missed += f", extended model at most {_largest(one, one.extended, name)} {unit}"
-        words.append(f"{what} from {low} to {high} {unit}; {missed}")
-    errors = percent(one.nominal_error) + (f", extended {percent(one.extended_error)}" if extended else "")
+        words.append(f"{what} from {low} to {high} {unit}; {', '.join(missed)}")
+    errors = ", extended ".join(percent(e) for e in one.errors)
     return f"Trial {trial.name}, {trial.kind}, {trial.duration:.3g} s: {'. '.join(words)}. E nominal {errors}."
 
 
@@ -105,47 +97,18 @@ def _short(value: float) -> str:
     return f"{float(value):.3g}"
 
 
-def _largest(one: Replay, simulated: Trial, name: str) -> str:
-    return _short(np.abs(one.measured.residual(simulated, name)).max())
-
-
-def _columns(one: Replay, extended: bool) -> dict[str, np.ndarray]:
-    out = {"time_s": one.measured.time}
-    for name in one.outputs:
-        out[f"{name}_measured"], out[f"{name}_nominal"] = one.measured[name], one.nominal[name]
-        if extended:
-            out[f"{name}_extended"] = one.extended[name]
-    return out | {n: v for n, v in one.measured.columns.items() if n not in one.outputs}
-
-
-def _limits(one: Replay, name: str, extended: bool) -> tuple[float, float]:
-    many = [one.measured[name], one.nominal[name]] + [one.extended[name]] * extended
-    low, high = min(float(v.min()) for v in many), max(float(v.max()) for v in many)
-    room = 0.05 * (high - low) or 1.0
-    return low - room, high + room
-
-
-def _curves(panel: Panel, one: Replay, name: str, extended: bool, points: int) -> None:
-    """Simulations behind, the measurement in front."""
-    time = one.measured.time
-    for of, width in WIDTHS.items():
-        if extended or of != "extended":
-            panel.line(*thin_curve(time, getattr(one, of)[name], points), of, width)
-
-
-def _residuals(one: Replay, name: str, extended: bool, factor: float, points: int, top: float) -> Panel:
-    """Residuals of both models, as they are and smoothed."""
-    time = one.measured.time
-    models = [(one.nominal, "nominal")] + [(one.extended, "extended")] * extended
-    raw = [factor * one.measured.residual(simulated, name) for simulated, _ in models]
-    limit = 1.1 * max(float(np.abs(r).max()) for r in raw) or 1.0
-    panel = Panel(LEFT, top, WIDE - LEFT - 8, 76, (float(time[0]), float(time[-1])), (-limit, limit))
+def _residuals(one: Replay, name: str, factor: float, band: float, points: int, top: float) -> Panel:
+    """Residuals of the models, as they are and smoothed."""
+    time, few = one.measured.time, max(FEWEST, round(0.6 * points))
+    residuals = {of: factor * r for of, r in one.residuals(name).items()}
+    limit = 1.1 * max(float(np.abs(r).max()) for r in residuals.values()) or 1.0
+    panel = Panel(LEFT, top, WIDE - LEFT - 8, 76, (time[0], time[-1]), (-limit, limit))
+    panel.box(panel.x, (-band, band), "band")
     panel.zero()
-    few = max(FEWEST, round(0.6 * points))
-    for residual, (_, colour) in zip(raw, models, strict=True):
-        panel.line(*thin_curve(time, residual, few), colour, 0.6, 0.45)
-    for residual, (_, colour) in zip(raw, models, strict=True):
-        panel.line(*thin_curve(*smoothed(time, residual), few), colour, 1.9)
+    for of, residual in residuals.items():
+        panel.line(*thin_curve(time, residual, few), of, 0.6, 0.45)
+    for of, residual in residuals.items():
+        panel.line(*thin_curve(*smoothed(time, residual), few), of, 1.9)
     return panel
 
 
@@ -261,6 +224,4 @@ def stimulus_drawing(trial: Trial, position_unit: str = "rad") -> Drawing:
         f"{label(n, position_unit)} from {_short(v.min())} to {_short(v.max())}" for n, v in trial.columns.items()
     )
     drawn = svg(panels, WIDE, 8 + 38 * len(panels) + 28, f"Inputs of the next trial, {trial.duration:.3g} s: {ranges}.")
-    step = every(len(trial))
-    columns = {"time_s": trial.time, **trial.columns}
-    return Drawing(drawn, csv_of(columns, step), f"one sample in {step}" if step > 1 else "")
+    return Drawing.of(drawn, {"time_s": trial.time, **trial.columns})

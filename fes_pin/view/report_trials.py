@@ -78,13 +78,11 @@ def _is_tracked(diagnosis: Diagnosis) -> bool:
 
 def trials_section(diagnosis: Diagnosis, replays: Sequence[Replay]) -> list[Markup]:
     """A figure of each trial, those with small errors folded."""
-    extended = bool(diagnosis.causes)
     noise, unit, points = diagnosis.extended.noise, position_unit(diagnosis), points_of(len(replays))
 
     def drawn(k: int) -> Markup:
-        one = replays[k]
-        made = trial_drawing(one, noise, unit, extended, points)
-        return figure(made, _trial_caption(one, extended), file=f"trial_{k + 1}")
+        made = trial_drawing(replays[k], noise, unit, points)
+        return figure(made, _trial_caption(replays[k]), file=f"trial_{k + 1}")
 
     worst = set(sorted(range(len(replays)), key=lambda k: -replays[k].nominal_error)[:OPEN])
     others = [k for k in range(len(replays)) if k not in worst]
@@ -97,8 +95,8 @@ def trials_section(diagnosis: Diagnosis, replays: Sequence[Replay]) -> list[Mark
     names = [("measured", "measured"), ("nominal", "nominal model, fitted")]
     out = [
         element("p", text, class_="soft"),
-        *_worse_note(replays, extended),
-        key(*names, *([("extended", "extended model")] if extended else [])),
+        *_worse_note(replays),
+        key(*names, *([("extended", "extended model")] if diagnosis.causes else [])),
         element("div", joined([drawn(k) for k in sorted(worst)]), class_="grid"),
     ]
     if others:
@@ -110,19 +108,18 @@ def trials_section(diagnosis: Diagnosis, replays: Sequence[Replay]) -> list[Mark
 
 def got_worse(one: Replay) -> bool:
     """True if the extended model misses a trial by more than the nominal one, and by more than noise makes it."""
-    return one.extended_error > (1.0 + WORSE) * one.nominal_error
+    return one.has_cause and one.extended_error > (1.0 + WORSE) * one.nominal_error
 
 
-def _worse_note(replays: Sequence[Replay], extended: bool) -> list[Markup]:
-    worse = [r.measured.name for r in replays if extended and got_worse(r)]
+def _worse_note(replays: Sequence[Replay]) -> list[Markup]:
+    worse = [r.measured.name for r in replays if got_worse(r)]
     which = f"{len(worse)} of {len(replays)} trials" if len(worse) > 1 else "One trial"
     return [element("p", FLAG, f" {which} got worse with the extended model: {', '.join(worse)}.")] if worse else []
 
 
-def _trial_caption(one: Replay, extended: bool) -> Markup:
-    trial, after = one.measured, f" -> {percent(one.extended_error)}" if extended else ""
+def _trial_caption(one: Replay) -> Markup:
+    trial, errors = one.measured, " -> ".join(percent(e) for e in one.errors)
     conditions = "".join(f", {n} = {v:g}" for n, v in trial.conditions.items())
     held_out = ", held out" if trial.role == "held_out" else ""
-    said = f"{trial.kind}{conditions}{held_out}, {trial.duration:.4g} s \u00b7 E {percent(one.nominal_error)}{after}"
-    flag = FLAG if extended and got_worse(one) else Markup("")
-    return element("strong", trial.name) + element("span", f" \u00b7 {said} ") + flag
+    said = f" \u00b7 {trial.kind}{conditions}{held_out}, {trial.duration:.4g} s \u00b7 E {errors} "
+    return element("strong", trial.name) + element("span", said) + (FLAG if got_worse(one) else Markup(""))

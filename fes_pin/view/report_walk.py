@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from fes_pin.view.chart import Panel, svg
-from fes_pin.view.drawing import Drawing, csv_of, every
+from fes_pin.view.chart import Panel, limits_of, svg
+from fes_pin.view.drawing import Drawing
 from fes_pin.view.page import Markup, element, figure, key, section
 from fes_pin.view.sections import Parts, not_testable
 from fes_pin.view.style import thin_curve
@@ -70,11 +70,9 @@ def _drawing(trial: str, time: np.ndarray, curves: Mapping[str, np.ndarray], sin
     for channel, name in enumerate(CHANNELS):
         unit = "N" if channel < 3 else "N m"
         own = {of: values[shown, channel] for of, values in curves.items()}
-        columns |= {f"{name.replace(' ', '_')}_{of}": values for of, values in own.items()}
-        low, high = min(v.min() for v in own.values()), max(v.max() for v in own.values())
-        room = 0.05 * (high - low) or 1.0
+        columns |= {f"{name.replace(' ', '_')}_{of}": values for of, values in reversed(own.items())}
         left, top, inner = AXIS + (channel // 3) * WIDE, 8.0 + (channel % 3) * ROW, WIDE - AXIS - 8.0
-        panel = Panel(left, top, inner, ROW - 16.0, (time[0], time[-1]), (low - room, high + room))
+        panel = Panel(left, top, inner, ROW - 16.0, (time[0], time[-1]), limits_of(*own.values()))
         for begin, end in edges.reshape(-1, 2).tolist():
             panel.box((time[begin], time[end - 1]), panel.y, "band")
         for of, values in own.items():
@@ -84,10 +82,8 @@ def _drawing(trial: str, time: np.ndarray, curves: Mapping[str, np.ndarray], sin
             panel.x_axis("time (s)")
         panels.append(panel)
         words.append(f"{name} from {own['measured'].min():.3g} to {own['measured'].max():.3g} {unit}")
-    step = every(len(time))
-    note = f"one sample in {step}" if step > 1 else ""
     drawn = svg(panels, 2.0 * WIDE, 3.0 * ROW + 30.0, f"Ground reaction of trial {trial}: {', '.join(words)}.")
-    return Drawing(drawn, csv_of(columns, step), note)
+    return Drawing.of(drawn, columns)
 
 
 PARTS = Parts(_counts, _sections, ("not testable",), {PLAYBACK_FILE: playback_html}, "Residual = measured - required. ")

@@ -219,7 +219,7 @@ def test_every_trial_is_drawn_and_those_that_got_worse_are_said():
 
 def test_what_got_worse_is_more_than_rounding():
     class One:
-        nominal_error, extended_error = 1.0, 1.005
+        has_cause, nominal_error, extended_error = True, 1.0, 1.005
 
     assert not got_worse(One) and setattr(One, "extended_error", 1.02) is None and got_worse(One)
 
