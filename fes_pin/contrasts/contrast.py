@@ -11,7 +11,7 @@ from fes_pin.contrasts.changes import change_of, misread_change, not_changed
 from fes_pin.contrasts.faults import GroupConditions, is_likelier, late_in_groups
 from fes_pin.contrasts.grouped import Grouped, noise_in
 from fes_pin.contrasts.groups import BY_GROUP, grouped_study, in_groups, labels_of
-from fes_pin.contrasts.models import ContrastModels, ContrastSearch, Found
+from fes_pin.contrasts.models import POLICY, ContrastModels, ContrastSearch, Found
 from fes_pin.contrasts.result import Contrast
 from fes_pin.contrasts.verdict import ContrastVerdict
 from fes_pin.data.asked import asked
@@ -162,9 +162,8 @@ class _Work:
 
     def _run(self, trials: Sequence[Trial]) -> tuple[ContrastSearch, Found]:
         effects = self.catalogue.effects_for(self.nominal.rig)
-        search = ContrastSearch(
-            ContrastModels(self.nominal, in_groups(trials), effects, self.driven, self.seed), self.tell
-        )
+        models = ContrastModels(self.nominal, in_groups(trials), effects, self.driven, self.seed)
+        search = ContrastSearch(models, self.tell, POLICY)
         return search, search.run()
 
     def _judged(self, search: ContrastSearch, found: Found, misread: Misread | None, said: list[str]) -> Contrast:

@@ -21,7 +21,7 @@ from fes_pin.infer.search import Names, Policy, Search, SearchResult
 from fes_pin.infer.spread import ByUnit, Spread
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
-from fes_pin.workers import Progress, in_parallel
+from fes_pin.workers import in_parallel
 
 FITTED, FITTED_DRIVEN = 10, 6
 """Items that are fitted with a set, those of largest score; on driven rigs a fit is some five times as long."""
@@ -230,21 +230,7 @@ def _moved(model: GroupedModel, group: str, own: Model) -> GroupedModel:
     return model.with_parameters({model.path(n, group): v for n, v in own.parameters().items() if v != known[n]})
 
 
-class ContrastSearch(Search[Grouped]):
-    """The search for what differs between groups; forward again under the noise that what was found leaves."""
+ContrastSearch = Search[Grouped, ContrastModels]
+"""A search for what differs between groups."""
 
-    models: ContrastModels
-
-    def __init__(self, models: ContrastModels, progress: Progress) -> None:
-        super().__init__(models, progress, POLICY)
-
-    def _search(self) -> Found:
-        self._forward()
-        if self.models.begin_again(self._kept):
-            self._rejected.clear()
-            self._formed.clear()
-            self._forward()
-        return self.settle(self._backward(self._kept))
-
-
-__all__ = ["ContrastModels", "ContrastSearch", "Found"]
+__all__ = ["POLICY", "ContrastModels", "ContrastSearch", "Found"]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from fes_pin.contrasts.grouped import Grouped
 from fes_pin.contrasts.left import left_in_groups
-from fes_pin.contrasts.models import ContrastSearch, Found
+from fes_pin.contrasts.models import ContrastModels, ContrastSearch, Found
 from fes_pin.data.trial import Trial
 from fes_pin.infer.held_out import FOLDS, deal, marginal_cost
 from fes_pin.infer.result import FITTED, Evidence, Gain, Remainder
@@ -32,7 +32,7 @@ class ContrastWeighed(Weighed):
 Judgement = State[Grouped, ContrastWeighed]
 
 
-class ContrastVerdict(Verdict[Grouped, ContrastWeighed]):
+class ContrastVerdict(Verdict[Grouped, ContrastModels, ContrastWeighed]):
     """How it is judged what a search found: a change that held-out trials do not confirm is not claimed.
 
     Parameters
@@ -40,8 +40,6 @@ class ContrastVerdict(Verdict[Grouped, ContrastWeighed]):
     search
         That has run.
     """
-
-    search: ContrastSearch
 
     def __init__(self, search: ContrastSearch) -> None:
         super().__init__(search)

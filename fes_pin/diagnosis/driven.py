@@ -42,7 +42,7 @@ from fes_pin.diagnosis.form_errors import FRESH, beside_what_is_new, judged_agai
 from fes_pin.diagnosis.remainder.driven import driven_remainder
 from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.diagnosis.search.cause_sets import names_of
-from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodSearch
+from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodModels, LikelihoodSearch
 from fes_pin.identify.ahead import falls
 from fes_pin.identify.lasting import words_of_reading
 from fes_pin.identify.likelihood import is_simulated
@@ -77,7 +77,7 @@ class DrivenWeighed(Weighed):
 Judgement = State[LikelihoodFit, DrivenWeighed]
 
 
-class DrivenVerdict(Verdict[LikelihoodFit, DrivenWeighed]):
+class DrivenVerdict(Verdict[LikelihoodFit, LikelihoodModels, DrivenWeighed]):
     """How it is judged what a search by the likelihood found.
 
     Trials that took no part speak for a cause, or not, by `speaks_for`, with errors over the horizon: several forms

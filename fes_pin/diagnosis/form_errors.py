@@ -2,45 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-
 import numpy as np
 
 from fes_pin.data.schema import IMPOSED
 from fes_pin.diagnosis.decide.by_prediction import FEWEST, best_predicting
 from fes_pin.diagnosis.decide.rivals import not_excluded
 from fes_pin.diagnosis.errors_ahead import squared_errors
-from fes_pin.diagnosis.search.cause_sets import Names, names_of
+from fes_pin.diagnosis.search.cause_sets import names_of
 from fes_pin.diagnosis.search.likelihood_fits import MEASUREMENT, PROCESS, WHITE
 from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodSearch, NominalFitError
 from fes_pin.identify.likelihood_fit import LikelihoodFit, beside_fresh_efforts
 from fes_pin.identify.process_noise import step_s
 from fes_pin.infer.held_out import held_out_gain
 from fes_pin.infer.levels import NOTHING_PERCENT
+from fes_pin.infer.search import Policy
 from fes_pin.workers import OutOfTime, in_parallel, time_limit
 
 FRESH = "what acts at random was taken for new in every sample: beside what lasts, the model foretold less"
 """What is told of it."""
-
-
-class FreshSearch(LikelihoodSearch):
-    """What was found, its parts and what cannot be told from it, beside random efforts that are new in every sample.
-
-    No cause is sought there: what is left has a colour that such efforts have not, and a likelihood without it tells
-    causes apart that it should not.
-    """
-
-    def __init__(self, search: LikelihoodSearch, fits: Sequence[LikelihoodFit]) -> None:
-        super().__init__(search.models.begun_with(fits), search.progress)
-        self._names = names_of(fits[0])
-
-    def _search(self) -> Found:
-        return self.settle(self._backward(self._names))
-
-    def settle(self, names: Names, refused: Iterable[str] = ()) -> Found:
-        """A set, once it has the form that the data demand."""
-        self._reform(names)
-        return self.result(names)
 
 
 def searched(search: LikelihoodSearch) -> tuple[LikelihoodSearch, Found]:
@@ -111,6 +90,8 @@ def judged_again(search: LikelihoodSearch, found: Found, fresh: LikelihoodFit) -
 
     It gains where its errors over the horizon are less, by a thousandth of what the nominal model gets wrong: a random
     effort that lasts is foretold as far as it does, and what takes its place gains nothing. Nothing is claimed by that.
+    No cause is searched for: what is left has a colour that new efforts have not, and a likelihood without it tells
+    causes apart that it should not.
 
     Parameters
     ----------
@@ -121,7 +102,8 @@ def judged_again(search: LikelihoodSearch, found: Found, fresh: LikelihoodFit) -
         with time_limit(search.seconds_left):
             if not _foretells_more(fresh, search, found):
                 return None
-            again = FreshSearch(search, [fresh, *_beside(found)])
+            sets = search.models.begun_with([fresh, *_beside(found)])
+            again = LikelihoodSearch(sets, search.progress, Policy(given=names_of(fresh)))
         with time_limit(search.seconds_left):
             other = again.run()
     except (ArithmeticError, np.linalg.LinAlgError, OutOfTime, NominalFitError):

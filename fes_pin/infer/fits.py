@@ -6,7 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import Generic, Self, TypeVar
 
 from fes_pin.infer.family import Family
 from fes_pin.infer.levels import CLAIM_LEVEL, SEPARABLE
@@ -57,6 +57,11 @@ class FittedSets(ABC, Generic[F, S]):
         self.fits: dict[Names, F] = {}
         self._converged: set[Names] = set()
         self._begun: set[tuple[Names, Hashable]] = set()
+
+    @property
+    def own(self) -> Self:
+        """These models, by the type that their front end knows."""
+        return self
 
     @abstractmethod
     def candidates(self, base: F) -> Mapping[str, Candidate[S]]:
@@ -130,6 +135,10 @@ class FittedSets(ABC, Generic[F, S]):
     def other_form(self, fitted: F) -> F | None:
         """The same set in a form that was reached another way, where that is better."""
         return None
+
+    def begin_again(self, names: Names) -> bool:
+        """Fit a set and the nominal model under the noise that the set leaves; False where every fit has its own."""
+        return False
 
     def extend(self, base: Names, most: int | None = None) -> None:
         """Fit a set with each further candidate, or with the `most` of largest score.

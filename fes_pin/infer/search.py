@@ -38,9 +38,11 @@ class Fitted(Protocol):
 
 
 F = TypeVar("F", bound=Fitted)
+M = TypeVar("M")
+M_co = TypeVar("M_co", covariant=True)
 
 
-class Models(Protocol[F]):
+class Models(Protocol[F, M_co]):
     """The fitted sets of one problem, and how its front end judges them.
 
     Attributes
@@ -50,6 +52,10 @@ class Models(Protocol[F]):
     """
 
     fits: dict[Names, F]
+
+    @property
+    def own(self) -> M_co:
+        """These models, by the type that their front end knows."""
 
     @property
     def most_candidates(self) -> int | None:
@@ -109,6 +115,9 @@ class Models(Protocol[F]):
     def other_form(self, fitted: F) -> F | None:
         """The same set in a form that was reached another way, where that is better."""
 
+    def begin_again(self, names: Names) -> bool:
+        """Fit a set and the nominal model under the noise that the set leaves; False where every fit has its own."""
+
 
 @dataclass(frozen=True)
 class Policy:
@@ -125,12 +134,15 @@ class Policy:
         Pairs that the score test proposes, for candidates that show nothing alone.
     judged
         Sets of a size that are judged, lowest price first, until one is accepted.
+    given
+        A set that is judged in the place of a search, without further rivals; None for a search.
     """
 
     beam: int = 3
     fitted: int | None = 8
     pairs: int = 4
     judged: int = 3
+    given: Names | None = None
 
 
 @dataclass(frozen=True)
@@ -156,17 +168,20 @@ class SearchResult(Generic[F]):
     without: dict[str, F]
 
 
-class Search(Generic[F]):
+class Search(Generic[F, M]):
     """One search on the sets of one problem.
 
     Attributes
     ----------
+    models
+        The sets.
     was_stopped
         True where a limit of time ended it: the result is the best set so far.
     """
 
-    def __init__(self, models: Models[F], progress: Progress, policy: Policy | None = None) -> None:
-        self.models, self.progress, self.policy = models, progress, policy or Policy()
+    def __init__(self, models: Models[F, M], progress: Progress, policy: Policy | None = None) -> None:
+        self.models, self._sets = models.own, models
+        self.progress, self.policy = progress, policy or Policy()
         self.was_stopped, self._end = False, math.inf
         self._formed: set[Names] = set()
         self._rejected: set[Names] = set()
@@ -176,7 +191,7 @@ class Search(Generic[F]):
         self.progress(0.05, "nominal model")
         self._end = time.monotonic() + seconds_left()
         with time_limit(math.inf):
-            self.models.nominal()
+            self._sets.nominal()
         self._kept: Names = ()
         try:
             return self._search()
@@ -192,11 +207,20 @@ class Search(Generic[F]):
 
     def nominal(self) -> F:
         """The fit of the nominal model."""
-        return self.models.fits[()]
+        return self._sets.fits[()]
 
     def _search(self) -> SearchResult[F]:
+        given = self.policy.given
+        return self.settle(self._backward(self._found_forward() if given is None else given))
+
+    def _found_forward(self) -> Names:
+        """The best set of a forward search; of another under the noise that it leaves, where that changes."""
         self._forward()
-        return self.settle(self._backward(self._kept))
+        if self._sets.begin_again(self._kept):
+            self._rejected.clear()
+            self._formed.clear()
+            self._forward()
+        return self._kept
 
     def _forward(self) -> None:
         """Extend the best set so far as long as a larger one is accepted."""
@@ -213,13 +237,13 @@ class Search(Generic[F]):
 
     def _sizes(self) -> Iterable[int]:
         """Sizes of sets that are larger than the best so far."""
-        first, most = len(self._kept) + 1, self.models.most_candidates
+        first, most = len(self._kept) + 1, self._sets.most_candidates
         return itertools.count(first) if most is None else range(first, most + 1)
 
     def earns(self, larger: F, smaller: F, gain: float, explained: float) -> bool:
         """Whether a larger set is worth its degrees of freedom where it gains so much in twice the log-likelihood."""
-        significant = self.models.p_value(larger, smaller, gain) < self.models.level(larger)
-        return significant and not self.models.is_error_of_form(larger, gain, explained)
+        significant = self._sets.p_value(larger, smaller, gain) < self._sets.level(larger)
+        return significant and not self._sets.is_error_of_form(larger, gain, explained)
 
     def is_accepted(self, larger: F, smaller: F) -> bool:
         """The same of two fits as they are."""
@@ -227,7 +251,7 @@ class Search(Generic[F]):
 
     def possible(self) -> dict[Names, F]:
         """All sets that are fitted, but for those that cannot be, or that were rejected."""
-        models = self.models
+        models = self._sets
         return {n: f for n, f in models.fits.items() if n not in self._rejected and models.is_possible(f)}
 
     def _worth_extending(self, names: Names) -> bool:
@@ -235,15 +259,15 @@ class Search(Generic[F]):
 
         Scores are slopes at the noise of the set, which takes up a candidate that is missed: they understate it.
         """
-        fitted = self.models.fits[names]
-        return self.models.extension_p_value(fitted) < UNUSUAL_LEVEL or not self.models.leaves_noise(fitted)
+        fitted = self._sets.fits[names]
+        return self._sets.extension_p_value(fitted) < UNUSUAL_LEVEL or not self._sets.leaves_noise(fitted)
 
     def _extend(self, size: int) -> None:
         """Fit sets of a size: the best smaller ones with further candidates, and pairs of largest score together."""
-        for names in self.models.near(size - 1)[: self.policy.beam]:
-            self.models.extend(names, None if size == 1 else self.policy.fitted)
+        for names in self._sets.near(size - 1)[: self.policy.beam]:
+            self._sets.extend(names, None if size == 1 else self.policy.fitted)
         if size == 2:
-            self.models.extend_by_pairs(self.policy.pairs)
+            self._sets.extend_by_pairs(self.policy.pairs)
 
     def _first_accepted(self, size: int, best: Names) -> Names | None:
         """The set of a size of lowest price that is accepted; those near it are judged without those that are not."""
@@ -252,27 +276,27 @@ class Search(Generic[F]):
             if self._is_accepted(ranked[0], best):
                 return ranked[0]
             tried.append(ranked[0])
-            self.models.converge(size, tried)
+            self._sets.converge(size, tried)
         return None
 
     def _in_better_forms(self, size: int, without: Sequence[Names], best: Names) -> list[Names]:
         """The best sets of a size but for some, lowest price first, once each has the form that the data demand."""
         most = self.policy.judged
-        while rough := [n for n in self.models.near(size, without)[:most] if self._is_rough(n, best)]:
+        while rough := [n for n in self._sets.near(size, without)[:most] if self._is_rough(n, best)]:
             self._reform(rough[0])
-        return self.models.near(size, without)[:most]
+        return self._sets.near(size, without)[:most]
 
     def _is_rough(self, names: Names, best: Names) -> bool:
         """Whether a set has not had another form yet, and half of what it must gain: a form may give the other half."""
         if names in self._formed:
             return False
-        larger, smaller = self.models.fits[names], self.models.fits[best]
+        larger, smaller = self._sets.fits[names], self._sets.fits[best]
         degrees = max(larger.degrees - smaller.degrees, 1)
-        return self.models.noise_p_value(2.0 * (smaller.sse - larger.sse), degrees) < self.models.level(larger)
+        return self._sets.noise_p_value(2.0 * (smaller.sse - larger.sse), degrees) < self._sets.level(larger)
 
     def _is_accepted(self, names: Names, best: Names) -> bool:
         """Whether a set can be, and is worth more than the best smaller one."""
-        models = self.models
+        models = self._sets
         larger, smaller = models.fits[names], models.fits[best]
         accepted = self.is_accepted(larger, smaller) and self._predicts_better(larger, smaller, bool(best))
         return self._kept_in_mind(names, accepted) and models.is_possible(larger)
@@ -282,9 +306,9 @@ class Search(Generic[F]):
 
         Where the smaller set has a lack of fit, a still further candidate may bring that about.
         """
-        if not has_candidates or not self.models.leaves_noise(smaller):
+        if not has_candidates or not self._sets.leaves_noise(smaller):
             return True
-        return self.models.predicts_better(larger, smaller)
+        return self._sets.predicts_better(larger, smaller)
 
     def _kept_in_mind(self, names: Names, accepted: bool) -> bool:
         """Whether a set is accepted, after that was written down."""
@@ -293,31 +317,31 @@ class Search(Generic[F]):
 
     def _reform(self, names: Names) -> None:
         """Give a set, once, the form that the data demand."""
-        while names not in self._formed and self._replaced(names, self.models.better_form(self.models.fits[names])):
+        while names not in self._formed and self._replaced(names, self._sets.better_form(self._sets.fits[names])):
             pass
         self._formed.add(names)
 
     def _replaced(self, names: Names, better: F | None) -> bool:
         """Take a better fit of a set; False if there is none."""
         if better is not None:
-            self.models.fits[names] = better
+            self._sets.fits[names] = better
         return better is not None
 
     def form_otherwise(self, names: Names) -> bool:
         """Give a set another form than it was led to, if one is better; False if none is, or time is up."""
         try:
             with time_limit(self.seconds_left):
-                return self._replaced(names, self.models.other_form(self.models.fits[names]))
+                return self._replaced(names, self._sets.other_form(self._sets.fits[names]))
         except OutOfTime:
             return False
 
     def _backward(self, names: Names) -> Names:
         """Drop candidates that the others have made superfluous."""
         while names:
-            less = {n: self.models.without(names, n) for n in names}
-            p_values = {n: self.models.p_value(self.models.fits[names], less[n]) for n in names}
+            less = {n: self._sets.without(names, n) for n in names}
+            p_values = {n: self._sets.p_value(self._sets.fits[names], less[n]) for n in names}
             weakest = max(names, key=lambda n: (p_values[n], -less[n].sse))
-            if self.is_accepted(self.models.fits[names], less[weakest]):
+            if self.is_accepted(self._sets.fits[names], less[weakest]):
                 break
             names = tuple(n for n in names if n != weakest)
         return names
@@ -335,18 +359,20 @@ class Search(Generic[F]):
         refused
             Names that no answer may hold.
         """
-        self.progress(0.75, "rivals")
         self._reform(names)
-        while True:
-            for name in names:
-                rest = tuple(n for n in names if n != name)
-                self.models.without(names, name)
-                self.models.extend(rest, None if len(names) == 1 else self.policy.fitted)
-                self.models.converge_rivals(rest, name)
-            better = next(n for n in self.models.ranked(len(names)) if n == names or self._may_be(n, refused))
-            if better == names:
-                return self.result(names)
+        while self.policy.given is None and (better := self._best_of_rivals(names, refused)) != names:
             names = better
+        return self.result(names)
+
+    def _best_of_rivals(self, names: Names, refused: Iterable[str]) -> Names:
+        """The best of a set and its rivals that can be the answer, once the rivals are fitted."""
+        self.progress(0.75, "rivals")
+        for name in names:
+            rest = tuple(n for n in names if n != name)
+            self._sets.without(names, name)
+            self._sets.extend(rest, None if len(names) == 1 else self.policy.fitted)
+            self._sets.converge_rivals(rest, name)
+        return next(n for n in self._sets.ranked(len(names)) if n == names or self._may_be(n, refused))
 
     def _may_be(self, names: Names, refused: Iterable[str]) -> bool:
         """Whether a set can be the answer: it holds nothing refused, and each of its candidates is accepted."""
@@ -357,7 +383,7 @@ class Search(Generic[F]):
 
     def result(self, names: Names) -> SearchResult[F]:
         """The result for a set from the sets that are fitted, without a search for further rivals."""
-        models = self.models
+        models = self._sets
         rivals: dict[str, list[F]] = {}
         without: dict[str, F] = {}
         for name in names:

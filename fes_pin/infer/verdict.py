@@ -13,7 +13,7 @@ from typing import Generic, Protocol, TypeVar
 
 from fes_pin.infer.held_out import speaks_for
 from fes_pin.infer.result import Evidence, Gain
-from fes_pin.infer.search import Fitted, Search, SearchResult
+from fes_pin.infer.search import Fitted, M, Search, SearchResult
 
 F = TypeVar("F", bound=Fitted)
 
@@ -110,7 +110,7 @@ class State(Generic[F, W]):
 Claim = Callable[[State[F, W]], State[F, W] | None]
 
 
-class Verdict(ABC, Generic[F, W]):
+class Verdict(ABC, Generic[F, M, W]):
     """The claims of one front end, in `claims` by their order, and what they are made of.
 
     Parameters
@@ -119,7 +119,7 @@ class Verdict(ABC, Generic[F, W]):
         That has run.
     """
 
-    def __init__(self, search: Search[F]) -> None:
+    def __init__(self, search: Search[F, M]) -> None:
         self.search = search
         self.claims: Sequence[Claim[F, W]] = (
             self.drop_unsupported,

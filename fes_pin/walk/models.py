@@ -190,10 +190,8 @@ class WalkModels(FittedSets[WalkFit, None]):
         return known is None or abs(value - known[0]) <= POSSIBLE_SIZES * known[1]
 
 
-class WalkSearch(Search[WalkFit]):
-    """The search over sets of forms of one study."""
-
-    models: WalkModels
+WalkSearch = Search[WalkFit, WalkModels]
+"""A search over sets of forms of one study."""
 
 
 def _read_off(banks: Banks) -> Iterator[tuple[str, tuple[float, float]]]:

@@ -15,7 +15,7 @@ from fes_pin.walk.banks import Banks
 from fes_pin.walk.effect import STAGE
 from fes_pin.walk.errors import StrideErrors
 from fes_pin.walk.judge import lack_of_fit, other_leg
-from fes_pin.walk.models import WalkFit, WalkSearch
+from fes_pin.walk.models import WalkFit, WalkModels, WalkSearch
 from fes_pin.walk.white_noise import white_noise
 
 ORDINARY_MM = 2.0
@@ -35,7 +35,7 @@ class WalkWeighed(Weighed):
 Judgement = State[WalkFit, WalkWeighed]
 
 
-class WalkVerdict(Verdict[WalkFit, WalkWeighed]):
+class WalkVerdict(Verdict[WalkFit, WalkModels, WalkWeighed]):
     """How it is judged what a search over sets of forms found.
 
     A cause must be supported by strides that are held out, by their likelihood: it counts as noise what soft tissue,

@@ -6,7 +6,7 @@ import pytest
 from contrast_pairs.free import free_pair
 
 import fes_pin as fp
-from fes_pin.contrasts.models import ContrastSearch
+from fes_pin.infer.search import Search
 from fes_pin.view.report import report_html
 from fes_pin.workers import OutOfTime
 
@@ -30,7 +30,7 @@ def test_a_change_that_was_found_in_time_is_kept(study, monkeypatch):
     def out_of_time(search, names):
         raise OutOfTime
 
-    monkeypatch.setattr(ContrastSearch, "settle", out_of_time)
+    monkeypatch.setattr(Search, "settle", out_of_time)
     found = fp.contrast(study, limit=1e3)
     assert found.verdict == "stopped" and [c.name for c in found.changes] == ["gain"]
     assert "stopped: best set so far: one thing changed" in str(found)

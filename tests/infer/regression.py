@@ -124,7 +124,7 @@ class Regression(FittedSets[Optimum, None]):
         return f_tail((between / free) / (pure / (self.runs.size - COUNT * len(sizes))), free, self.runs.size) > 0.01
 
 
-class RegressionVerdict(Verdict[Optimum, Weighed]):
+class RegressionVerdict(Verdict[Optimum, Regression, Weighed]):
     """Runs are held out in turn, every group staying in what is fitted; what is left is judged as the search does."""
 
     def weigh(self, found: SearchResult[Optimum]) -> Weighed:

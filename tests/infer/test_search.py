@@ -31,6 +31,10 @@ class Models:
     def __init__(self):
         self.fits = {(): self.fit(())}
 
+    @property
+    def own(self):
+        return self
+
     def fit(self, names):
         sse = PRICE[names]
         return SimpleNamespace(names=names, sse=sse, price=sse + 5.0 * len(names), degrees=len(names))

@@ -154,10 +154,7 @@ class LikelihoodModels(LikelihoodFits):
         return None if self.noise == WHITE else self.forms.otherwise(fitted)
 
 
-class LikelihoodSearch(Search[LikelihoodFit]):
-    """The search over sets of causes of one study by the likelihood."""
-
-    models: LikelihoodModels
-
+LikelihoodSearch = Search[LikelihoodFit, LikelihoodModels]
+"""A search over sets of causes of one study by the likelihood."""
 
 __all__ = ["Found", "LikelihoodModels", "LikelihoodSearch", "NominalFitError"]
