@@ -1,4 +1,4 @@
-"""What a controller answers, foretold by what it read: what is left is the noise that its effort was recorded with.
+"""A controller's effort predicted from its readings: the residual is the noise that the effort was recorded with.
 
 A controller asks for an effort by what it reads, now and lately. While it keeps its ways, that is a linear function of
 each reading y, of its last difference, and of its distance from low passes P_i of it, with time constants of 1, 2, 4,
@@ -37,9 +37,9 @@ class ControllerAnswer:
     Attributes
     ----------
     values
-        Shape (n,), the effort as it is foretold from the readings.
+        Shape (n,), the effort as the readings predict it.
     left_std
-        Shape (n,), standard deviation of what is left of the effort, over the stretch about each sample.
+        Shape (n,), standard deviation of the residual of the effort, over the stretch about each sample.
     gains
         Shape (n, readings, 2), by how much it changes with each reading as it is then, and as it was a sample before.
     """
@@ -49,10 +49,10 @@ class ControllerAnswer:
     gains: np.ndarray
 
     def quieted(self, effort: np.ndarray, noise: float) -> np.ndarray:
-        """The effort that acted, shape (n,), as far as a recorded one with noise of this standard deviation tells.
+        """The estimate of the effort that acted, shape (n,), from a recorded one with noise of this deviation.
 
-        What is left of it, of variance s^2, is noise and what the answer does not foretell, a share 1 - noise^2 / s^2
-        of it, as Wiener's filter has it.
+        The residual, of variance s^2, is noise and effort that the readings do not predict. The effort is a share
+        1 - noise^2 / s^2 of the residual, as in Wiener's filter.
         """
         all_noise = np.ones_like(self.left_std)
         of_left = np.divide(noise, self.left_std, out=all_noise, where=self.left_std > noise)

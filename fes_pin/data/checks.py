@@ -110,7 +110,7 @@ def checked_remarks(value: object, error: KeyFault) -> tuple[str, ...]:
 
 
 def check_columns(names: Sequence[str], schema: RigSchema, kind: str, inputs_only: bool, error: Fault) -> None:
-    """Require the columns of this rig and kind, and no others: another unit and a likely typo are told as such.
+    """Require the columns of this rig and kind, and no others; the error names another unit or a likely typo.
 
     Parameters
     ----------
@@ -181,11 +181,11 @@ def check_values(
     if "pulse_width_us" in columns:
         width = columns["pulse_width_us"]
         if (least := float(width.min())) < 0.0:
-            told = f"expected a pulse width of at least 0 us, found {least:g}"
-            raise error(told, "pulse_width_us", int(np.argmax(width < 0.0)))
+            message = f"expected a pulse width of at least 0 us, found {least:g}"
+            raise error(message, "pulse_width_us", int(np.argmax(width < 0.0)))
         if 0.0 < (most := float(width.max())) <= min(SHORTEST_PULSE_US, threshold_us):
-            told = f"reaches {most:.4g} us, and no pulse is so short: is it in {'ms' if most > 0.002 else 's'}?"
-            raise error(told, "pulse_width_us", int(np.argmax(width)))
+            message = f"reaches {most:.4g} us, and no pulse is so short: is it in {'ms' if most > 0.002 else 's'}?"
+            raise error(message, "pulse_width_us", int(np.argmax(width)))
         if most > LONGEST_PULSE_US:
             raise error(
                 f"reaches {most:g} us, and no pulse is so long: is it in ns?", "pulse_width_us", int(width.argmax())
@@ -198,8 +198,8 @@ def check_values(
     turning = [f"q_{one}" for one in REQUIRED if one not in TRANSLATIONS] if len(schema.recordings) > 1 else []
     for name in ("angle_rad", *turning):
         if name in columns and (most := float(np.abs(columns[name]).max())) > TURN:
-            told = f"reaches {most:.4g}; no {'ankle' if name == 'angle_rad' else 'joint'} turns so far"
-            raise error(f"{told}: is it in degrees?", name, int(np.argmax(np.abs(columns[name]))))
+            message = f"reaches {most:.4g}; no {'ankle' if name == 'angle_rad' else 'joint'} turns so far"
+            raise error(f"{message}: is it in degrees?", name, int(np.argmax(np.abs(columns[name]))))
     if "length_m" in columns:
         length = columns["length_m"]
         if (most := float(length.max())) > LONGEST_MUSCLE_M:
@@ -259,7 +259,7 @@ def check_same_inputs(
         for column in schema.stimuli(kind) if len(schema.recordings) == 1 else ():
             if (column in columns) != (column in first[kind]):
                 there, others = ("has", "has not") if column in columns else ("lacks", "has it")
-                told = f"this trial {there} the column {column} and the first {others}; expected all or none"
-                raise error(place, schema.recordings[0], told)
+                message = f"this trial {there} the column {column} and the first {others}; expected all or none"
+                raise error(place, schema.recordings[0], message)
     if any("pulse_width_us" in columns for _, columns in trials) and "threshold_us" not in constants:
         raise error(None, "threshold_us", "missing; trials with pulse_width_us need threshold and saturation")

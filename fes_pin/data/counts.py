@@ -1,4 +1,4 @@
-"""Readings in counts, as an encoder's: each stands for all that lies within half a count of it."""
+"""Readings in counts, as an encoder's: each is the same for all values within half a count of it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ is read is as good as a number."""
 MOST = 2.0**53
 """Counts that a reading may be away from its first: beyond, doubles hold no whole numbers."""
 WHOLE = 0.1
-"""Share of a count by which a reading may be beside a whole number of them: digits that a file was rounded to."""
+"""Share of a count by which a reading may differ from a whole number of counts: files are rounded to some digits."""
 
 
 @np.errstate(all="ignore")

@@ -144,8 +144,8 @@ def download_all(
     folder
         To make `<name>` in; without it the first of `folders`.
     unverified
-        Keep what no checksum is known of, or whose conversion differs. A wrong checksum of an upstream file is refused
-        anyway.
+        Keep files without a known checksum, or whose conversion differs. A wrong checksum of an upstream file is an
+        error all the same.
     force
         Write over files in it that were not fetched, or have been changed since.
 

@@ -1,4 +1,4 @@
-"""A velocity that was computed from positions, or read beside them."""
+"""A velocity that was computed from positions, or measured by a sensor of its own."""
 
 from __future__ import annotations
 

@@ -146,7 +146,7 @@ def inside(folder: Path, relative: object) -> Path:
 
 
 def write_bytes(path: str | Path, content: bytes, mode: int = 0o666) -> None:
-    """Write one file whole or not at all: to a temporary file beside it, synchronised, then renamed over it.
+    """Write one file whole or not at all: to a temporary file next to it, synchronised, then renamed over it.
 
     Parameters
     ----------

@@ -1,10 +1,10 @@
-"""Motion that the rig is made to follow: smoothed, with its rates, and with what its reading leaves in doubt.
+"""Motion that the rig is made to follow: smoothed, with its rates, and with the uncertainty of each.
 
 A dynamometer, a muscle lever or a test stand imposes the motion; what is measured is the force that it takes. A model
 needs velocity and acceleration of the motion: they come from a smoothing spline of the reading, whose bandwidth
-cross-validation sets (`data.smooth`). A velocity that was measured as well is smoothed by itself, and stands for that
-of the position. What noise stays in them acts on a model's force, and is estimated with all else that is random about
-that.
+cross-validation sets (`data.smooth`). A velocity that was measured as well is smoothed by itself, and replaces the one
+from the position. Noise that smoothing leaves in them acts on a model's force; it is estimated together with the
+process noise and the measurement noise of the force.
 """
 
 from __future__ import annotations

@@ -41,8 +41,8 @@ def trc_points(path: Path) -> dict[str, np.ndarray]:
     cells = 2 + len(points)  # what is behind them is no marker
     lines[5:] = ["\t".join(line.split("\t")[:cells]) for line in lines[5:]]
     table = table_of_lines(path, lines, ("Frame#", TIME, *points), TextForm("\t", header_row=4, first_row=6))
-    if (promised := header.get("NumFrames")) not in (None, str(len(table))):
-        raise InputError(f"expected {promised[:20]} frames as NumFrames says, found {len(table)}", file=path, row=3)
+    if (stated := header.get("NumFrames")) not in (None, str(len(table))):
+        raise InputError(f"expected {stated[:20]} frames as NumFrames says, found {len(table)}", file=path, row=3)
     if len(late := np.flatnonzero(~(np.diff(table.columns[TIME]) > 0.0))):
         raise table.error("expected time to increase", TIME, int(late[0]) + 1)
     return {TIME: table.columns[TIME], **{n: METRES[unit] * table.columns[n] for n in points}}

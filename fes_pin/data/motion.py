@@ -35,7 +35,7 @@ _OPENSIM_GROUND = re.compile(
 STORAGE = (".mot", ".sto")
 """Suffixes of OpenSim's files, whose columns have its own names."""
 BESIDE_M = 0.02
-"""How far apart two plates' centres of pressure lie sideways at least, for the right foot's to be told."""
+"""Least sideways distance of two plates' centres of pressure that identifies the right foot's."""
 BENT_RAD, BACK_RAD = 0.7, -0.26
 """Knees that both pass the first and never the second count flexion positive: none extends 0.7 rad beyond straight."""
 
@@ -53,7 +53,7 @@ def read_motion(path: str | Path) -> tuple[Table, bool | None]:
     Raises
     ------
     InputError
-        As `read_csv` and `check_time`; a header without `endheader`, or that promises another number of rows.
+        As `read_csv` and `check_time`; a header without `endheader`, or that states another number of rows.
     """
     path = Path(path)
     table, in_degrees = _read_storage(path) if is_storage(path) else (read_csv(path), False)

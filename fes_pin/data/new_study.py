@@ -113,8 +113,8 @@ class _Making:
         forms = {p.form: p for p in self.proposals}
         if len(forms) > 1:
             one, other = list(forms.items())[:2]
-            told = " and ".join(f"{p.recording.path.name} has {form_in_words(form)}" for form, p in (one, other))
-            raise InputError(f"expected files that are written alike, but {told}; make a study of each kind")
+            forms_found = " and ".join(f"{p.recording.path.name} has {form_in_words(form)}" for form, p in (one, other))
+            raise InputError(f"expected files that are written alike, but {forms_found}; make a study of each kind")
         return self.proposals[0].form
 
     def _kind(self, proposal: Proposal) -> str:
@@ -150,7 +150,7 @@ class _Making:
     def _source(self, column: str, is_needed: bool) -> dict[str, Any] | None:
         option = self.wanted.columns.get(column)
         if option is not None:
-            return self._told(column, option)
+            return self._stated(column, option)
         candidates = self._candidates(column)
         if len(candidates) != 1:
             if not is_needed and len(candidates) < 2:
@@ -184,10 +184,10 @@ class _Making:
             self.missing.append(what)
             return None
         answer = self.wanted.ask(what.removeprefix("--column ")).strip().removeprefix(f"{column}=")
-        return self._told(column, answer)
+        return self._stated(column, answer)
 
-    def _told(self, column: str, words: str) -> dict[str, Any] | None:
-        """What somebody said of a column, in the unit that the file states where they named none."""
+    def _stated(self, column: str, words: str) -> dict[str, Any] | None:
+        """A column as the user states it, in the unit of the file where the user names none."""
         source = source_from_option(column, words, self.names) if words else None
         if source is None or source.keys() & {"unit", "rate_hz", "edge"}:
             return source

@@ -1,4 +1,4 @@
-"""What a study's numbers alone say against it, before anything is fitted: refused, or warned of, in one line each.
+"""Implausible numbers of a study, found before anything is fitted: errors, and warnings of one line each.
 
 Refused, as no verdict could follow from it: no stimulus above threshold in any trial, outputs that never change or go
 to and fro between two counts, too few samples, a load that only grams explain, an imposed motion that never moves; and
@@ -89,34 +89,34 @@ def implausible(study: Study | ToPredict) -> list[str]:
         check_trial(trial, study.schema, inputs_only=True, threshold_us=-math.inf)
     _check_rows(study)
     done = [(t, remark) for t in study.trials for remark in t.remarks]  # to samples, when they were read
-    warnings = [*_told("", done), *_inputs(study), *_units(study), *_imposed(study)]
+    warnings = [*_each("", done), *_inputs(study), *_units(study), *_imposed(study)]
     outputs = tuple(dict.fromkeys((*study.schema.outputs.values(), "velocity")))
     measured = [(t, n) for t in study.trials for n in outputs if n in t and n not in _driving(study, t)]
     constant = [(t, n) for t, n in measured if not np.ptp(t[n]) > 0.0]
     _check_counts(study, [one for one in measured if one not in constant])
     if len(constant) == len(measured) and not isinstance(study, ToPredict):
         raise InputError("no output changes in any trial; there is nothing to compare a model with", file=study.folder)
-    warnings += _told("does not change at all", constant)
+    warnings += _each("does not change at all", constant)
     moving = [one for one in measured if one not in constant]
-    warnings += _told("is cut off at its largest or smallest value (clipping?)", [m for m in moving if _is_clipped(*m)])
-    warnings += _told("holds whole numbers only: are they an encoder's counts?", [m for m in moving if _is_counted(*m)])
+    warnings += _each("is cut off at its largest or smallest value (clipping?)", [m for m in moving if _is_clipped(*m)])
+    warnings += _each("holds whole numbers only: are they an encoder's counts?", [m for m in moving if _is_counted(*m)])
     for trial, name in moving:
         warnings += dropouts(trial, name) or _held(trial, name)
     return [*warnings, *_rates(study.trials)]
 
 
 def _check_counts(study: Study | ToPredict, moving: Sequence[tuple[Trial, str]]) -> None:
-    """Refuse outputs that hardly ever do more than go to and fro between two counts; what moves is in none of them."""
+    """Raise InputError for outputs that hardly do more than go to and fro between two counts: they show no motion."""
     columns = [t[n] for t, n in moving]
     hunting = [hunts(c) for c in columns]
-    beside = sum(int(np.sum(~h & (np.diff(c, prepend=np.nan) != 0.0))) for c, h in zip(columns, hunting, strict=True))
+    others = sum(int(np.sum(~h & (np.diff(c, prepend=np.nan) != 0.0))) for c, h in zip(columns, hunting, strict=True))
     wanted = SAMPLES_EACH * len(study.start)
     most = sum(int(h.sum()) for h in hunting) > 0.5 * sum(map(len, hunting))
-    if most and beside < wanted:
+    if most and others < wanted:
         names = ", ".join(dict.fromkeys(n for _, n in moving))
         raise InputError(
-            f"{names} only goes to and fro between two counts: expected at least {wanted} readings beside, "
-            f"{SAMPLES_EACH} for each value of [start]; found {beside}",
+            f"{names} only goes to and fro between two counts: expected at least {wanted} other readings, "
+            f"{SAMPLES_EACH} for each value of [start]; found {others}",
             file=study.folder,
         )
 
@@ -132,7 +132,7 @@ def _stimuli(study: Study | ToPredict, trial: Trial) -> tuple[str, ...]:
     return tuple(n for n in study.schema.stimuli(trial.kind) if n in trial)
 
 
-def _told(what: str, found: Sequence[tuple[Trial, str]]) -> list[str]:
+def _each(what: str, found: Sequence[tuple[Trial, str]]) -> list[str]:
     """One warning for each column, however many trials have it."""
     by_column: dict[str, list[str]] = {}
     for trial, name in found:
@@ -170,23 +170,23 @@ def _inputs(study: Study | ToPredict) -> Iterable[str]:
         threshold = study.constants.get("threshold_us", 0.0) if name == "pulse_width_us" else 0.0
         driven = [t for t in study.trials if name in _stimuli(study, t)]
         below = [t for t in driven if not (np.abs(t[name]) > threshold).any()]
-        silent = [t.name for t in below]
-        told = f"{name} is never above the threshold of {threshold:g} us" if threshold else f"{name} is zero throughout"
-        if len(silent) < len(driven):
-            if silent and name in PULSES:  # a joint may swing free between driven trials
+        idle = [t.name for t in below]
+        zero = f"{name} is never above the threshold of {threshold:g} us" if threshold else f"{name} is zero throughout"
+        if len(idle) < len(driven):
+            if idle and name in PULSES:  # a joint may swing free between driven trials
                 for trial in below:
                     check_values({name: trial[name]}, study.schema, trial.error, threshold)
-                yield f"{told} in {trials_named(silent)}"
+                yield f"{zero} in {trials_named(idle)}"
         elif name not in PULSES:
-            yield f"no trial is driven: {told}"
+            yield f"no trial is driven: {zero}"
         else:
             most = max(float(np.abs(t[name]).max()) for t in study.trials if name in t)
             unit = "ms" if threshold < 1e3 * most else "s"
             hint = f" (it reaches {most:.4g}: is it in {unit}?)" if 0.0 < most < SHORTEST_US else ""
             if isinstance(study, ToPredict) and not hint:
-                yield f"{told}: nothing is stimulated"
+                yield f"{zero}: nothing is stimulated"
                 continue
-            message = f"{told} in all trials{hint}; a muscle that is never stimulated shows nothing"
+            message = f"{zero} in all trials{hint}; a muscle that is never stimulated shows nothing"
             raise InputError(message, file=study.folder)
 
 
@@ -195,8 +195,8 @@ def _units(study: Study | ToPredict) -> Iterable[str]:
     for name, most, unit, small in (("force_n", STRONGEST_N, "N", "mN"), ("torque_nm", STRONGEST_NM, "N m", "mN m")):
         strong = [t.name for t in study.trials if name in t and float(np.abs(t[name]).max()) > most]
         if strong:
-            told = f"{name} is beyond {most:g} {unit}, which no limb exerts"
-            yield f"{told}, in {trials_named(strong)}: is it in {small}?"
+            limit = f"{most:g} {unit}, which no limb exerts"
+            yield f"{name} is beyond {limit}, in {trials_named(strong)}: is it in {small}?"
     whole = [t.name for t in study.trials if t.dt >= 1.0 and (t.time == np.rint(t.time)).all()]
     if whole:
         yield f"time_s counts whole numbers in {trials_named(whole)}: is it in ms, or a number of the sample?"
@@ -210,7 +210,7 @@ def _units(study: Study | ToPredict) -> Iterable[str]:
 
 
 def _imposed(study: Study | ToPredict) -> Iterable[str]:
-    """What is odd about imposed motions; refuses a motion that never moves."""
+    """Remarks on imposed motions; a motion that never moves is an InputError."""
     trials = [t for t in study.trials if t.kind == IMPOSED]
     if not trials:
         return
@@ -225,8 +225,8 @@ def _imposed(study: Study | ToPredict) -> Iterable[str]:
         message = f"{name} never moves in any imposed trial: nothing but noise of {motions[0].doubt[0]:.2g} is in it"
         raise InputError(message, file=study.folder, column=name)
     bands = [m.bandwidth_hz for m in motions]
-    told = f"{min(bands):.2g} Hz" if max(bands) < 1.1 * min(bands) else f"{min(bands):.2g} to {max(bands):.2g} Hz"
-    yield f"velocity and acceleration of {name} are those of smoothing splines with a bandwidth of {told}"
+    band = f"{min(bands):.2g} Hz" if max(bands) < 1.1 * min(bands) else f"{min(bands):.2g} to {max(bands):.2g} Hz"
+    yield f"velocity and acceleration of {name} are those of smoothing splines with a bandwidth of {band}"
 
 
 def _is_clipped(trial: Trial, name: str) -> bool:
@@ -260,7 +260,7 @@ def dropouts(trial: Trial, name: str) -> list[str]:
     changes = np.flatnonzero(steps)
     if len(changes) < 2 * RUN:
         return []
-    lengths = np.diff(np.r_[-1, changes])  # samples that each value stands for, the last value's left out
+    lengths = np.diff(np.r_[-1, changes])  # samples of each value but the last
     usual = float(np.quantile(lengths, 0.95))
     sizes = steps[changes]
     jump = JUMP * float(np.quantile(sizes, 0.99))
@@ -270,8 +270,8 @@ def dropouts(trial: Trial, name: str) -> list[str]:
     first = int(changes[found[0]])
     begin = float(trial.time[first - lengths[found[0]] + 1])
     more = f", and {len(found) - 1} times more" if len(found) > 1 else ""
-    told = f"{name} stays at {values[first]:.4g} for {lengths[found[0]]} samples from {begin:.4g} s on and then jumps"
-    return [f"{told}{more} in trial {trial.name}: a dropout, its last value held?"]
+    held = f"{name} stays at {values[first]:.4g} for {lengths[found[0]]} samples from {begin:.4g} s on and then jumps"
+    return [f"{held}{more} in trial {trial.name}: a dropout, its last value held?"]
 
 
 def _held(trial: Trial, name: str) -> list[str]:
@@ -291,8 +291,8 @@ def _held(trial: Trial, name: str) -> list[str]:
     apart = 1.0 - (len(changes) + lengths[longest] - 1) / max(len(values) - 1, 1)
     if lengths[longest] >= RUN and apart < COMMON and values.min() < inside < values.max():
         begin = float(trial.time[ends[longest] + 1])
-        told = f"{name} stays at {inside:.4g} for {lengths[longest]} samples"
-        return [f"{told} from {begin:.4g} s on in trial {trial.name}"]
+        held = f"{name} stays at {inside:.4g} for {lengths[longest]} samples"
+        return [f"{held} from {begin:.4g} s on in trial {trial.name}"]
     return []
 
 

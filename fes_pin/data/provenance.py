@@ -50,8 +50,8 @@ class Provenance(ReadOnly):
 
     def record(self) -> dict[str, Any]:
         """As a dictionary for JSON."""
-        told = {"date": self.date, "versions": dict(self.versions), "inputs": dict(self.inputs), "seed": self.seed}
-        return {**told, "command": self.command} if self.command else told
+        found = {"date": self.date, "versions": dict(self.versions), "inputs": dict(self.inputs), "seed": self.seed}
+        return {**found, "command": self.command} if self.command else found
 
 
 def this_command() -> str:

@@ -83,7 +83,7 @@ def pulse_list(
 ) -> dict[str, np.ndarray]:
     """The pulses of a trial.
 
-    A trial beyond a limit is refused, not clipped: cut short it would be another experiment, and would separate less.
+    A trial beyond a limit is an error and is not clipped: a clipped trial is another experiment, and separates less.
 
     Parameters
     ----------

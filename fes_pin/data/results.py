@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     import pandas
 
 RESULT, TEXT, TABLE = "result", "text", "table"
-"""Keys that every saved result has, beside those of its kind: which kind, its text by lines, its table by columns."""
+"""Keys that every saved result has in addition to those of its kind: its kind, its text by lines, its table by
+columns."""
 UNCOMPARED = ("wall_s", "provenance")
 """Keys of a record that say how a result was made, not what it is."""
 

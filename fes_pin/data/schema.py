@@ -16,7 +16,7 @@ from fes_pin.data.read_only import ReadOnly
 
 ROLES = ("fit", "held_out")
 ALSO_OF_A_TRIAL = ("file", "kind", "role", "group", "name", "remarks", "low_pass_hz")
-"""What a `[[trial]]` states beside its conditions."""
+"""Keys of a `[[trial]]` in addition to its conditions."""
 IMPOSED = "imposed"
 """The kind of a trial in which the motion is an input."""
 UNITS = (
@@ -114,7 +114,7 @@ class RigSchema(ReadOnly):
     inputs
         Columns of which a trial holds one; for a joint none is needed.
     optional
-        Other columns that have a meaning. A column that has none is refused.
+        Other columns that have a meaning. A column that has none is an error.
     imposed
         Columns that hold the motion in a trial of the kind "imposed": the position, which must be there, and what else
         of it may have been measured. Such a trial has them as inputs; without them the rig has no such trials.
@@ -160,7 +160,7 @@ class RigSchema(ReadOnly):
         self._freeze()
 
     def stimuli(self, kind: str) -> tuple[str, ...]:
-        """The input columns of a kind of trial, of which it holds one, beside a motion that it may impose."""
+        """The input columns of a kind of trial, of which it holds one, without a motion that it may impose."""
         return tuple(n for n in self.inputs if n != self.outputs[kind])
 
     def motion(self, kind: str) -> tuple[str, ...]:

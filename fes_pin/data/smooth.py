@@ -27,9 +27,9 @@ WELL = 0.3
 FEWER = 0.6
 """Share of knots beneath which noise is not white: with white noise their number scatters by a quarter."""
 MOTION, PLACES = 5.0, 5.0
-"""Times what many knots leave, beyond which few leave motion, as of noise that lasts many follow a part only; and
-places between knots, as many as hold all squares evenly, of which noise has more, or a quarter. A quick release leaves
-20 to 100 times as much, or all of it in two or three places."""
+"""Bounds on residuals with few knots, beyond which they hold motion: the ratio of their squares to those with many
+knots, which follow a part of correlated noise; and the number of places between knots, or a quarter of them, over which
+noise spreads its squares evenly. A quick release leaves a ratio of 20 to 100, or all squares in two or three places."""
 _TWICE = (2.0**0.5 - 1.0) ** (1.0 / (2 * ORDER))
 """Run twice, the filter halves the power lower than run once; the design is higher by this (Winter, ch. 3)."""
 
@@ -116,9 +116,9 @@ def smoothed_rates(values: np.ndarray, time: np.ndarray) -> tuple[np.ndarray, np
 def _knots(values: np.ndarray, time: np.ndarray) -> tuple[int, int]:
     """How many inner knots a reading has, and how many samples apart its noise is taken for white.
 
-    Noise that lasts over some samples, of a log that was interpolated or of a clock that drifts between them, is
-    followed by a spline as motion is, and an acceleration is most of all noise then. Samples so far apart that they
-    just show the motion well do not share it. White noise lets them have fewer knots by the power of 1 / 13 of the
+    Noise with a correlation time of some samples, of an interpolated log or of a clock that drifts between them, is
+    followed by a spline as motion is, and then an acceleration is mostly noise. Samples so far apart that they just
+    show the motion well do not share such noise. White noise lets them have fewer knots by the power of 1 / 13 of the
     distance alone (Wahba 1990, Spline Models for Observational Data, section 4.4, for a quintic).
     """
     all_of_them = _cross_validated_knots(values, time, 1)
@@ -126,8 +126,8 @@ def _knots(values: np.ndarray, time: np.ndarray) -> tuple[int, int]:
         few = _cross_validated_knots(values, time, apart)
         if few <= WELL * len(time) / apart:
             usual = round(few * apart ** (1.0 / 13.0))
-            lasting = usual < FEWER * all_of_them and _leave_noise(values, time, usual, all_of_them)
-            return (usual, apart) if lasting else (all_of_them, 1)
+            correlated = usual < FEWER * all_of_them and _leave_noise(values, time, usual, all_of_them)
+            return (usual, apart) if correlated else (all_of_them, 1)
     return all_of_them, 1
 
 

@@ -27,7 +27,7 @@ MOST = 0.05
 LONGEST = 2
 """Samples in a row that are still a spike."""
 PASSES = 4
-"""A spike beside a spike shows when the first is gone."""
+"""A spike next to a spike shows when the first is gone."""
 CUBIC, LINE, AFTER = 2, 3, 8
 """Neighbours on a side that the cubic, the straight line, and the parabola at an end go through."""
 
@@ -74,7 +74,7 @@ def _spikes(x: np.ndarray, length: int) -> np.ndarray:
     count = len(x) - 2 * LINE - length + 1
     sides = [x[k : k + count] for k in range(LINE)] + [x[LINE + length + k :][:count] for k in range(LINE)]
     at = np.r_[np.arange(LINE), LINE + length + np.arange(LINE)].astype(float)
-    mask, hit, off, beside = np.zeros(len(x), dtype=bool), np.ones(count, dtype=bool), [], []
+    mask, hit, off, off_line = np.zeros(len(x), dtype=bool), np.ones(count, dtype=bool), [], []
     for inside in range(LINE, LINE + length):
         middle = slice(LINE - CUBIC, LINE + CUBIC)
         weights = [_weights(at[middle], inside, 3), _weights(at[:LINE], inside, 1), _weights(at[LINE:], inside, 1)]
@@ -86,7 +86,7 @@ def _spikes(x: np.ndarray, length: int) -> np.ndarray:
         hit &= np.sign(here) * np.sign(before) > 0
         hit &= np.sign(here) * np.sign(after) > 0
         off.append(np.abs(here))
-        beside.append(np.minimum(np.abs(before), np.abs(after)))
+        off_line.append(np.minimum(np.abs(before), np.abs(after)))
         if inside == LINE:
             line = np.abs(before)
     least, floor = np.min(off, axis=0), _quantum(x)
@@ -94,7 +94,7 @@ def _spikes(x: np.ndarray, length: int) -> np.ndarray:
     for k in np.flatnonzero(hit):
         near = slice(max(0, k - AROUND), k + AROUND + 1)
         far = least[k] > FAR * _deviation(off[0][near])
-        if far and min(b[k] for b in beside) > OFF_LINE * max(_deviation(line[near]), floor):
+        if far and min(b[k] for b in off_line) > OFF_LINE * max(_deviation(line[near]), floor):
             mask[k + LINE : k + LINE + length] = True
     return mask
 

@@ -85,8 +85,8 @@ def _is_noisy(values: np.ndarray, moving: Sequence[slice]) -> bool:
     if not scale / np.linalg.norm(FOURTH) > digit:
         return False
     cut = [np.clip(f, -3.0 * scale, 3.0 * scale) for f in fourth]
-    beside, power = (sum(float(f[k:] @ f[: len(f) - k]) for f in cut) for k in (1, 0))
-    return beside < WHITE * power
+    lagged, power = (sum(float(f[k:] @ f[: len(f) - k]) for f in cut) for k in (1, 0))
+    return lagged < WHITE * power
 
 
 def without_stuck(trial: Trial, columns: Sequence[str], starts_anywhere: bool) -> tuple[list[Trial], list[str]]:
@@ -145,5 +145,5 @@ def _said(trial: Trial, name: str, stretches: Sequence[slice]) -> str:
     first = stretches[0]
     count = sum(s.stop - s.start for s in stretches)
     more = f", and {len(stretches) - 1} times more" if len(stretches) > 1 else ""
-    told = f"{name} stays at {trial[name][first.start]:.4g} from {trial.time[first.start]:.4g} s on"
-    return f"{told}{more} in trial {trial.name}, as a stuck sensor does: {count} samples are left out"
+    held = f"{name} stays at {trial[name][first.start]:.4g} from {trial.time[first.start]:.4g} s on"
+    return f"{held}{more} in trial {trial.name}, as a stuck sensor does: {count} samples are left out"

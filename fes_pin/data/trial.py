@@ -425,8 +425,7 @@ def _checked_columns(
 ) -> tuple[dict[str, np.ndarray], np.ndarray]:
     """A trial's columns by name, and its time, after all that is asked of them was checked."""
     if table.names[0] != "time_s":
-        told = f"expected time_s as the first column, found {table.names[0][:40]!r}"
-        raise table.error(f"{told}; {NEW_STUDY}", "time_s")
+        raise table.error(f"expected time_s as the first column, found {table.names[0][:40]!r}; {NEW_STUDY}", "time_s")
     check_columns(table.names[1:], schema, kind, inputs_only, table.error)
     check_time(table)
     columns = {name: table.columns[name] for name in table.names[1:]}

@@ -166,7 +166,7 @@ class _Urdf:
         if not SMALLEST <= value <= LARGEST:
             raise self.error(f"expected a mass between {SMALLEST:g} and {LARGEST:g} kg, found {value:g}", name)
         if "inertia" not in numbers:
-            raise self.error("expected an <inertia> beside the mass", name)
+            raise self.error("expected an <inertia> together with the mass", name)
         self._check_inertia(numbers["inertia"], name)
         return value
 

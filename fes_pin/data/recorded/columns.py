@@ -36,7 +36,7 @@ class ColumnSource:
     scale
         1; -1 where the recording counts the other way; radians a count, newtons a volt.
     zero
-        The reading, as recorded, that stands for zero.
+        The recorded reading that means zero.
     edge
         Of `stim`: a pulse begins where the recording rises above this.
     rate_hz

@@ -68,7 +68,8 @@ def read_recording(path: str | Path, form: TextForm | None = None, wanted: Seque
     Raises
     ------
     InputError
-        Not what its suffix says, a library that is not installed, a file of a kind that is refused, with what to do.
+        The file is not what its suffix says, a library is not installed, or no file of this kind can be read; the
+        message says what to do.
     """
     path = Path(path)
     suffix = path.suffix.lower()

@@ -1,4 +1,4 @@
-"""A file that is not as the study format has it is refused, with a word on what would read it as it is."""
+"""Errors for files that are not written as the study format says; the message names what reads them as they are."""
 
 from __future__ import annotations
 
