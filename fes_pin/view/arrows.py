@@ -50,7 +50,7 @@ def arrow_commands(arrow: Arrow, name: str, animation) -> list:
                 matrix[:3, :3], matrix[:3, 3] = turn.matrix() * scale, middle
                 out.append(SetTransform(matrix, place))
             if len(arrow.foot) > 1:
-                _key(animation, place, t, turn, middle, scale)
+                set_key(animation, place, t, turn, middle, scale)
     return out
 
 
@@ -67,10 +67,11 @@ def _placed(part: str, foot: np.ndarray, vector: np.ndarray) -> tuple[pin.Quater
     return turn, foot + (shaft + 1.5 * HEAD_M) * along, np.ones(3)
 
 
-def _key(animation, place, frame: int, turn: pin.Quaternion, middle: np.ndarray, scale: np.ndarray) -> None:
+def set_key(animation, place, frame: int, turn: pin.Quaternion, middle: np.ndarray, scale=(1.0, 1.0, 1.0)) -> None:
+    """Where a part is in one frame of an animation, how it is turned and how large it is."""
     from meshcat.animation import AnimationClip  # noqa: PLC0415
 
     clip = animation.clips.setdefault(place, AnimationClip(fps=animation.default_framerate))
     clip.set_property(frame, "position", "vector3", middle.tolist())
     clip.set_property(frame, "quaternion", "quaternion", turn.coeffs().tolist())
-    clip.set_property(frame, "scale", "vector3", scale.tolist())
+    clip.set_property(frame, "scale", "vector3", list(scale))

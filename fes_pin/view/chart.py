@@ -191,7 +191,7 @@ class Panel:
 
 
 def _labelled(limits: tuple[float, float], count: int) -> list[tuple[float, str]]:
-    made = ticks(*limits, count)
+    made = next((m for k in range(count, 3 * count) if len(m := ticks(*limits, k)) > 1), [limits[0]])
     step = made[1] - made[0] if len(made) > 1 else abs(made[0]) or 1.0
     return [(v, tick_text(v, step)) for v in made]
 

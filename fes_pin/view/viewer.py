@@ -27,7 +27,7 @@ from fes_pin.data.errors import InputError
 from fes_pin.data.files import write_text
 from fes_pin.data.named import NamedArray
 from fes_pin.data.numbers import instance
-from fes_pin.view.arrows import Arrow, arrow_commands
+from fes_pin.view.arrows import Arrow, arrow_commands, set_key
 
 FRAMES_A_SECOND = 30
 MODE_SWING_DEG, MODE_PERIOD_S = 12.0, 2.0
@@ -142,7 +142,7 @@ class BodyScene:
                 if t == 0:
                     out.append(SetTransform(matrix, path))
                 if len(self.frames) > 1:
-                    _key(animation, path, t, matrix)
+                    set_key(animation, path, t, pin.Quaternion(matrix[:3, :3]), matrix[:3, 3])
         for k, (centre, _, _) in enumerate(self.balls):
             out.append(SetTransform(_moved(tilt.act(centre)), Place(("meshcat", "ball", str(k)))))
         for number, arrow in enumerate(self.arrows):
@@ -348,14 +348,6 @@ def _meshcat_geometry(shape):
     if isinstance(shape, coal.Box):
         return Box((2.0 * shape.halfSide).tolist()), np.eye(3)
     raise InputError(f"the viewer draws spheres, cylinders and boxes, not {type(shape).__name__}")
-
-
-def _key(animation, place, frame: int, matrix: np.ndarray) -> None:
-    from meshcat.animation import AnimationClip  # noqa: PLC0415
-
-    clip = animation.clips.setdefault(place, AnimationClip(fps=animation.default_framerate))
-    clip.set_property(frame, "position", "vector3", matrix[:3, 3].tolist())
-    clip.set_property(frame, "quaternion", "quaternion", pin.Quaternion(matrix[:3, :3]).coeffs().tolist())
 
 
 _PAGE = """<!DOCTYPE html>

@@ -16,12 +16,13 @@ def study(tmp_path_factory):
     return free_pair("muscle", ("gain",), 80.0, 9, tmp_path_factory.mktemp("pair"))
 
 
-def test_without_time_nothing_is_claimed(study):
+def test_without_time_nothing_is_claimed(study, tmp_path):
     found = fp.contrast(study, limit=0.0)
     assert found.verdict == "stopped" and not found.changes
     assert not found.unchanged and not found.excluded
     assert "stopped: best set so far: nothing changed" in str(found)
-    assert "Stopped: best set so far" in report_html(found)
+    fp.report(found, tmp_path / "report.html")
+    assert "Stopped: best set so far" in (tmp_path / "report.html").read_text(encoding="utf-8") == report_html(found)
     assert json.loads(found.to_json())["verdict"] == "stopped"
     assert any("limit of 0 s" in words for words in found.warnings)
 
