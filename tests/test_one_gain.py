@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 from view.reported import ankle_diagnosis
-from view.test_report import driven_diagnosis
+from view.test_report import diagnosis_of
 
 from fes_pin.diagnosis.errors_ahead import Ahead, AheadErrors
 from fes_pin.infer.held_out import speaks_for
@@ -43,7 +43,7 @@ def shares(text):
 
 def test_one_cause_by_two_measures_says_which(tmp_path):
     """Once a study said "explains 56 %" and "explains 2 %" of one cause and its values, depending on the limit."""
-    found = replace(driven_diagnosis(tmp_path, 310.0), nominal_error=(100.0, None), extended_error=(44.0, None))
+    found = replace(diagnosis_of(tmp_path, 310.0), nominal_error=(100.0, None), extended_error=(44.0, None))
     ahead = AheadErrors(0.3, Ahead(0.1, 5.0, 100.0, 1.0), Ahead(0.1, 4.9, 44.0, 1.0), None, None)
     by_likelihood = replace(found, ahead=ahead, held_out_by=FITTED)
     free = ankle_diagnosis()
@@ -86,5 +86,5 @@ def test_what_is_fitted_alone_is_no_held_out_gain():
 
 
 def test_a_driven_rig_is_judged_over_the_horizon_and_another_by_free_simulations(tmp_path):
-    assert driven_diagnosis(tmp_path, 310.0).explained.what == "predictions 0.3 s ahead"
+    assert diagnosis_of(tmp_path, 310.0).explained.what == "predictions 0.3 s ahead"
     assert ankle_diagnosis().explained.what == "free simulations"

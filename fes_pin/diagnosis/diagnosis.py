@@ -20,8 +20,7 @@ from fes_pin.data.stuck import without_stuck
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.decide.doubts import few_trials
-from fes_pin.diagnosis.driven import driven_diagnosis
-from fes_pin.diagnosis.form_errors import searched
+from fes_pin.diagnosis.estimators import searched
 from fes_pin.diagnosis.logged import LogFaults, likelier, with_timing_of, with_words
 from fes_pin.diagnosis.long_records import searched_part, thinned
 from fes_pin.diagnosis.misread import NAME as MISREAD
@@ -33,6 +32,7 @@ from fes_pin.diagnosis.search.likelihood_fits import MEASUREMENT, PROCESS
 from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodModels, LikelihoodSearch, NominalFitError
 from fes_pin.diagnosis.stopped import unfitted
 from fes_pin.diagnosis.testable import given_away
+from fes_pin.diagnosis.verdict import diagnosis_of
 from fes_pin.identify.feedback import is_fed_back, is_stimulus_fed_back
 from fes_pin.identify.recording import earns, low_pass_of
 from fes_pin.infer.result import STOPPED
@@ -175,7 +175,7 @@ class _Work:
         whole, stated = study, train
         if again is not None:
             train, whole = again.trials, restated_study(study, nominal, again.misread)
-        diagnosis = driven_diagnosis(whole, search, found, (train, test), self.seed)
+        diagnosis = diagnosis_of(whole, search, found, (train, test), self.seed)
         return diagnosis if again is None else with_misread(diagnosis, again, stated, test, self.seed)
 
 

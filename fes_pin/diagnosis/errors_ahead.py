@@ -9,12 +9,12 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from fes_pin.data.trial import Trial
-from fes_pin.identify.ahead import SquaredErrors, forecast, forecasts, one_step, reach_of
+from fes_pin.identify.ahead import forecast, forecasts, one_step, reach_of
 from fes_pin.identify.likelihood import is_simulated
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.per_trial import predictions
 from fes_pin.identify.process_noise import driving_size, first_guess
-from fes_pin.infer.held_out import FOLDS, Errors, joined_errors, percent_of_spread, within
+from fes_pin.infer.held_out import FOLDS, Errors, joined_errors, within
 from fes_pin.infer.levels import AVERAGED_S, RUNAWAY, SMALL_SHARE
 from fes_pin.infer.noise import NoiseModel
 from fes_pin.models.autoregression import weights_ahead
@@ -61,11 +61,6 @@ class Ahead:
     horizon: float
     free: float | None
     noise: float | None = None
-
-    @classmethod
-    def of(cls, total: SquaredErrors) -> Ahead:
-        """From squared errors."""
-        return cls(*(percent_of_spread(e, total.around) for e in (total.one_step, total.horizon, total.free)))
 
 
 @dataclass(frozen=True)

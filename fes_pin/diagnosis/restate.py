@@ -10,9 +10,8 @@ import numpy as np
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.conditions import Conditions, Restated
-from fes_pin.diagnosis.decide.folds import folds_of
-from fes_pin.diagnosis.driven_held_out import afresh
 from fes_pin.diagnosis.errors_ahead import errors_ahead, free_errors
+from fes_pin.diagnosis.held_out import afresh, folds_of
 from fes_pin.diagnosis.misread import NAME, Misread, find_misread, restated_trials
 from fes_pin.diagnosis.parts import in_parts
 from fes_pin.diagnosis.remainder.driven import driven_remainder

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -46,50 +45,6 @@ def default_horizon(trials: Sequence[Trial]) -> float:
     if all(t.kind == IMPOSED for t in trials):
         return max(t.duration for t in trials)
     return min(HORIZON_S, 0.1 * min(t.duration for t in trials))
-
-
-@dataclass(frozen=True)
-class SquaredErrors:
-    """Squared errors of a model on trials, in units of the noise: one sample ahead, over a horizon, free; and of the
-    measurement about its mean."""
-
-    one_step: float = 0.0
-    horizon: float = 0.0
-    free: float = 0.0
-    around: float = 0.0
-
-    def __add__(self, other: SquaredErrors) -> SquaredErrors:
-        return SquaredErrors(
-            self.one_step + other.one_step,
-            self.horizon + other.horizon,
-            self.free + other.free,
-            self.around + other.around,
-        )
-
-
-def forecast_errors(
-    model: Model, trials: Sequence[Trial], noise: NoiseModel, floor: NoiseModel, horizon_s: float
-) -> SquaredErrors:
-    """Squared errors of a model that is simulated freely.
-
-    Parameters
-    ----------
-    noise
-        By which the residual foretells itself.
-    floor
-        Whose deviations weigh the channels.
-    """
-    total = SquaredErrors()
-    for trial, readings in zip(trials, predictions(model, trials, noise), strict=True):
-        for k, name in enumerate(model.rig.outputs(trial.kind)):
-            if name not in trial.columns or name not in noise or name not in floor:
-                continue
-            variance, measured = floor[name].std ** 2, trial[name]
-            left = measured - readings[:, k]
-            errors = [left - forecast(left, noise[name], trial.dt, ahead) for ahead in (0.0, horizon_s)]
-            squares = [float(e @ e) / variance for e in (*errors, left, measured - measured.mean())]
-            total += SquaredErrors(*squares)
-    return total
 
 
 def own_noise(fitted: Fit) -> NoiseModel:

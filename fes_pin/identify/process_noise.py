@@ -8,7 +8,7 @@ parameters are those that leave the least effort unexplained, whatever it is, as
 (Khalil and Dombre, Modeling, Identification and Control of Robots, 2002, chapter 12): calibration in the mean square,
 which is the model nearest to what is measured where none is right (Tuo and Wu, Efficient calibration for imperfect
 computer models, Annals of Statistics 43, 2015). Where a random effort does last, errors of prediction are smaller with
-it (`diagnosis.form_errors`).
+it (`diagnosis.estimators`).
 """
 
 from __future__ import annotations

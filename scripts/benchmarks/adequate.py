@@ -4,7 +4,7 @@
 
 Studies that hide nothing, of `scripts/accuracy free`, in white, first-order autoregressive (0.6 to 0.9) and coloured
 noise (a random torque, or ARMA(2, 1) in the sensor), are fitted with the nominal model. Printed are quantiles of
-`driven_refused.slowness`, and how many studies lie beyond `levels.SMALL_SHARE`, where no model is adequate.
+`refused.slowness`, and how many studies lie beyond `levels.SMALL_SHARE`, where no model is adequate.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from confusion_matrix.generator import make
 from confusion_matrix.noise import FAMILIES
 from confusion_matrix.plan import Item
 
-from fes_pin.diagnosis.driven_refused import slowness
+from fes_pin.diagnosis.refused import slowness
 from fes_pin.identify.fit import fit
 from fes_pin.infer.levels import SMALL_SHARE
 from fes_pin.models.nominal import nominal_model

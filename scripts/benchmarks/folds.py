@@ -21,8 +21,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from confusion_matrix.generator import make
 from confusion_matrix.plan import FORMS, Item
 
-from fes_pin.diagnosis.decide.folds import folds_of
 from fes_pin.diagnosis.diagnosis import diagnose_joint
+from fes_pin.diagnosis.held_out import folds_of
 
 NOISE = "white"
 

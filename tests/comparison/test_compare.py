@@ -16,8 +16,8 @@ from fes_pin.comparison.literature import LITERATURE, published_model
 from fes_pin.comparison.own_part import own_part
 from fes_pin.comparison.result import apart_from
 from fes_pin.data.errors import InputError
-from fes_pin.diagnosis.errors_ahead import Ahead, free_errors
-from fes_pin.identify.ahead import forecast_errors, own_noise
+from fes_pin.diagnosis.errors_ahead import free_errors, free_residuals
+from fes_pin.identify.ahead import forecast, own_noise
 from fes_pin.identify.fit import rough_noise
 
 DEMO = Path(__file__).parents[2] / "analysis/studies/ankle_demo"
@@ -66,9 +66,11 @@ def test_the_error_is_that_of_a_diagnosis(tmp_path):
     (found,) = fp.compare(replace(study, trials=tuple(trials)), ["nominal"], horizon_s=0.2).models
     held, floor = trials[5:], rough_noise(found.fit.model, trials)
     assert found.percent["free"] == pytest.approx(free_errors(found.fit.model, held, floor).error_percent())
-    ahead = Ahead.of(forecast_errors(found.fit.model, held, own_noise(found.fit), floor, 0.2))
-    assert found.percent["horizon"] == pytest.approx(ahead.horizon)
-    assert found.percent["free"] == pytest.approx(ahead.free)
+    left = [(t, free_residuals(found.fit.model, t, floor)["force_n"]) for t in held]
+    noise = own_noise(found.fit)["force_n"]
+    ahead = sum(np.sum((x - forecast(x, noise, t.dt, 0.2)) ** 2) for t, x in left)
+    around = sum(np.sum((t["force_n"] - t["force_n"].mean()) ** 2) for t in held)
+    assert found.percent["horizon"] == pytest.approx(100.0 * ahead / around)
     for kind, squares in found.squares.items():
         assert squares.mean() == pytest.approx(found.percent[kind])
 

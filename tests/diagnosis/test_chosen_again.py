@@ -7,7 +7,7 @@ from diagnosis.hidden import study_of
 from identify.rigs import as_likely
 
 from fes_pin.diagnosis.decide.chosen_again import ChosenAgain, share_of
-from fes_pin.diagnosis.decide.folds import folds_of
+from fes_pin.diagnosis.held_out import folds_of
 from fes_pin.identify.fit import fit, fit_problem
 from fes_pin.identify.problem import Problem
 from fes_pin.infer.distributions import chi2_tail

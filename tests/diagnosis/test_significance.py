@@ -4,7 +4,7 @@ import numpy as np
 from diagnosis.hidden import study_of
 from identify.rigs import WHITE, trials_of
 
-from fes_pin.diagnosis.decide.folds import folds_of
+from fes_pin.diagnosis.held_out import folds_of
 from fes_pin.diagnosis.remainder.open_set import unexplained_remainder
 from fes_pin.identify.fit import fit
 from fes_pin.models.predict import predict

@@ -9,10 +9,10 @@ from driven_rigs.arm import CAUSES, draw_arm
 
 from fes_pin.data.study import read_study
 from fes_pin.diagnosis.diagnosis import diagnose_joint
-from fes_pin.diagnosis.driven import Judged, _foretelling_more
 from fes_pin.diagnosis.errors_ahead import Ahead, errors_ahead
-from fes_pin.diagnosis.form_errors import beside_what_is_new
+from fes_pin.diagnosis.estimators import beside_what_is_new
 from fes_pin.diagnosis.search.likelihood_maxima import LikelihoodMaxima
+from fes_pin.diagnosis.verdict import Judged, _predicting_better
 from fes_pin.identify.likelihood_fit import beside_fresh_efforts
 from fes_pin.identify.process_noise import first_guess, without_memory
 from fes_pin.infer.levels import CONFIDENCE_95
@@ -95,16 +95,17 @@ def test_what_errs_less_over_the_horizon_is_taken_and_what_is_left_by_either_sta
         replace(empty, left=what, ahead=(None, Ahead(1.0, error, None)), horizon_s=error)
         for what, error in ((left, 1.0), (nothing, ahead))
     )
-    chosen = _foretelling_more(other, one)
+    chosen = _predicting_better(other, one)
     assert chosen.horizon_s == (ahead if taken else 1.0)
     assert chosen.left.unexplained is unexplained
 
 
 @pytest.mark.parametrize(
-    "search", [SimpleNamespace(was_stopped=True), SimpleNamespace(was_stopped=False, seconds_left=-1.0)]
+    "left", [{"was_stopped": True}, {"was_stopped": False, "seconds_left": -1.0}], ids=["stopped", "at its end"]
 )
-def test_a_search_that_has_no_time_left_is_not_judged_again(search, fitted):
+def test_a_search_that_has_no_time_left_is_not_judged_again(left, fitted):
     _, likeliest, _ = fitted[2]
+    search = SimpleNamespace(models=SimpleNamespace(answered=True), **left)
     assert beside_what_is_new(search, SimpleNamespace(best=likeliest)) is None
 
 

@@ -11,9 +11,9 @@ from scipy.signal import lfilter
 
 from fes_pin.data.study import read_study
 from fes_pin.diagnosis.diagnosis import diagnose_joint
-from fes_pin.diagnosis.driven import DrivenVerdict, DrivenWeighed
-from fes_pin.diagnosis.driven_refused import with_refused_causes
 from fes_pin.diagnosis.errors_ahead import RandomPart
+from fes_pin.diagnosis.refused import with_refused_causes
+from fes_pin.diagnosis.verdict import RigVerdict, RigWeighed
 from fes_pin.infer.result import Evidence, Gain, Remainder
 from fes_pin.infer.verdict import Refused, State
 
@@ -23,10 +23,10 @@ LITTLE = (RandomPart("effort", 0.1, 0.1, 0.01),)
 
 def unsupported(evidence, low, random):
     """What is refused of a friction with the low end of its gain."""
-    verdict = DrivenVerdict(SimpleNamespace(models=SimpleNamespace(horizon_s=0.3)), (), 0)
+    verdict = RigVerdict(SimpleNamespace(models=SimpleNamespace(horizon_s=0.3)), (), 0)
     gains = {"coulomb_friction": Gain(low + 1.0, low, low + 2.0)}
     found = SimpleNamespace(without={"coulomb_friction": None})
-    return verdict.unsupported(State(found, DrivenWeighed(gains, evidence, NOTHING, (), random), {}, frozenset(gains)))
+    return verdict.unsupported(State(found, RigWeighed(gains, evidence, NOTHING, (), random), {}, frozenset(gains)))
 
 
 @pytest.mark.parametrize(

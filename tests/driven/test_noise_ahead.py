@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from identify.test_likelihood import TRUE, believed, held
 
-from fes_pin.diagnosis.driven_refused import is_moved_by_what_is_recorded
-from fes_pin.diagnosis.errors_ahead import errors_ahead, errors_over_horizon, noise_that_is_small, random_parts
+from fes_pin.diagnosis.errors_ahead import errors_ahead, noise_that_is_small, random_parts, squared_errors
+from fes_pin.diagnosis.refused import is_moved_by_what_is_recorded
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import maximise
 from fes_pin.identify.process_noise import first_guess
@@ -27,7 +27,7 @@ def fitted():
 @pytest.mark.parametrize("horizon_s", [0.1, 0.3])
 def test_errors_of_a_right_model_are_those_of_noise(horizon_s, fitted):
     """Pieces as long as the horizon err together: their sum is within three of its own deviations."""
-    found = errors_over_horizon([(fitted, fitted, fitted.trials)], horizon_s)
+    found = squared_errors([(fitted, fitted, fitted.trials)], horizon_s)
     assert abs(found.squares.sum() - found.noise.sum()) < 3.0 * np.sqrt(found.scatter().sum())
     assert found.noise.sum() > 5.0 * sum(map(len, fitted.trials))
     told = errors_ahead([(fitted, fitted, fitted.trials)], horizon_s, falling=False)

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from fes_pin.diagnosis.decide import gains_ahead
+from fes_pin.diagnosis import held_out
 from fes_pin.infer.result import Gain
 
 SHORT, LONG = 0.3, 1.16
@@ -22,11 +22,11 @@ def test_a_cause_may_show_as_far_ahead_as_what_stands_for_it_lasts(short, long, 
         low = short if horizon_s == SHORT else long
         return dict.fromkeys(names, Gain(low + 1.0, low, low + 2.0))
 
-    monkeypatch.setattr(gains_ahead, "_gains_over", gains_over)
+    monkeypatch.setattr(held_out, "_gains_over", gains_over)
     without = SimpleNamespace(noise=SimpleNamespace(time={"effort": lasts_s}))
     found = SimpleNamespace(without={"parallel_stiffness": without})
     folds = [SimpleNamespace(test=[SimpleNamespace(duration=11.0)])]
-    gain = gains_ahead.gains_of(folds, found.without, SHORT, seed=0)["parallel_stiffness"]
+    gain = held_out.gains_of(folds, found.without, SHORT, seed=0)["parallel_stiffness"]
     assert gain.ahead_s == ahead_s
     assert gain.low == (short if ahead_s is None else long)
 

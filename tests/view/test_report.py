@@ -234,7 +234,7 @@ def test_no_chance_is_zero_and_no_floor_is_a_tiny_number():
     assert "5.8e-08" not in str(sure)
 
 
-def driven_diagnosis(folder, free):
+def diagnosis_of(folder, free):
     """A joint whose effort answers the reading, as if judged so; `free` is its free error."""
     made = diagnosed(joint_study(folder), ("coulomb_friction",))
     white = dict.fromkeys(("position", "velocity"), 1e-3)
@@ -253,7 +253,7 @@ def driven_diagnosis(folder, free):
 
 
 def test_a_driven_rig_shows_three_errors_side_by_side_and_reasons_along_its_motion(tmp_path):
-    text = checked(driven_diagnosis(tmp_path, 310.0))
+    text = checked(diagnosis_of(tmp_path, 310.0))
     for words in (
         "of the squared error of predictions 0.3 s ahead",
         "E 9.5 % \u2192 0.4 %, cross-validated; noise alone leaves 0.2 %",
@@ -267,7 +267,7 @@ def test_a_driven_rig_shows_three_errors_side_by_side_and_reasons_along_its_moti
 
 
 def test_the_free_error_of_a_rig_that_falls_is_said_to_be_meaningless(tmp_path):
-    text = checked(driven_diagnosis(tmp_path, None))
+    text = checked(diagnosis_of(tmp_path, None))
     assert "Falls by itself: free errors are meaningless" in text and "free simulations" not in text
 
 

@@ -13,8 +13,8 @@ from dataclasses import replace
 import numpy as np
 
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.decide.folds import folds_of
 from fes_pin.diagnosis.errors_ahead import free_residuals
+from fes_pin.diagnosis.held_out import folds_of
 from fes_pin.diagnosis.search.likelihood_models import LikelihoodSearch
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit

@@ -9,8 +9,3 @@ from fes_pin.infer.search import Names
 def names_of(fitted: Fit) -> Names:
     """The causes in a fit."""
     return tuple(sorted(e.name for e in fitted.model.effects))
-
-
-def subsets(names: Names) -> list[Names]:
-    """The sets with one cause less."""
-    return [tuple(m for m in names if m != n) for n in names]

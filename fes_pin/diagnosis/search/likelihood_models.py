@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.decide.gains_ahead import Fold, gains_of
 from fes_pin.diagnosis.decide.significance import level_of
 from fes_pin.diagnosis.errors_ahead import are_large, random_parts
+from fes_pin.diagnosis.held_out import Fold, Found, gains_of
 from fes_pin.diagnosis.remainder.driven import driven_remainder
 from fes_pin.diagnosis.search.cause_sets import Names
 from fes_pin.diagnosis.search.likelihood_fits import MEASUREMENT, PROCESS, WHITE, LikelihoodFits
@@ -20,12 +20,9 @@ from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.distributions import chi2_tail
 from fes_pin.infer.levels import FORM_SHARE, MOST_CAUSES
 from fes_pin.infer.scatter import excess_scatter
-from fes_pin.infer.search import Search, SearchResult
+from fes_pin.infer.search import Search
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
-
-Found = SearchResult[LikelihoodFit]
-"""What a search among causes found."""
 
 
 class NominalFitError(Exception):

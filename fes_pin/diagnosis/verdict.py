@@ -15,19 +15,7 @@ import numpy as np
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.decide.chosen_again import ChosenAgain, is_chosen, share_of
-from fes_pin.diagnosis.decide.folds import folds_of
-from fes_pin.diagnosis.decide.gains_ahead import Fold, gains_of
 from fes_pin.diagnosis.decide.rivals import absorbed, alternatives, estimates, experiment, ranking
-from fes_pin.diagnosis.driven_held_out import (
-    Again,
-    afresh,
-    as_random_as_in_all,
-    evidence_of,
-    held_errors_ahead,
-    make_folds,
-    with_choices,
-)
-from fes_pin.diagnosis.driven_refused import UNMOVED, is_moved_by_what_is_recorded, no_noise, with_refused_causes
 from fes_pin.diagnosis.errors_ahead import (
     Ahead,
     AheadErrors,
@@ -38,7 +26,20 @@ from fes_pin.diagnosis.errors_ahead import (
     noise_that_is_small,
     random_parts,
 )
-from fes_pin.diagnosis.form_errors import FRESH, beside_what_is_new, judged_again, least_error
+from fes_pin.diagnosis.estimators import FRESH, beside_what_is_new, judged_again, least_error
+from fes_pin.diagnosis.held_out import (
+    Again,
+    Fold,
+    afresh,
+    as_random_as_in_all,
+    evidence_of,
+    folds_of,
+    gains_of,
+    held_errors_ahead,
+    make_folds,
+    with_choices,
+)
+from fes_pin.diagnosis.refused import UNMOVED, is_moved_by_what_is_recorded, no_noise, with_refused_causes
 from fes_pin.diagnosis.remainder.driven import driven_remainder
 from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.diagnosis.search.cause_sets import names_of
@@ -55,7 +56,7 @@ from fes_pin.models.stage import Effect
 
 
 @dataclass(frozen=True)
-class DrivenWeighed(Weighed):
+class RigWeighed(Weighed):
     """What trials say of a set of causes; gains are over the horizon.
 
     Attributes
@@ -74,10 +75,10 @@ class DrivenWeighed(Weighed):
     no_noise: str | None
 
 
-Judgement = State[LikelihoodFit, DrivenWeighed]
+Judgement = State[LikelihoodFit, RigWeighed]
 
 
-class DrivenVerdict(Verdict[LikelihoodFit, LikelihoodModels, DrivenWeighed]):
+class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
     """How it is judged what a search by the likelihood found.
 
     Trials that took no part speak for a cause, or not, by `speaks_for`, with errors over the horizon: several forms
@@ -99,11 +100,11 @@ class DrivenVerdict(Verdict[LikelihoodFit, LikelihoodModels, DrivenWeighed]):
         self.again, self._alike = Again(afresh), Again(as_random_as_in_all)
         self._chosen: dict[int, tuple[Found, list[LikelihoodFit]]] = {}
 
-    def weigh(self, found: Found) -> DrivenWeighed:
+    def weigh(self, found: Found) -> RigWeighed:
         """What held-out trials, and the tests of lack of fit, say of a set."""
         folds = make_folds(found, self.models.trials, self.test, self.again)
         within = folds or [Fold(found.nominal, found.best, found.without, self.models.trials)]
-        return DrivenWeighed(
+        return RigWeighed(
             gains=gains_of(within, found.without, self.models.judged_s, self.seed),
             evidence=evidence_of(folds, found, self._alike) if folds else {},
             lack_of_fit=driven_remainder(found.best, self.seed),
@@ -187,8 +188,8 @@ class Judged:
         return tuple(f.best for f in self.state.weighed.folds if f.within)
 
 
-def judge_driven(search: LikelihoodSearch, found: Found, test: Sequence[Trial], seed: int) -> Judged:
-    """Hold out, and judge what is left; see `DrivenVerdict` and `infer.verdict`.
+def judged_of(search: LikelihoodSearch, found: Found, test: Sequence[Trial], seed: int) -> Judged:
+    """Hold out, and judge what is left; see `RigVerdict` and `infer.verdict`.
 
     Parameters
     ----------
@@ -200,7 +201,7 @@ def judge_driven(search: LikelihoodSearch, found: Found, test: Sequence[Trial], 
         Of critical values.
     """
     reason = None if is_moved_by_what_is_recorded(found.best) else UNMOVED
-    verdict = DrivenVerdict(search, test, seed)
+    verdict = RigVerdict(search, test, seed)
     state = verdict.of(search.result(()) if reason else found)
     found, train = state.found, search.models.trials
     falling = search.models.answered and falls(found.best.model, train)
@@ -240,17 +241,17 @@ def _ceiling(fitted: LikelihoodFit) -> float:
     return 100.0 * noise / max(sum(float(np.nansum((y - np.nanmean(y)) ** 2)) for y, _ in columns), 1e-300)
 
 
-def driven_diagnosis(
+def diagnosis_of(
     study: Study, search: LikelihoodSearch, found: Found, trials: tuple[list[Trial], list[Trial]], seed: int
 ) -> Diagnosis:
     """The diagnosis of a rig whose effort answers what is read, from a search that has run."""
-    judged = likeliest = judge_driven(search, found, trials[1], seed)
+    judged = likeliest = judged_of(search, found, trials[1], seed)
     fresh = beside_what_is_new(search, judged.found)
     again = None if fresh is None else judged_again(search, judged.found, fresh)
     if judged.left.unexplained and again is None:
         again = least_error(search)
     if again is not None:
-        judged = _predicting_better(judge_driven(*again, trials[1], seed), judged)
+        judged = _predicting_better(judged_of(*again, trials[1], seed), judged)
     found, left = judged.found, judged.left
     best = as_wide_as_trials_differ(with_honest_intervals(found.best), judged.again)
     other = fresh if judged.found is likeliest.found else likeliest.found.best
