@@ -38,7 +38,7 @@ def accepted_trials(model: Model, trials: Trial | Iterable[Trial], inputs_only: 
             raise InputError(f"expected trials, found a {type(trial).__name__}", column="trials")
         check_trial(trial, schema, inputs_only=inputs_only, threshold_us=threshold_us, also=also)
         if "pulse_width_us" in trial and "threshold_us" not in model.rig.constants:
-            told = "missing; trials with pulse_width_us need threshold_us and saturation_us of the rig"
-            raise trial.error(told, "constants.threshold_us")
+            message = "missing; trials with pulse_width_us need threshold_us and saturation_us of the rig"
+            raise trial.error(message, "constants.threshold_us")
         model.rig.check_prediction(trial)
     return given

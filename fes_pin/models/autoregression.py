@@ -1,11 +1,11 @@
-"""Noise of a reading that lasts: an autoregression of what a filter leaves of it, in units of its deviation.
+"""Autoregressive measurement noise: a model of a filter's innovations, in units of their deviation.
 
     x_t = a_1 x_(t-1) + ... + a_p x_(t-p) + e_t,    e_t of unit variance
 
 Where nothing acts at random on a rig the filter is the free simulation, and x is the noise of the reading itself. Where
 something does, x is white if the reading's noise is.
 
-The first samples, which have fewer before them, are foretold by the best predictors of lower orders k, and miss by
+The first samples, which have fewer before them, are predicted by the best predictors of lower orders k, with errors of
 variances v_k (Levinson's recursion backwards, c the last coefficient of each):
 
     a_i <- (a_i + c a_(k-i)) / (1 - c^2),    v <- v / (1 - c^2)
@@ -20,11 +20,11 @@ from functools import cache
 import numpy as np
 
 REACH = 400
-"""Samples ahead after which nothing counts as left of what was seen: a sensor's noise lasts for tens."""
+"""Samples ahead after which past noise predicts nothing: a sensor's noise has a correlation time of tens."""
 
 
-def unforetold(x: np.ndarray, ar: tuple[float, ...]) -> np.ndarray:
-    """What noise is besides what it foretells of itself, or sensitivities that go with it, shape (n, ...)."""
+def innovations_of(x: np.ndarray, ar: tuple[float, ...]) -> np.ndarray:
+    """Innovations of autoregressive noise, or their sensitivities from those of the noise; shape (n, ...)."""
     if x.ndim == 1:
         out = np.convolve(x, [1.0, *(-a for a in ar)])[: len(x)]
     else:
@@ -38,7 +38,7 @@ def unforetold(x: np.ndarray, ar: tuple[float, ...]) -> np.ndarray:
 
 @cache
 def _first(ar: tuple[float, ...]) -> np.ndarray:
-    """What makes innovations of the first samples, shape (p, p): row t is a predictor of order t."""
+    """The map from the first samples to their innovations, shape (p, p): row t is a predictor of order t."""
     predictors, variances = beginning(ar)
     out = np.eye(len(ar))
     for t, own in enumerate(predictors):
@@ -48,7 +48,7 @@ def _first(ar: tuple[float, ...]) -> np.ndarray:
 
 @cache
 def beginning(ar: tuple[float, ...]) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
-    """The best predictors of each of the first samples from those before, and the variances of what they miss.
+    """The best predictors of each of the first samples from those before, and the variances of their errors.
 
     Returns
     -------
@@ -73,7 +73,7 @@ def stationary_variance(ar: tuple[float, ...]) -> float:
 
 
 def weights_ahead(ar: tuple[float, ...], count: int) -> np.ndarray:
-    """What so many samples ahead are foretold by those before, the newest first, shape (count, p).
+    """Weights of past samples, the newest first, in predictions of the next `count` samples, shape (count, p).
 
     Row k is the first row of the companion matrix to the power of k + 1.
     """
@@ -87,13 +87,13 @@ def weights_ahead(ar: tuple[float, ...], count: int) -> np.ndarray:
 
 @cache
 def _ahead(ar: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """`weights_ahead`, and the variance of what they miss, shape (`REACH`,)."""
+    """`weights_ahead`, and the variance of their errors, shape (`REACH`,)."""
     rows = weights_ahead(ar, REACH)
     return rows, np.cumsum(np.append(1.0, rows[:-1, 0] if ar else np.zeros(REACH - 1)) ** 2)
 
 
 def noise_ahead(x: np.ndarray, seen: np.ndarray, ar: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """What noise is foretold to be from what was seen of it before, and the variance of what that misses.
+    """Prediction of noise from its past where that was measured, and the variance of the error, shape (n,) each.
 
     Parameters
     ----------
@@ -108,12 +108,12 @@ def noise_ahead(x: np.ndarray, seen: np.ndarray, ar: tuple[float, ...]) -> tuple
     for begin, end in ends.reshape(-1, 2):
         count = min(end - begin, REACH)
         known[order + begin : order + begin + count] = rows[:count] @ known[begin : begin + order][::-1]
-    foretold = np.convolve(known, [0.0, *ar])[order : order + len(x)]
+    predicted = np.convolve(known, [0.0, *ar])[order : order + len(x)]
     at = np.arange(len(x))
     newest = np.maximum.accumulate(np.append(-1, np.where(seen, at, -1)))[:-1]
     variances = growth[np.minimum(at - newest - 1, REACH - 1)]
     predictors, first = beginning(ar)
     for t in range(min(order, len(x))):
-        foretold[t] = predictors[t] @ known[order : order + t][::-1]
+        predicted[t] = predictors[t] @ known[order : order + t][::-1]
         variances[t] = max(variances[t], first[t])
-    return foretold, variances
+    return predicted, variances

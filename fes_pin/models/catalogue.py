@@ -106,8 +106,8 @@ def load_library(*sources: Source) -> Catalogue:
             catalogue = catalogue.with_classes((source,))
         else:
             if not isinstance(source, str | Path | ModuleType):
-                told = f"expected a path, the name of a module, a module or a class, found a {type(source).__name__}"
-                raise InputError(told, column="library")
+                message = f"expected a path, the name of a module, a module or a class, found a {type(source).__name__}"
+                raise InputError(message, column="library")
             module = source if isinstance(source, ModuleType) else load_module(source)
             catalogue = catalogue.with_classes(classes_of(module))
     return catalogue

@@ -47,9 +47,9 @@ def describe(effect: type[Effect]) -> str:
 
 
 def described(effect: Any, stage: str, parameters: Mapping[str, str]) -> str:
-    """Name, stage, sentence, equation, tell-tale, and what is said of each parameter."""
+    """The name, stage, sentence, equation and tell-tale of an effect, and the description of each parameter."""
     whose = f"; code of {where}" if (where := origin(effect)) else ""
     lines = [f"{effect.name} ({stage}; rigs: {', '.join(effect.rigs)}{whose})", f"  {sentence(effect)}"]
     lines += [f"      {line}" for line in equation(effect).split("\n")]
-    lines += [f"  Tell-tale: {remark(effect, 'Tell-tale:')}", *(f"    {n} {told}" for n, told in parameters.items())]
+    lines += [f"  Tell-tale: {remark(effect, 'Tell-tale:')}", *(f"    {n} {words}" for n, words in parameters.items())]
     return "\n".join(lines) + "\n"

@@ -1,7 +1,7 @@
 """What acts on a rig at random: an effort that no cause explains, and slow wandering of a reading.
 
 Both are first-order processes, e' = -e / time + white noise, of stationary deviation std. They are effects like any
-other, but of no library: nobody is told that noise is a cause. Their deviations and times are no parameters of a model;
+other, but of no library: noise is never named as a cause. Their deviations and times are no parameters of a model;
 they are constants of a predictor (`models.predictor.Doubt`), as reading noise is.
 """
 

@@ -1,8 +1,8 @@
 """Functions of a rig's own state, input and time as efforts and as errors of the reading, to seek a remainder by.
 
-They are effects like any other, of no library. What they are functions of is what the model itself holds at each
-instant; in a predictor that is what was known before the sample that it foretells, so that features share nothing with
-the noise that they are judged against.
+They are effects like any other, of no library. They are functions of what the model itself holds at each instant. In a
+one-step predictor that is what was known before the sample it predicts, so that features are independent of the noise
+that they are judged against.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""One trial as it was foretold, sample by sample: innovations, their variances, and what they cost."""
+"""One-step predictions of one trial: innovations, their variances, and their cost."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fes_pin.models.autoregression import beginning, unforetold
+from fes_pin.models.autoregression import beginning, innovations_of
 
 
 class ForetoldOutput(NamedTuple):
-    """What is foretold of an output, measured or not, and the variance of what it is off by if the model is right.
+    """Prediction of an output, measured or not, and the variance of its error if the model is right.
 
     Both have shape (n,).
     """
@@ -24,7 +24,7 @@ class ForetoldOutput(NamedTuple):
 
 @dataclass(frozen=True)
 class Readings:
-    """What was read in one trial, whatever is foretold of it.
+    """The readings of one trial, whatever their prediction.
 
     Attributes
     ----------
@@ -34,8 +34,8 @@ class Readings:
         Shape (n, outputs): True where something was measured that is judged: a reading that hunts between two counts is
         only followed, see `fes_pin.data.counts.hunts`.
     repeats
-        Shape (n, outputs): how often the same count was read in a row, n; together they are one reading. 1 of what is
-        not read in counts: what a log holds or interpolates stands for other reasons.
+        Shape (n, outputs): how often the same count was read in a row, n; together they are one reading. 1 for outputs
+        that are not read in counts: a value that a log holds or interpolates is constant for other reasons.
     """
 
     outputs: tuple[str, ...]
@@ -49,12 +49,12 @@ class Readings:
 
     @cached_property
     def again(self) -> np.ndarray:
-        """Share of each reading's noise that was told before, 1 - 1 / n, shape (m,) of what is seen."""
+        """Share of each reading's noise that repeats an earlier one, 1 - 1 / n, shape (m,) of what is seen."""
         return np.asarray(1.0 - 1.0 / self.of_seen(self.repeats))
 
     @cached_property
-    def told_again(self) -> np.ndarray:
-        """Places among what is seen of readings whose noise was told before."""
+    def repeated(self) -> np.ndarray:
+        """Places, among what is seen, of readings whose noise repeats an earlier one."""
         return np.flatnonzero(self.again)
 
     def of_seen(self, array: np.ndarray) -> np.ndarray:
@@ -64,14 +64,14 @@ class Readings:
 
 @dataclass(frozen=True)
 class ForetoldTrial:
-    """One trial as it was foretold, sample by sample.
+    """One-step predictions of one trial, sample by sample.
 
     Attributes
     ----------
     readings
         What was measured.
     values
-        Shape (n, outputs): measured minus foretold one sample ahead; 0 where that is not judged.
+        Shape (n, outputs): measurements minus their one-step predictions; 0 where that is not judged.
     variances
         Shape (n, outputs).
     sensitivities
@@ -101,8 +101,8 @@ class ForetoldTrial:
 
     @property
     def noise_told_again(self) -> np.ndarray:
-        """Variances of noise that was told before as they stand in `variances`, by reading: that of one times n."""
-        at = self.readings.told_again
+        """Variances of repeated noise as `variances` holds them, by reading: the variance of one reading times n."""
+        at = self.readings.repeated
         return np.asarray(self.of_seen(self.readings.repeats * np.square(self.white))[at]) if len(at) else np.zeros(0)
 
     def of_seen(self, array: np.ndarray) -> np.ndarray:
@@ -129,18 +129,18 @@ class ForetoldTrial:
     def whitened(self) -> tuple[np.ndarray, np.ndarray]:
         """Residuals over deviations and logarithms of variances; of what was seen.
 
-        n equal readings have n logarithms of one error: what the determinant holds of noise that was told before is
-        taken off.
+        n equal readings have one error, and the determinant holds its logarithm n times: the repeated ones are taken
+        off.
         """
         logs = np.log(self.seen_variances)
         if any(self.ar):
             logs += self.of_seen(self._growth())
-        at = self.readings.told_again
+        at = self.readings.repeated
         logs[at] -= self.readings.again[at] * np.log(self.noise_told_again)
         return self.over_deviations(self.values), logs
 
     def _growth(self) -> np.ndarray:
-        """Logarithms of how much more varies what noise foretells of itself where it begins, shape (n, outputs)."""
+        """Logarithms of variances of the first innovations, which have fewer samples before them: (n, outputs)."""
         out = np.zeros(self.variances.shape)
         for k, ar in enumerate(self.ar):
             first = np.log(beginning(ar)[1])[: len(out)]
@@ -148,7 +148,7 @@ class ForetoldTrial:
         return out
 
     def over_deviations(self, array: np.ndarray) -> np.ndarray:
-        """What is seen of an array of shape (n, outputs, ...) over deviations, less what noise foretells of itself."""
+        """What is seen of an array (n, outputs, ...) over deviations, less its prediction by autoregressive noise."""
         if not any(self.ar):
             deviations = self._deviations.reshape(-1, *[1] * (array.ndim - 2))
             return np.asarray(self.of_seen(array) / deviations)
@@ -156,7 +156,7 @@ class ForetoldTrial:
         out = array * scale.reshape(*scale.shape, *[1] * (array.ndim - 2))
         for k, ar in enumerate(self.ar):
             if ar:
-                out[:, k] = unforetold(out[:, k], ar)
+                out[:, k] = innovations_of(out[:, k], ar)
         return self.of_seen(out)
 
     @cached_property

@@ -1,4 +1,4 @@
-"""Causes and rigs of anybody's own file or module: loaded, checked, and told from those written here."""
+"""Causes and rigs of anybody's own file or module: loaded, checked, and distinguished from those written here."""
 
 from __future__ import annotations
 
@@ -174,7 +174,7 @@ def _form_lacks(one: type[Effect]) -> str:
         problems[f"expected another name than {name}, which every effect has"] = hasattr(Effect, name)
         inside = info.lower <= getattr(one, name) <= info.upper
         problems[f"expected {name} from {info.lower:g} to {info.upper:g}, as its bounds are"] = not inside
-    return next((told for told, is_so in problems.items() if is_so), "")
+    return next((problem for problem, is_so in problems.items() if is_so), "")
 
 
 def _signals(one: type[Effect], rigs: Iterable[type[Rig]]) -> set[str]:

@@ -29,15 +29,15 @@ HELD = {"q": "m", "y": "N", "effort": "N"}
 
 @dataclass(frozen=True, repr=False)
 class ParameterInfo:
-    """What is known of a parameter beside its value.
+    """The description of a parameter: all but its value.
 
     Attributes
     ----------
     unit
-        Unit as printed; "" for a pure number. {q}, {y} and {effort} stand for what the rig has there: see `in_units`.
+        Unit as printed; "" for a pure number. {q}, {y} and {effort} are replaced by the rig's units: see `in_units`.
     null
-        Value at which an effect vanishes; None for a shape parameter, which means something only beside the effect,
-        and for a nominal parameter.
+        Value at which an effect vanishes; None for a nominal parameter, and for a shape parameter, which has a meaning
+        only where the effect acts.
     lower, upper
         Physical bounds.
     scale

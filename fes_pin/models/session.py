@@ -3,9 +3,9 @@
 What tires in one trial may be tired in the next. Where trials say when they began (`start_s`) the recruitment of all
 earlier ones is known, and with it the states at which a trial begins of whatever remembers for longer than a trial.
 Such a state follows first-order equations whose rates do not change within a bin of the past, so that a bin takes it
-exactly to where it is after the mean recruitment of that bin. Recruitment stands for the activation, which follows it
-within a tenth of a second. A trial that does not say when it began begins fresh, and so do all where trials overlap:
-they are of more than one session.
+exactly to where it is after the mean recruitment of that bin. Recruitment replaces the activation, which follows it
+within a tenth of a second. In a trial without a time of beginning the muscle begins unfatigued, and so it does in all
+trials where trials overlap: they are of more than one session.
 """
 
 from __future__ import annotations

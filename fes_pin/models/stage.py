@@ -63,25 +63,25 @@ class Effect:
     rigs
         The rigs it can be part of.
     of_form
-        Which of its states and memories it has only beside a refinement, with the parameter that switches that on.
+        Its states and memories that only a refinement has, each with the parameter that switches the refinement on.
     random
         Names of the constants that say how its states are driven at random; see `models.disturbance`.
     inputs
-        Columns of a trial that it reads beside those that drive the rig, as `s.u.<name>`.
+        Columns of a trial that it reads in addition to those that drive the rig, as `s.u.<name>`.
     dissipative
         True if it can only take energy from the joint.
     max_step_s
         Longest integration step that resolves it, s.
     foretold_step_s
-        The same of a predictor, where it depends on how well the rig's velocity is known.
+        The same for a one-step predictor, where the step depends on how well the rig's velocity is known.
     varies
         True if its amplitudes can be other in each trial: those of what does not begin with the trial.
     beside
-        Names of effects without which it shows little or nothing: it is screened beside them.
+        Names of effects without which it shows little or nothing: it is screened in models that also contain them.
     remembers
         True if earlier trials of the session are in its states at the start: `rest` reads them by `session`.
     scales
-        True if it multiplies its signal. Where that is a reading, a filter's gains go with it: see `LikelihoodProblem`.
+        True if it multiplies its signal. Where that is a reading it scales a filter's gains: see `LikelihoodProblem`.
     each_trial
         Its amplitudes are unknowns of each trial, estimated from that trial alone; the fields keep what a trial that
         was not measured is predicted with: their nulls. All other parameters stay common to all trials.
@@ -143,7 +143,7 @@ class Effect:
         return {}
 
     def start_variances(self, reach: Any, speed: Any) -> ByName:
-        """How uncertain states, and memories that states go into, are when a trial begins, beside `rest`: unit squared.
+        """Variances about `rest` of states, and of memories that states go into, when a trial begins: unit squared.
 
         Parameters
         ----------
@@ -164,7 +164,7 @@ class Effect:
 
     @classmethod
     def shapes(cls) -> tuple[str, ...]:
-        """The parameters that exist only beside the effect."""
+        """The parameters that have a meaning only where the effect acts."""
         return tuple(n for n, info in cls.parameters().items() if info.null is None and not info.optional)
 
     @classmethod

@@ -86,7 +86,7 @@ def load_model(path: str | Path, *, library: Source | Sequence[Source] | None = 
     if found != FORMAT or isinstance(found, bool):
         raise document.error("format", f"expected format = {FORMAT}: a model that fes-pin saved")
     name = document.data.get("rig")
-    kind = kinds[one_of(name, tuple(kinds), lambda told: document.error("rig", _missing(document, name, told)))]
+    kind = kinds[one_of(name, tuple(kinds), lambda words: document.error("rig", _missing(document, name, words)))]
     nominal: dict[str, Any] = _numbers(document, "nominal", kind.parameters())
     constants, fitted = _numbers(document, "constants", None), document.data.get("fitted", "")
     try:

@@ -74,7 +74,7 @@ def _check_same(rig: Joint, body: pin.Model, urdf: str | Path) -> None:
 
 
 def _scale(root: Element, joint: Element, rig: Joint, inertia: float, urdf: str | Path) -> str:
-    """Masses by the weight; the rest of the inertia about the joint's axis. What else was changed, in words.
+    """Scale masses by the weight, and add the remaining inertia about the joint's axis; returns what else was changed.
 
     Where the inertia is less than that of masses where they are, all lengths of what moves are multiplied by k and the
     masses divided by it: the weight's torque (mass by length) stays, the inertia (mass by length squared) is k times.

@@ -16,7 +16,7 @@ from fes_pin.identify.problem import Problem
 from fes_pin.identify.process_noise import first_guess, stilled
 from fes_pin.identify.stored import load_random, stored_tables
 from fes_pin.infer.noise import ORDERS, Noise
-from fes_pin.models.autoregression import unforetold
+from fes_pin.models.autoregression import innovations_of
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.store import model_toml
 
@@ -76,7 +76,7 @@ def test_noise_of_much_power_at_low_frequencies_is_white_beside_what_is_found(st
     noise = [lfilter([1.0, 0.4], [1.0, -1.3, 0.43], e) for e in innovations]
     left = [replace(r, values=e[:, None], variances=np.ones((len(e), 1))) for r, e in zip(run, noise, strict=True)]
     (found,) = autoregressions(left, {"angle_rad": ORDERS}).values()
-    over = sum(float(np.sum(unforetold(x, found) ** 2)) for x in noise) / sum(float(e @ e) for e in innovations)
+    over = sum(float(np.sum(innovations_of(x, found) ** 2)) for x in noise) / sum(float(e @ e) for e in innovations)
     assert over < 1.001
 
 

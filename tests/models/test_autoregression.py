@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import toeplitz
 
-from fes_pin.models.autoregression import beginning, noise_ahead, stationary_variance, unforetold
+from fes_pin.models.autoregression import beginning, innovations_of, noise_ahead, stationary_variance
 
 KINDS = [(0.8,), (1.2, -0.5), (1.3, -0.8, 0.3, -0.15)]
 
@@ -24,7 +24,7 @@ def test_innovations_and_their_variances_are_those_of_the_gaussian(ar):
     n = 12
     factor = np.linalg.cholesky(covariance(ar, n))
     x = np.random.default_rng(1).normal(size=(n, 2))
-    assert unforetold(x, ar) == pytest.approx(np.linalg.solve(factor, x), rel=1e-9)
+    assert innovations_of(x, ar) == pytest.approx(np.linalg.solve(factor, x), rel=1e-9)
     assert beginning(ar)[1] == pytest.approx(np.diag(factor)[: len(ar)] ** 2, rel=1e-9)
     assert stationary_variance(ar) == pytest.approx(covariance(ar, 1)[0, 0], rel=1e-9)
 
@@ -46,7 +46,7 @@ def test_what_was_not_seen_is_foretold_from_what_was(ar):
 
 def test_white_noise_is_left_as_it_is():
     x = np.random.default_rng(3).normal(size=20)
-    assert unforetold(x, ()) == pytest.approx(x)
+    assert innovations_of(x, ()) == pytest.approx(x)
     assert stationary_variance(()) == 1.0
     told, variances = noise_ahead(x, np.ones(20, dtype=bool), ())
     assert not told.any()

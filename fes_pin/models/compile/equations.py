@@ -9,9 +9,10 @@ With states x, memories m, parameters p and their sensitivities S = dx/dp, R = d
 
 Only the entries of S and R that can be other than zero are carried.
 
-Delay: whole samples of it shift the input (`shift`). Of the rest f < dt, the input jumps within each sample, at f. The
-J steps of a sample are stretched so that a step ends there: k of them fill [0, f] and J - k fill [f, dt], none longer
-than dt / (J - 1). The stretch is part of the equations, so the sensitivity to the delay is that of the exact jump.
+Delay: whole samples of it shift the input (`shift`). A remainder f < dt makes the input jump within each sample, at f.
+The J steps of a sample are stretched so that a step ends there: k of them fill [0, f] and J - k fill [f, dt], none
+longer than dt / (J - 1). The stretch is part of the equations, so the sensitivity to the delay is that of the exact
+jump.
 """
 
 from __future__ import annotations

@@ -19,11 +19,11 @@ CONTRACT = ("contract",)
 """A product and a sum may become one fused instruction."""
 
 LN2_HIGH = float.fromhex("0x1.62e42fee00000p-1")  # ln 2, its leading 33 bits
-LN2_LOW = float.fromhex("0x1.a39ef35793c76p-33")  # the rest of ln 2
+LN2_LOW = float.fromhex("0x1.a39ef35793c76p-33")  # ln 2, the bits after those
 HALF_PI_HIGH = float.fromhex("0x1.921fb54400000p+0")  # pi/2, its leading 33 bits
 HALF_PI_MIDDLE = float.fromhex("0x1.0b4611a600000p-34")  # the next 33 bits
 MAGIC = 1.5 * 2.0**52  # what is added to it is in the low bits of its mantissa
-HALF_PI_LOW = float.fromhex("0x1.3198a2e037073p-69")  # the rest
+HALF_PI_LOW = float.fromhex("0x1.3198a2e037073p-69")  # the bits after those
 
 
 class LaneFunctions:
@@ -90,7 +90,7 @@ class LaneFunctions:
         return b.bits_as(b.operation("xor", b.bits_as(value, b.integers), sign), b.vector)
 
     def _turn(self, b: Lines, x: Value) -> tuple[Value, Value, Value]:
-        """Quarter turns in x, and sine and cosine of the rest |r| <= pi / 4; sin(x) and cos(x) share them."""
+        """Quarter turns in x, and sine and cosine of the remainder |r| <= pi / 4; sin(x) and cos(x) share them."""
         n = self.call("rint", b.fmul(x, b.splat(2 / math.pi)))
         r = b.fsub(x, b.fmul(n, b.splat(HALF_PI_HIGH)))
         r = b.fsub(b.fsub(r, b.fmul(n, b.splat(HALF_PI_MIDDLE))), b.fmul(n, b.splat(HALF_PI_LOW)))

@@ -12,18 +12,19 @@ which is exact to the order of h^4 where f is linear and to that of h^2 where it
 f may depend on the deviation of what is estimated, as dry friction does: sqrt(g_x N P N' g_x') of g(x), with P as a
 step begins and N = 1 + t A, t into the step, of the rows of A in which no such deviation is.
 
-At a sample, for each measured output y_k in turn, with H = dh_k/dx where it was foretold:
+At a sample, for each measured output y_k in turn, with H = dh_k/dx at its prediction:
 
     r = y_k - h_k,   V = H P H' + n white_k^2,   K = P H' / V
     x <- x + K r,    P <- P - K V K',    dr/dp = -(H S + h_m R + h_p),   S <- S + K dr/dp
 
 The gains K are taken as they are when sensitivities are formed: what a parameter does to them acts through past
-innovations alone, which are white and independent of what is foretold where the model is right (Ljung, System
-Identification, 2nd ed., section 7.4). A sample that was not seen corrects nothing. The same count n times in a
+innovations alone, which are white and independent of the predictions where the model is right (Ljung, System
+Identification, 2nd ed., section 7.4). A sample that was not measured corrects nothing. The same count n times in a
 row, as of an encoder that stands, is one reading and not n: its error is the same each time. So are n samples that
 hunt between two counts, which say no more than that what is read is near the edge of both. What a trial begins with
 is known as its unknowns are, and these as their readings are: P = X diag(prior / g)^2 X', X the sensitivities of the
-first states to them and g the slope of the reading: a scale of it that another inertia undoes must not be told from it.
+first states to them and g the slope of the reading: a scale of the reading must not be distinguished from the inertia
+that undoes it.
 
 A memory that states go into, as the play of a gear does, is as uncertain as they are: it is carried as a state that
 changes at samples alone, m+ = D(x, m). Where D bends within that uncertainty its tangent says little of it: mean, slope
@@ -52,8 +53,8 @@ LEAST = 1e-20
 """Variance that a carried memory and what it follows have at least, in their unit squared: nothing is divided by 0."""
 
 
-class _Doubt:
-    """Covariance of the states as symbols, and what moves it."""
+class _Uncertainty:
+    """Covariance of the states as symbols, and the process noise that adds to it."""
 
     def __init__(self, d: Carried, model: Model) -> None:
         self.d, self.count = d, d.x.numel()
@@ -71,14 +72,14 @@ class _Doubt:
         return ca.diag(out)
 
     def widened(self, f: Any) -> Any:
-        """Rates with the standard deviations in them, of states that go on at those rates which need none."""
+        """Rates with standard deviations in place of their symbols; the states move at the rates that need none."""
         d, unsure = self.d, self.d.sym.unsure
         if not unsure:
             return f
         symbols = ca.vertcat(*(symbol for symbol, _ in unsure))
         known = ca.DM([not ca.depends_on(f[k], symbols) for k in range(f.numel())])
         moved = ca.SX.eye(self.count) + d.into * ca.mtimes(ca.diag(known), ca.jacobian(f, d.x))
-        for symbol, one in reversed(unsure):  # what is asked for later may hold what was before
+        for symbol, one in reversed(unsure):  # a later one may contain an earlier one
             slope = ca.mtimes(ca.jacobian(one, d.x), moved)
             variance = ca.mtimes([slope, self.covariance, slope.T])
             f = ca.substitute(f, symbol, ca.sqrt(ca.fmax(variance, 0.0) + LEAST))
@@ -160,8 +161,8 @@ class Carried(Tangents):
 def derive_predictor(model: Model, layout: Layout) -> Equations:
     """Write out a model's predictor; see the module."""
     d = Carried(model, layout)
-    doubt = _Doubt(d, model)
-    count, width = doubt.count, len(layout.columns)
+    uncertain = _Uncertainty(d, model)
+    count, width = uncertain.count, len(layout.columns)
     whole = ca.Sparsity.dense(count, width)
     _, r_pattern = d.patterns()
     s, r = ca.SX.sym("S", whole), ca.SX.sym("R", r_pattern)
@@ -169,15 +170,15 @@ def derive_predictor(model: Model, layout: Layout) -> Equations:
     r = ca.SX.sym("R", r_pattern)
     inner = ((d.x, s), (d.m, r))
     lower = ca.Sparsity.lower(count)
-    state = ca.vertcat(d.x, nonzeros(s, whole), nonzeros(doubt.lower, lower))
+    state = ca.vertcat(d.x, nonzeros(s, whole), nonzeros(uncertain.lower, lower))
     memory = ca.vertcat(d.m, nonzeros(r, r_pattern))
 
     def packed(x: Any, sensitivities: Any, covariance: Any) -> Any:
         return ca.vertcat(x, nonzeros(sensitivities, whole), nonzeros(covariance, lower))
 
-    held = ca.vertcat(ca.SX.sym("held", count), nonzeros(s, whole), nonzeros(doubt.lower, lower))
-    d.rates = doubt.widened(d.rates)
-    x0 = packed(d.x0, d.at_start(d.x0), doubt.at_start(model))
+    held = ca.vertcat(ca.SX.sym("held", count), nonzeros(s, whole), nonzeros(uncertain.lower, lower))
+    d.rates = uncertain.widened(d.rates)
+    x0 = packed(d.x0, d.at_start(d.x0), uncertain.at_start(model))
     m0 = ca.vertcat(d.m0, nonzeros(d.at_start(d.m0), r_pattern))
     after = ca.vertcat(d.after, nonzeros(d.through(d.after, *inner), r_pattern))
     reached = ca.SX.sym("x1", count)
@@ -189,8 +190,8 @@ def derive_predictor(model: Model, layout: Layout) -> Equations:
         sample=(given, [after]),
         rates=([d.x, held, *during], [d.rates]),
         output=(given, [d.readings]),
-        correct=(given, _corrected(d, doubt, s, inner, packed)),
-        follow=([state, reached, *during], [packed(reached, *_followed(d, doubt, s, r, reached))]),
+        correct=(given, _corrected(d, uncertain, s, inner, packed)),
+        follow=([state, reached, *during], [packed(reached, *_followed(d, uncertain, s, r, reached))]),
     )
 
 
@@ -203,26 +204,26 @@ def _wider(d: Carried, s: Any, pattern: Any) -> Any:
         pattern = wider
 
 
-def _followed(d: Carried, doubt: _Doubt, s: Any, r: Any, reached: Any) -> tuple[Any, Any]:
+def _followed(d: Carried, uncertain: _Uncertainty, s: Any, r: Any, reached: Any) -> tuple[Any, Any]:
     """Sensitivities and covariance after an integration step; see the module."""
     middle = 0.5 * (d.x + reached)
-    slope, beside = (ca.substitute(e, d.x, middle) for e in (ca.jacobian(d.rates, d.x), d.through(d.rates, (d.m, r))))
-    h, one = d.sym.c["step"], ca.SX.eye(doubt.count)
+    slope, direct = (ca.substitute(e, d.x, middle) for e in (ca.jacobian(d.rates, d.x), d.through(d.rates, (d.m, r))))
+    h, one = d.sym.c["step"], ca.SX.eye(uncertain.count)
     grown = one
     for k in (4.0, 3.0, 2.0):
         grown = one + h / k * ca.mtimes(slope, grown)
     through = one + h * ca.mtimes(grown, slope)
-    moved = s + h * ca.mtimes(grown, ca.mtimes(slope, s) + beside)
-    spread = 0.5 * h * (ca.mtimes([through, doubt.spread, through.T]) + doubt.spread)
-    return moved, ca.mtimes([through, doubt.covariance, through.T]) + spread
+    moved = s + h * ca.mtimes(grown, ca.mtimes(slope, s) + direct)
+    spread = 0.5 * h * (ca.mtimes([through, uncertain.spread, through.T]) + uncertain.spread)
+    return moved, ca.mtimes([through, uncertain.covariance, through.T]) + spread
 
 
-def _corrected(d: Carried, doubt: _Doubt, s: Any, inner: tuple[Any, ...], packed: Any) -> list[Any]:
+def _corrected(d: Carried, uncertain: _Uncertainty, s: Any, inner: tuple[Any, ...], packed: Any) -> list[Any]:
     """State after the measurements of a sample; innovations, their variances, sensitivities of the innovations."""
     slack = _read_with_slack(d)
-    now, covariance, moved = _remembered(d, doubt.covariance, s, inner, slack)
+    now, covariance, moved = _remembered(d, uncertain.covariance, s, inner, slack)
     x, u, c = now, d.sym.u, d.sym.c
-    told: list[tuple[Any, Any, Any]] = []
+    read: list[tuple[Any, Any, Any]] = []
     for name in d.layout.measured:
         reading = d.readings[d.layout.outputs.index(name)]
         given = (u[f"measured.{name}"], u[f"repeated.{name}"] * c[f"white.{name}"] ** 2, u[f"seen.{name}"])
@@ -232,8 +233,8 @@ def _corrected(d: Carried, doubt: _Doubt, s: Any, inner: tuple[Any, ...], packed
             slack, now = None, x
         else:
             one, x, covariance, moved = _linear(d, now, reading, given, known, moved, inner)
-        told.append(one)
-    innovations, variances, slopes = ([one[k] for one in told] for k in range(3))
+        read.append(one)
+    innovations, variances, slopes = ([one[k] for one in read] for k in range(3))
     dr = ca.vertcat(*slopes)
     y = ca.vertcat(column(innovations), column(variances), ca.vec(dr.T) if d.layout.columns else ca.SX(0, 1))
     return [packed(x, moved, covariance), y]
@@ -245,12 +246,12 @@ def _linear(
     """Innovation, its variance and sensitivities; state, covariance and sensitivities, linear about `now`."""
     measured, noise, seen = given
     expressions = (reading, ca.jacobian(reading, d.x), d.through(reading, *inner[1:]))
-    foretold, row, beside = (ca.substitute(one, d.x, now) for one in expressions)
-    innovation = measured - (foretold + ca.mtimes(row, known.mean - now))
+    predicted, row, direct = (ca.substitute(one, d.x, now) for one in expressions)
+    innovation = measured - (predicted + ca.mtimes(row, known.mean - now))
     toward = ca.mtimes(known.covariance, row.T)
     variance = ca.mtimes(row, toward) + noise
     gain = seen * toward / variance
-    slope = ca.densify(-(beside + ca.mtimes(row, moved)))
+    slope = ca.densify(-(direct + ca.mtimes(row, moved)))
     left = known.covariance - ca.mtimes(gain, toward.T)
     return (innovation, variance, slope), known.mean + gain * innovation, left, moved + ca.mtimes(gain, slope)
 
@@ -266,14 +267,14 @@ def _across_slack(
 ) -> tuple[tuple[Any, Any, Any], Any, Any, Any]:
     """Innovation, its variance and sensitivities; state, covariance and sensitivities; see `compile.slack`."""
     mean, (measured, noise, _) = ca.SX.sym("mean", d.x.numel()), given
-    told, left = read_across(Slack(k, *d.slacks[k]), d.x, reading, given, Gaussian(mean, known.covariance))
+    predicted, left = read_across(Slack(k, *d.slacks[k]), d.x, reading, given, Gaussian(mean, known.covariance))
 
     def through(f: Any) -> Any:
         return ca.substitute(d.through(f, *inner[1:]) + ca.mtimes(ca.jacobian(f, mean), moved), mean, known.mean)
 
-    slope, turned = ca.densify(-through(told.mean)), through(left.mean)
+    slope, turned = ca.densify(-through(predicted.mean)), through(left.mean)
     value, spread, x, covariance = (
-        ca.substitute(e, mean, known.mean) for e in (told.mean, told.covariance, left.mean, left.covariance)
+        ca.substitute(e, mean, known.mean) for e in (predicted.mean, predicted.covariance, left.mean, left.covariance)
     )
     return (measured - value, spread + noise, slope), x, covariance, turned
 

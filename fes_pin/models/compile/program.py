@@ -113,10 +113,10 @@ def derived(model: Model, layout: Layout) -> Equations:
     try:
         return derive_predictor(model, layout) if layout.measured else derive(model, layout)
     except Exception as error:
-        told = at_fault(error, _classes(model))
-        if told is None:
+        fault = at_fault(error, _classes(model))
+        if fault is None:
             raise
-        raise told from error
+        raise fault from error
 
 
 def _classes(model: Model) -> tuple[type, ...]:

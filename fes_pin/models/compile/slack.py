@@ -1,15 +1,15 @@
-"""What is known of a memory that follows with slack, and of what it follows, once a reading of it has come.
+"""Filter step for a memory that follows with slack: its distribution, and that of the states, after a reading of it.
 
 A memory m follows a position p(x) within w: m+ = p - w where the slack s = p - m is beyond w, p + w where it is below
 -w, and m between. For a Gaussian x each of the three pieces is a Gaussian cut off where s leaves it, and the reading is
-linear in it. With N_j the density of the reading in piece j, uncut, and P_j the share of what it then leaves of x that
-lies inside,
+linear in it. With N_j the density of the reading in piece j, uncut, and P_j the share of the updated x that lies inside
+the piece,
 
     weight_j = P_j N_j / sum P N,   x = sum weight_j E_j[x],   P = sum weight_j (cov_j[x] + (E_j[x] - x)(E_j[x] - x)'),
 
-which is exact in mean and covariance; what they leave out of the three is not carried on. Where the slack is crossed a
-reading that stands still cuts off what would have moved it, and says nothing of the rest: taken for linear, its noise
-would move x by many deviations.
+which is exact in mean and covariance; higher moments of the mixture are dropped. While the slack is crossed, a reading
+that stands still excludes the states that would have moved it, and says nothing of the others: in a linear update its
+noise would move x by many deviations.
 
 Source: assumed-density filtering, Maybeck, Stochastic Models, Estimation and Control 2, 1982, section 12.7; cut
 Gaussians: Johnson, Kotz and Balakrishnan, Continuous Univariate Distributions 1, 2nd ed., section 13.10.1.
@@ -42,7 +42,7 @@ class Gaussian:
     covariance: Any
 
     def seen(self, row: Any, innovation: Any, noise: Any, share: Any) -> tuple[Gaussian, Any]:
-        """What a linear reading leaves of it, and the logarithm of the reading's density; nothing for a share of 0."""
+        """The Gaussian given a linear reading, and the log density of that reading; a share of 0 changes nothing."""
         toward = ca.mtimes(self.covariance, row.T)
         variance = ca.mtimes(row, toward) + noise
         gain = share * toward / variance
@@ -103,7 +103,7 @@ class Slack:
 def read_across(
     slack: Slack, x: Any, reading: Any, given: tuple[Any, Any, Any], known: Gaussian
 ) -> tuple[Gaussian, Gaussian]:
-    """What is foretold of a reading, but for its noise, and what it leaves of the states; see the module.
+    """One-step prediction of a reading without its noise, and the states given the reading; see the module.
 
     Parameters
     ----------
@@ -122,22 +122,22 @@ def read_across(
         (slack.half, None, slack.half),
         (None, -slack.half, -slack.half),
     ):
-        turned, beside = ca.SX.eye(x.numel()), ca.SX.zeros(x.numel())
+        turned, moved = ca.SX.eye(x.numel()), ca.SX.zeros(x.numel())
         if behind is not None:
             turned[slack.place, :] = along
-            beside[slack.place] = position - ca.mtimes(along, known.mean) - behind
-        pieces.append(_Piece(across, away, low, high, turned, beside).read(x, reading, given, known))
-    told = mixed(normalized([one.share for one in pieces]), [one.foretold for one in pieces])
-    return told, mixed(normalized([one.weight for one in pieces]), [one.left for one in pieces])
+            moved[slack.place] = position - ca.mtimes(along, known.mean) - behind
+        pieces.append(_Piece(across, away, low, high, turned, moved).read(x, reading, given, known))
+    predicted = mixed(normalized([one.share for one in pieces]), [one.predicted for one in pieces])
+    return predicted, mixed(normalized([one.weight for one in pieces]), [one.left for one in pieces])
 
 
 @dataclass(frozen=True)
 class _Read:
-    """A piece once a reading has come: logarithms of its share before and of its weight after, what it says, leaves."""
+    """A piece given a reading: logarithms of its share before and of its weight after, prediction, and states after."""
 
     share: Any
     weight: Any
-    foretold: Gaussian
+    predicted: Gaussian
     left: Gaussian
 
 
@@ -150,10 +150,10 @@ class _Piece:
     low: Any
     high: Any
     turned: Any
-    beside: Any
+    moved: Any
 
     def _followed(self, one: Gaussian) -> Gaussian:
-        mean = ca.mtimes(self.turned, one.mean) + self.beside
+        mean = ca.mtimes(self.turned, one.mean) + self.moved
         return Gaussian(mean, ca.mtimes([self.turned, one.covariance, self.turned.T]))
 
     def read(self, x: Any, reading: Any, given: tuple[Any, Any, Any], known: Gaussian) -> _Read:
@@ -164,11 +164,11 @@ class _Piece:
         value, row = (ca.substitute(e, x, middle) for e in (reading, ca.jacobian(reading, x)))
         row = ca.mtimes(row, self.turned)
         uncut = value + ca.mtimes(row, known.mean - part.mean)
-        told, density = known.seen(row, measured - uncut, noise, seen)
-        away = self.away + ca.mtimes(self.across, told.mean - known.mean)
-        left, cut = told.cut(self.across, away, self.low, self.high)
-        foretold = Gaussian(value, ca.mtimes([row, part.covariance, row.T]))
-        return _Read(share, left + density, foretold, self._followed(cut))
+        updated, density = known.seen(row, measured - uncut, noise, seen)
+        away = self.away + ca.mtimes(self.across, updated.mean - known.mean)
+        left, cut = updated.cut(self.across, away, self.low, self.high)
+        predicted = Gaussian(value, ca.mtimes([row, part.covariance, row.T]))
+        return _Read(share, left + density, predicted, self._followed(cut))
 
 
 class _End:

@@ -17,7 +17,7 @@ class AntagonistSpillover(Effect):
         lag b'  = r_s - b
         F_net   = F_M - share K F_ref b
 
-    Tell-tale: the strongest stimuli move the joint less than weaker ones promise, though the muscle alone pulls as
+    Tell-tale: the strongest stimuli move the joint less than weaker ones predict, though the muscle alone pulls as
     modelled.
     Source: Popovic and Sinkjaer, Control of Movement for the Physically Disabled, Springer 2000: spread of current
     to neighbouring nerves. The antagonist answers at once unless data show its lag.

@@ -12,7 +12,7 @@ from fes_pin.models.maths import play
 from fes_pin.models.stage import Bounds, ByName, Effect, Grids, Measured, Stage, least_step, parameter, span
 
 WIDTHS = (0.003, 0.03)
-"""Half widths that a fit begins with beside those that slopes lead to, as shares of the range of the motion."""
+"""Half widths at which a fit starts, in addition to those that slopes lead to, as shares of the range of the motion."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Backlash(Effect):
 
     @classmethod
     def far_sizes(cls, measured: Measured) -> Grids:
-        """Shares of the motion: slopes beside a reading that follows at once end at a slack of a few counts."""
+        """Half widths as shares of the motion: a fit that starts from no slack ends at a slack of a few counts."""
         size = span(measured, "position")
         return {"half_width": tuple(share * size for share in WIDTHS)} if size > 0.0 else {}
 

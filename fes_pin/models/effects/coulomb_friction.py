@@ -19,7 +19,7 @@ CORNER = 0.01
 CREEP = 0.004
 """Speed at which a joint creeps under half its friction until data show another, rad/s: 0.2 degrees a second."""
 SPAN_S = 0.05
-"""Time over which a speed is read off measured positions, s: an encoder's counts are small beside what is moved."""
+"""Time over which a speed is read off measured positions, s: an encoder's counts are small next to the way in it."""
 WAYS = (0.05, 0.2)
 """Presliding that is tried, as shares of an imposed way."""
 STRETCHES = (1e-4, 1e-3)
@@ -52,7 +52,7 @@ class CoulombFriction(Effect):
     one_way = asymmetry sign(x), x without it.
     Where the motion is an estimate, friction is near its mean over what x may be by it: corners are rounded over
     sqrt(pi / 2) of that deviation as well. T sign(v) becomes T tanh(v / (sqrt(pi / 2) v_std)), which has the slope of
-    the mean for a Gaussian. The slope at one velocity says nothing of friction at those beside it.
+    the mean for a Gaussian. The slope at one velocity says nothing of friction at those next to it.
     A contact stretches before it slips. On a joint that is free, with `stretch` of it, what holds the joint at rest is
     a spring to an anchor a that it drags along, and not the torque itself:
 
@@ -66,7 +66,7 @@ class CoulombFriction(Effect):
     velocity is known there; noise in one that is estimated would wear z away while the joint stands.
     Sliding contacts lose in proportion to the load; rolling ones by elastic hysteresis, the load times the width of the
     contact: to the power 4/3 for balls, 3/2 for rollers. Friction that differs by the direction is, moving and at rest,
-    symmetric friction beside a constant torque: a joint has `effort_offset` for that, and no asymmetry.
+    symmetric friction together with a constant torque: a joint has `effort_offset` for that, and no asymmetry.
 
     Tell-tale: the joint comes to rest at other angles from above than from below; free swings shrink by equal steps.
     Source: Olsson, Astrom, Canudas de Wit, Gafvert and Lischinsky, Friction models and friction compensation,
@@ -125,8 +125,8 @@ class CoulombFriction(Effect):
     def forms(cls, measured: Measured) -> tuple[Mapping[str, float], ...]:
         """With presliding as well where the motion is imposed: at rates of many samples a band's stretch is no jump.
 
-        With a stretch where an effort answers what is read: beside a play, a joint that sticks and creeps otherwise
-        passes for no friction.
+        With a stretch where an effort answers the readings: in a model that also contains a play, a joint that sticks
+        and creeps is otherwise mistaken for one without friction.
         """
         grids, tried = cls.grids(measured), "stretch" if "answer" in measured else "presliding"
         return ({}, *({tried: way} for way in grids[tried] if way > 0.0))

@@ -17,8 +17,8 @@ class FrameVibration(Effect):
         q''   = torque / J - phi''
 
     Tell-tale: after each sudden change the angle rings at one frequency of its own, whatever the load.
-    What is damped more than any joined frame, which is a fifth of critical at most, does not ring: it stood for efforts
-    that a log writes down late.
+    A mode damped more than any joined frame, which is a fifth of critical at most, does not ring: it was mistaken for
+    efforts that a log writes down late.
     Source: Dombre, Fournier and Coiffet, section II-3-2: mechanical vibrations of the metallic frame. coupling = J
     / J_frame. Damping: Newmark and Hall, Earthquake Spectra and Design, EERI 1982, up to 0.2, of nailed wood near
     yield.

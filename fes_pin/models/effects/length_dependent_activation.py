@@ -9,7 +9,7 @@ from fes_pin.models.maths import exp, power
 from fes_pin.models.stage import Bounds, Effect, Measured, Stage, parameter, span
 
 LEAST = 1e-3
-"""Activation below which a power of it is not told from a straight line: it keeps derivatives finite."""
+"""Activation below which its power is replaced by a straight line, which keeps derivatives finite."""
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from fes_pin.models.maths import exp, ramp, sqrt
 from fes_pin.models.stage import Bounds, Effect, Grids, Measured, Stage, parameter
 
 FLAT = 1e-6
-"""Squared rate of the exponential that stands for a straight line, 1/m2."""
+"""Squared rate at which the exponential is a straight line, 1/m2."""
 
 
 @dataclass(frozen=True)

@@ -47,8 +47,8 @@ class PeriodicTorque(Effect):
         return {**grids, "frequency_hz": tuple(f for f in grids["frequency_hz"] if f >= slowest) or (FASTEST_HZ,)}
 
     def limits(self, measured: Measured) -> Bounds:
-        """What does not come again within a trial is not seen to be periodic: with a phase of each trial's own it would
-        stand for anything slow."""
+        """At least one period in a trial: a slower torque, with a phase of each trial's own, can replace any slow
+        effect."""
         return {"frequency_hz": (_slowest(measured), FASTEST_HZ)}
 
     def apply(self, value: Any, s: Any) -> Any:

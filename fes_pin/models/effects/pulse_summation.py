@@ -9,7 +9,7 @@ from fes_pin.models.maths import power
 from fes_pin.models.stage import Effect, Stage, parameter
 
 LEAST = 1e-3
-"""Activation below which powers of it are not told from a straight line: it keeps derivatives finite."""
+"""Activation below which its powers are replaced by a straight line, which keeps derivatives finite."""
 
 
 @dataclass(frozen=True)

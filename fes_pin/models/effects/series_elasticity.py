@@ -11,7 +11,7 @@ from fes_pin.models.maths import exp
 from fes_pin.models.stage import Bounds, ByName, Effect, Grids, Measured, Stage, parameter, span
 
 RIGID = 1e-16
-"""Compliance that stands for none, m/N."""
+"""Compliance that counts as none, m/N."""
 
 
 @dataclass(frozen=True)

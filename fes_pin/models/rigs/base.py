@@ -68,13 +68,13 @@ class Rig(ReadOnly):
     needed: ClassVar[tuple[str, ...]] = ()
     """Constants without which there are no equations."""
     elsewhere: ClassVar[str] = "turn the rig's base, or add a sensor on the other side of the joint or frame"
-    """What tells causes apart that no input does."""
+    """A change of the experiment that distinguishes causes where no input does."""
     settings: ClassVar[tuple[str, ...]] = ("",)
     """Examples of `fes-pin predict`'s options for its kinds of trial."""
     rate_of: ClassVar[Mapping[str, str]] = {}
     """Readings that are the rate of another, and may have been computed from it: their column and the other's."""
     begins: ClassVar[str] = ""
-    """Where a prediction of it begins, one sentence, if that is to be told."""
+    """Where a prediction of it begins, one sentence; "" where nothing needs saying."""
 
     def __post_init__(self) -> None:
         names, schema = tuple(self.parameters()), self.schema
@@ -212,7 +212,7 @@ class Rig(ReadOnly):
         raise NotImplementedError
 
     def driven_by(self, trial: Trial) -> tuple[str, ...]:
-        """Names of what drives the model in a trial: an imposed motion with its rates stands for its columns."""
+        """Names of what drives the model in a trial: an imposed motion with its rates replaces its columns."""
         moved = self.schema.motion(trial.kind)
         columns = tuple(n for n in self.input_columns(trial) if n not in moved)
         return (*columns, *MOTION) if moved else columns
@@ -319,7 +319,7 @@ def imposed_now(s: Signals) -> tuple[Any, Any, Any]:
 
 
 def undone(s: Signals, signal: str, value: Any) -> Any:
-    """What a signal was that comes out as `value`: all that acts on it is linear in it, or adds to it."""
+    """The signal before the effects that turn it into `value`: each effect on it is linear in it, or adds to it."""
     at_zero, at_one = s.through(signal, 0.0), s.through(signal, 1.0)
     return (value - at_zero) / (at_one - at_zero)
 

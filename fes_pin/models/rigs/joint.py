@@ -142,7 +142,7 @@ class Joint(Rig):
         return {**known, "idle": self._idle(trial)}
 
     def _idle(self, trial: Trial) -> float:
-        """Where no effort is needed to rest, rad or m: beside what is read or stated of a trial that is driven."""
+        """Position at which the joint rests without effort, rad or m: the one nearest to a driven trial's readings."""
         a, b = float(self.constants["gravity_cos"]), float(self.constants["gravity_sin"])
         if not (self.constants["revolute"] and (a or b)):
             return 0.0
@@ -181,12 +181,12 @@ class Joint(Rig):
         return {"effort": max(size, 1e-9 * self.constants["inertia"])}
 
     def unmeasured(self, trial: Trial) -> tuple[str, ...]:
-        told = trial.kind == IMPOSED or "velocity" in trial.columns or "velocity0" in trial.conditions
-        return () if told or "position" not in trial.columns else ("initial_velocity",)
+        known = trial.kind == IMPOSED or "velocity" in trial.columns or "velocity0" in trial.conditions
+        return () if known or "position" not in trial.columns else ("initial_velocity",)
 
     def read_first(self, trial: Trial) -> Mapping[str, str]:
-        told = trial.kind == IMPOSED or "position0" in trial.conditions or "position" not in trial.columns
-        return {} if told else {"initial_position": "position"}
+        known = trial.kind == IMPOSED or "position0" in trial.conditions or "position" not in trial.columns
+        return {} if known else {"initial_position": "position"}
 
     def set_rest(self, s: Signals, z: Any) -> None:
         if s.kind == IMPOSED:
