@@ -18,7 +18,7 @@ from fes_pin.muscles.recruitment import ChannelRecruitment, LinearRecruitment
 EFFORT = 1e-4
 """Default price of effort: recruiting the strongest channel fully costs as much as missing 1 % of its torque."""
 LEAST_PRICE, LARGEST_PRICE = 1e-10, 1e8
-"""Prices of effort lie between: below, double precision cannot tell choices apart; above, nothing is ever recruited."""
+"""Prices of effort lie between: below, double precision cannot separate choices; above, nothing is ever recruited."""
 LEAST_WEIGHT, LARGEST_WEIGHT = 1e-6, 1e6
 """Weights of joints that count lie between, for the same reason."""
 LEAST_LEFT = 0.05

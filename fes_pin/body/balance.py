@@ -24,7 +24,7 @@ class GroundRows:
     constant + per_mode eta + per_force F + per_torque (C + D), with eta'' = mu eta + F and F = phi' (C + D).
 
     Rows are divided by the weight: about how far, m, the centre of pressure lies outside an edge of a sole, for a foot
-    that bears it all. On one foot the motion alone tells it, on two the torques tell which foot bears what.
+    that bears it all. On one foot the motion alone determines it, on two the torques determine each foot's share.
 
     Parameters
     ----------

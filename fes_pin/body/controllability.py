@@ -1,4 +1,4 @@
-"""Which inputs control which modes, and at what price.
+"""Which inputs control which modes, and with how much energy.
 
 With A-orthonormal mode shapes, mode i obeys eta'' = mu_i eta + phi_i' (C + Q u). Its row b_i = phi_i' Q is what the
 Popov-Belevitch-Hautus (PBH) test looks at, for +sqrt(mu_i) and -sqrt(mu_i) alike. Inputs that only pull control a body

@@ -109,7 +109,7 @@ class LinearBody(Tabulated):
 
     @property
     def conservative(self) -> bool:
-        """Whether there is neither damping nor motion: the paper's case, where A and B tell everything."""
+        """Whether there is neither damping nor motion: the paper's case, where A and B describe the body."""
         return not self.E.any() and np.allclose(self.B, self.B.T, rtol=0.0, atol=1e-9 * np.abs(self.B).max())
 
     @cached_property

@@ -131,7 +131,7 @@ def minimal_sets(
     together
         True: with every other fall controlled at the same time by the same set. False: one mode at a time, the others
         let be (Brammer's test with strength, the bound of `modal_bound`): no smaller set does, however stimulated; this
-        one does in principle, at a price that the answer shows.
+        one does in principle, with an energy that the answer shows.
     gravity
         Whether the set must also carry the posture's weight (C).
     settle_deg

@@ -125,7 +125,7 @@ class ModeSet(Tabulated):
     shapes
         Eigenvectors in columns, shapes' A shapes = 1: (n, r), r = n on one foot.
     conservative
-        False where damping or motion is left out here; `LinearBody.poles` then tells the whole.
+        False where damping or motion is left out here; `LinearBody.poles` then includes them.
     """
 
     modes: tuple[Mode, ...]

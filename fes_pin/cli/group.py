@@ -117,7 +117,7 @@ class Command(TyperCommand):
 
 
 class App(typer.Typer):
-    """A group of commands that have -h, -q and -v, refuse options that they would ignore, and name them in errors."""
+    """A group of commands that have -h, -q and -v, reject options that they would ignore, and name them in errors."""
 
     def __init__(self, **given: Any) -> None:
         super().__init__(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]}, **given)

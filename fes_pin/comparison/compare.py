@@ -214,7 +214,7 @@ def _check_time(value: float, trials: Sequence[Trial], name: str) -> None:
 
 def _warnings(ranked: Sequence[Compared], given_s: float | None) -> list[str]:
     if given_s is not None and any("begun" not in m.percent for m in ranked):
-        return ["too few trials tell how much trials differ: the beginning of one says nothing of its rest"]
+        return ["too few trials to estimate how trials differ: the first seconds of a trial do not predict its others"]
     return []
 
 

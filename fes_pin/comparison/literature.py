@@ -72,7 +72,7 @@ class Published:
     fixed: tuple[tuple[str, float], ...] = ()
 
     def model(self, nominal: Model, trials: Sequence[Trial]) -> Model:
-        """The model on a rig, with the effects that these trials can feel.
+        """The model on a rig, with the effects that act in these trials.
 
         Raises
         ------
@@ -93,7 +93,7 @@ class Published:
         return model
 
     def unfelt(self, nominal: Model, trials: Sequence[Trial]) -> tuple[str, ...]:
-        """Names of its effects that none of these trials can feel."""
+        """Names of its effects that act in none of these trials."""
         return tuple(e.name for e in self.effects(trials) if not is_felt(nominal, e, trials))
 
 

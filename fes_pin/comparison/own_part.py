@@ -24,11 +24,11 @@ from fes_pin.infer.noise import thin
 STEP_S = 4e-3
 """Samples are averaged to this time step, s, as the noise's are: `infer.noise.FASTEST_S`."""
 WORTH = (1.0, 3.0, 10.0, 30.0, 100.0)
-"""How many samples may weigh as one: what a model gets wrong is the same for some tenths of a second."""
+"""How many samples may weigh as one: errors of a model have a correlation time of some tenths of a second."""
 TURNS = 40
 """Of expectation and maximisation; D then moves by less than a hundredth."""
 FEWEST = 4
-"""Trials that can tell how much trials differ."""
+"""Least number of trials from which the differences between trials are estimated."""
 
 Pair = tuple[np.ndarray, np.ndarray]
 

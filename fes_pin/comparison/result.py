@@ -1,4 +1,4 @@
-"""The answer of a comparison: models by their errors on held-out trials, and which of them these trials tell apart."""
+"""The answer of a comparison: models by their errors on held-out trials, and which of them differ significantly."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Compared(Recorded):
     parameters
         How many are fitted.
     unfelt
-        Effects of the publication that these trials cannot feel.
+        Effects of the publication that act in none of these trials.
     rmse
         By output column and then by "free", "horizon", "begun" and "free_rest": root mean squared error over held-out
         trials, in the unit of the column.
@@ -180,7 +180,7 @@ class Comparison(Saveable):
 
 
 def apart_from(best: np.ndarray, other: np.ndarray, rivals: int, folds: int) -> Apart:
-    """Whether held-out trials tell a model from the best: a t interval of the mean difference of their errors.
+    """A t interval of the mean difference between the errors of a model and of the best, on held-out trials.
 
     Parameters
     ----------

@@ -44,7 +44,7 @@ class GroupConditions(Conditions[ContrastSearch, Found]):
         return True
 
     def saved(self, searched: Found, trials: Sequence[Trial], made: Restated[ContrastSearch, Found]) -> float:
-        """By how much the price falls, under the noise of the restated trials."""
+        """The fall of the penalised likelihood, with the noise of the restated trials."""
         best, after = searched.best, made.searched.best
         fits = ContrastModels(self.nominal, in_groups(trials), (), best.is_driven).maxima
         return fits.converged(best.model, best.items, after.weights, best.fit.unknowns).price - after.price

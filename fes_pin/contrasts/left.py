@@ -39,7 +39,7 @@ def _left_by(fitted: Fit, seed: int) -> Remainder:
 
 
 def _in_single_trials(models: ContrastModels, best: Grouped, group: str, left: Remainder, seed: int) -> Remainder:
-    """What is left in a group, if half of its trials leave something, each with nominal values of its own.
+    """Lack of fit of a group, if half of its trials have one with nominal values of their own.
 
     Trials whose strength or friction differs, of whatever group, have a lack of fit by values that they share.
     """

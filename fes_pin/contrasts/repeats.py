@@ -28,8 +28,8 @@ from fes_pin.infer.projection import without_locals
 from fes_pin.models.model import Model
 
 SMALLEST, LARGEST = -1.0, 12.0
-"""Logarithms between which s is sought, in units of what the trials tell of a parameter: at the smallest its variance
-is an eighth of that, at the largest a trial tells nothing but its own."""
+"""Logarithms between which s is sought, in units of the standard error of a parameter from these trials: at the least
+its variance is an eighth of that, at the largest a trial informs its own value alone."""
 COARSE, STEP, FINE = 27, 0.5, 21
 """Points of a deviation's logarithm that are tried, half a unit apart, and as many within one of them from the best."""
 

@@ -25,7 +25,7 @@ from scipy.special import fdtrc
 LOW_PASSES = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
 """Time constants of the low passes, in samples: between two of them a filter is nearly a mean of both."""
 SHORTEST = 4
-"""Samples of a stretch at least, for each coefficient: as few as tell how much is left within a tenth or two."""
+"""Samples of a stretch at least, for each coefficient: enough to estimate the residual's size within a tenth or two."""
 APART_LEVEL = 0.01
 """At which two stretches answer differently: one too many costs a few samples, one too few mixes two ways."""
 

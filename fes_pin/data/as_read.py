@@ -86,7 +86,7 @@ def note_bytes(path: str | Path, content: bytes) -> None:
 
 
 def digest_of(parts: Iterable[Any]) -> bytes:
-    """A short hash of arrays and of whatever else `repr` tells apart."""
+    """A short hash of arrays and of whatever else `repr` distinguishes."""
     made = hashlib.blake2b(digest_size=16)
     for part in parts:
         made.update(part.tobytes() if isinstance(part, np.ndarray) else repr(part).encode())

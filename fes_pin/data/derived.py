@@ -37,7 +37,7 @@ def without_derived(trials: Sequence[Trial], position: str, velocity: str) -> tu
 def own_share(position: np.ndarray, velocity: np.ndarray) -> float | None:
     """Share of the power of a velocity's second differences, mostly noise, that no filter of positions explains.
 
-    v''_t = sum_k b_k q''_(t + k),  k = -TAPS ... TAPS; None of a record that is too short to tell.
+    v''_t = sum_k b_k q''_(t + k),  k = -TAPS ... TAPS; None for a record that is too short to decide.
 
     Parameters
     ----------

@@ -52,7 +52,7 @@ def answered(trial: Trial) -> ControllerAnswer:
 
 
 def quiet(trial: Trial, answer: ControllerAnswer, noise: float) -> Trial:
-    """The trial without so much noise of its effort as its answer tells; see `ControllerAnswer.quieted`."""
+    """The trial with the estimate of the effort that acted; see `ControllerAnswer.quieted`."""
     return trial.with_columns(**{EFFORT: answer.quieted(trial[EFFORT], noise)})
 
 

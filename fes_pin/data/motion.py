@@ -217,7 +217,7 @@ def _right_plate(table: Table, names: Mapping[str, str]) -> str:
         across[plate] = float(load @ table.columns[names[f"{plate}_copz"]] / max(load.sum(), 1e-9))
     if abs(across["1"] - across["2"]) < BESIDE_M:
         raise table.error(
-            "expected columns that name the foot, r_ and l_: the plates' order does not tell it", names["1_Fy"]
+            "expected columns that name the foot, r_ and l_: the plates' order does not show it", names["1_Fy"]
         )
     return max(across, key=lambda plate: across[plate])
 

@@ -158,7 +158,7 @@ def _check_rows(study: Study | ToPredict) -> None:
 
 
 def _inputs(study: Study | ToPredict) -> Iterable[str]:
-    """What is odd about inputs; refuses a muscle that is never stimulated."""
+    """Remarks on inputs; a muscle that is never stimulated is an InputError."""
     short = [t.name for t in study.trials if len(t) < FEW]
     if short:
         yield f"fewer than {FEW} samples in {trials_named(short)}"

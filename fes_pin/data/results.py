@@ -85,7 +85,7 @@ class Saveable(Recorded):
 
 
 class Plan(Protocol):
-    """An experiment that would tell two causes apart, or the reason why none does."""
+    """An experiment that would distinguish two causes, or the reason why none does."""
 
     @property
     def why(self) -> str:
@@ -118,7 +118,7 @@ class Result(Saveable):
         Why something is unexplained, where it is no test of the residuals that says so: nothing could be fitted, or an
         error stays that is no noise.
     next_experiment
-        What would tell the first cause from what it cannot be told from.
+        The experiment that would distinguish the first cause from its equivalents.
     provenance
         When, by which versions, from which files it was made.
     """
@@ -173,8 +173,8 @@ class Result(Saveable):
 
     def headline(self) -> str:
         """The verdict in one sentence, with what is explained, and against what that is measured."""
-        told = f": that explains {self.explained}" if self.explained and self.causes else ""
-        return f"{self.title()}{told}{f': {self.reason}' if self.reason else ''}."
+        explains = f": that explains {self.explained}" if self.explained and self.causes else ""
+        return f"{self.title()}{explains}{f': {self.reason}' if self.reason else ''}."
 
     def notes(self) -> list[tuple[str, str]]:
         """What is said besides the table of what is named, by topic."""
@@ -235,8 +235,8 @@ class Result(Saveable):
         """Title, head, rows and notes of the table that is printed."""
         errors: dict[str, list[str]] = {}
         for one in self.errors():
-            told = " -> ".join(dict.fromkeys([percent(one.nominal), percent(one.extended)]))
-            errors.setdefault(f"error E {ON[one.on]}", []).append(f"{one.what} {told}")
+            values = " -> ".join(dict.fromkeys([percent(one.nominal), percent(one.extended)]))
+            errors.setdefault(f"error E {ON[one.on]}", []).append(f"{one.what} {values}")
         lines = [(topic, ", ".join(many)) for topic, many in errors.items()] + self.notes()
         title, rows = f"{self.study.name}: {self.headline()}", [one.row() for one in self.causes]
         return title, self.head(), rows, [f"{topic}: {words}" for topic, words in lines]

@@ -21,7 +21,7 @@ OFF_LINE = 4.5
 MAD_TO_STD = 1.4826
 """Standard deviation over median absolute deviation of a Gaussian."""
 AROUND = 100
-"""Samples to either side that tell how large deviations are there."""
+"""Samples to either side from which the size of deviations is estimated."""
 MOST = 0.05
 """Share of a channel above which excursions belong to the signal."""
 LONGEST = 2

@@ -95,7 +95,7 @@ def check_one_joint(path: str | Path) -> tuple[str, str]:
 
 
 def mechanics(path: str | Path) -> str:
-    """URDF text of a file's links and joints alone, every number checked: no parser has cause to refuse it.
+    """URDF text of a file's links and joints alone, every number checked, so that a parser accepts it.
 
     Shapes, materials and whatever else a URDF may hold do not bear on how it moves, and are left out. Joints that mimic
     another are fixed: `check_one_joint` accepts them only where they move no mass.

@@ -39,7 +39,7 @@ class Wanted:
     settings
         By key, numbers of the rig, start values, conditions of all trials; by `FILE:key` of one trial alone.
     kind
-        Of all trials; None to be told from their columns.
+        Of all trials; None if their columns decide it.
     labels
         Of trials: by "role" and "group" what was said of files, by `FILE`.
     resample_hz, fill

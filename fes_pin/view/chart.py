@@ -44,7 +44,7 @@ def ticks(low: float, high: float, count: int = TICKS) -> list[float]:
 
 
 def tick_text(value: float, step: float) -> str:
-    """A tick's number with the digits that tell it from its neighbours."""
+    """A tick's number with the digits that distinguish it from its neighbours."""
     if value and (abs(value) >= 1e5 or step < 1e-4):
         return f"{value:.3g}".replace("e+0", "e").replace("e-0", "e-").replace("-", "\N{MINUS SIGN}")
     digits = max(0, -math.floor(math.log10(step) + 1e-9)) if step > 0 else 2

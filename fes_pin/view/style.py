@@ -1,7 +1,7 @@
 """How figures look: colours by stage and by role, units of columns.
 
-The colours are Okabe and Ito's, which colour-blind readers tell apart (Color Universal Design, 2008). Each has a name,
-under which a page may give it another shade on a dark ground.
+The colours are Okabe and Ito's, which colour-blind readers can distinguish (Color Universal Design, 2008). Each has a
+name, under which a page may give it another shade on a dark ground.
 """
 
 from __future__ import annotations

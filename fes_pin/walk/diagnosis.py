@@ -32,7 +32,7 @@ def diagnose_walk(
     limit: float | None = None,
     progress: Progress | None = None,
 ) -> WalkDiagnosis:
-    """Find out what the believed body and its measurements get wrong in measured walking.
+    """Name the errors of the nominal body and of the measurements in measured walking.
 
     Parameters
     ----------

@@ -72,7 +72,7 @@ class Form:
 
 
 class WalkEffect:
-    """One physical thing that a model of walking leaves out, or a measurement gets wrong.
+    """One physical effect that a model of walking lacks, or one error of its measurements.
 
     A subclass says what it is in its docstring and lists its forms. Each form is linear in its parameters.
 

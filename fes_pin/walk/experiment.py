@@ -1,4 +1,4 @@
-"""The next walk, or stand, that tells two causes apart: which of a few that anybody can do separates them most."""
+"""The next walk, or stand, that distinguishes two causes: the one of a few simple ones that separates them most."""
 
 from __future__ import annotations
 

@@ -93,7 +93,7 @@ def rotation(left: np.ndarray, harmonics: np.ndarray) -> np.ndarray:
     scale = 1.0 / np.maximum(np.sqrt(np.mean(left**2, axis=(0, 2))), FLOOR_N)
     scaled = (scale[:, None] * left).transpose(1, 0, 2).reshape(6, -1)
     shared = scaled @ scaled.T / scaled.shape[1]
-    shared = 0.8 * shared + 0.2 * np.diag(np.diag(shared))  # few strides tell a correlation badly
+    shared = 0.8 * shared + 0.2 * np.diag(np.diag(shared))  # few strides estimate a correlation badly
     _, vectors = np.linalg.eigh(shared)
     return vectors.T * scale
 

@@ -26,7 +26,7 @@ BODY_FILE = "body.urdf"
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class WalkDiagnosis(Result):
-    """What a model of walking gets wrong: "adequate", "causes_found", "unexplained" or "stopped".
+    """The result of a diagnosis of walking: "adequate", "causes_found", "unexplained" or "stopped".
 
     Attributes
     ----------

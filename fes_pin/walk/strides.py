@@ -101,7 +101,7 @@ def strides_of(scenes: Sequence[Scene], cutoff_hz: float) -> Strides:
 
 
 def _steps(time: np.ndarray, plates: Plates) -> bool:
-    """Whether contacts tell a stride's length: two of a foot, or one of each."""
+    """Whether contacts determine a stride's length: two of a foot, or one of each."""
     counts = [len(_contacts(time, plates.loaded[side])) for side in SIDES]
     return max(counts) > 1 or min(counts) > 0
 

@@ -106,7 +106,7 @@ class Columns:
         return replace(table, half_digit=half_digit if self.resample_hz is None else 0.0), said
 
     def _taken(self, recording: Table, schema: RigSchema, kind: str, inputs_only: bool) -> dict[str, ColumnSource]:
-        """Sources of this file's columns; refuses what nobody has spoken for."""
+        """Sources of this file's columns; a column of the file that no source names is an error."""
         measured = () if inputs_only else (schema.outputs[kind],)
         needed = {"time_s", *schema.stimuli(kind), *schema.motion(kind)[:1], *measured}
         known = schema.columns_of(kind)
@@ -120,9 +120,9 @@ class Columns:
                     raise recording.error(message, source.name)
                 continue
             taken[column] = source
-        spoken_for = {*self.ignored, *(s.name for s in self.sources.values())}
+        declared = {*self.ignored, *(s.name for s in self.sources.values())}
         for name in recording.names:
-            if name in spoken_for:
+            if name in declared:
                 continue
             if name not in known or name in taken:
                 expected = f"this rig reads {', '.join(known)}"

@@ -83,8 +83,8 @@ def read_recording(path: str | Path, form: TextForm | None = None, wanted: Seque
     recording = _READERS[suffix](path, wanted)
     sizes = {len(values) for values in recording.columns.values()}
     if len(sizes) > 1:
-        told = ", ".join(f"{name} {len(values)}" for name, values in recording.columns.items())
-        raise InputError(f"expected columns of one length, found {told[:200]}", file=path)
+        lengths = ", ".join(f"{name} {len(values)}" for name, values in recording.columns.items())
+        raise InputError(f"expected columns of one length, found {lengths[:200]}", file=path)
     if not sizes or min(sizes) < MIN_ROWS:
         raise InputError(f"expected at least {MIN_ROWS} samples of numbers, found {min(sizes, default=0)}", file=path)
     for name, values in recording.columns.items():

@@ -1,4 +1,4 @@
-"""Samples that are missing, and times that are not equally spaced: filled in only where a study says so, and told."""
+"""Missing samples, and times that are not equally spaced: filled in only where a study says so, and reported."""
 
 from __future__ import annotations
 

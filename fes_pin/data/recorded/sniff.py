@@ -107,6 +107,6 @@ def _header(lines: list[str], best: _Guess, comment: str) -> tuple[int, dict[int
 
 def _are_units(cells: list[str]) -> bool:
     bare = [cell.strip("[](){} ") for cell in cells]
-    told = [cell for cell in bare if cell not in ("", "-", "1")]
+    stated = [cell for cell in bare if cell not in ("", "-", "1")]
     bracketed = all(cell[:1] in "[({" for cell in cells if cell)
-    return bool(told) and (bracketed or all(known_unit(cell, tuple(UNITS)) for cell in told))
+    return bool(stated) and (bracketed or all(known_unit(cell, tuple(UNITS)) for cell in stated))
