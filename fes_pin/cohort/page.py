@@ -11,7 +11,7 @@ from fes_pin.cohort.pool import pooled
 from fes_pin.data.provenance import Provenance, today, versions
 from fes_pin.identify.error_measures import E_WORDS
 from fes_pin.infer.levels import CONFIDENCE_95
-from fes_pin.infer.text import percent, probability
+from fes_pin.infer.text import percent, probability, rounded
 from fes_pin.view.drawing import Drawing
 from fes_pin.view.intervals import intervals_drawing
 from fes_pin.view.page import (
@@ -24,7 +24,6 @@ from fes_pin.view.page import (
     html_table,
     joined,
     section,
-    value_text,
 )
 from fes_pin.view.sections import answers, provenance_parts, stage_mark
 
@@ -133,13 +132,13 @@ def _pooled(causes: Sequence[PageRow], rows: Sequence[PageRow]) -> list[Markup]:
 
 def _pooled_cells(r: PageRow) -> list[Content]:
     error = (r["high"] - r["low"]) / 4.0
-    bounds = [value_text(r[n], error) for n in ("next_low", "next_high") if math.isfinite(r[n])]
+    bounds = [rounded(r[n], error) for n in ("next_low", "next_high") if math.isfinite(r[n])]
     return [
         element("code", r["cause"]) if r["cause"] else "the rig",
         element("code", r["parameter"]),
         f"{r['studies']} of {r['of']}",
-        f"{value_text(r['mean'], error)} [{value_text(r['low'], error)}, {value_text(r['high'], error)}]",
-        value_text(r["between"], error),
+        f"{rounded(r['mean'], error)} [{rounded(r['low'], error)}, {rounded(r['high'], error)}]",
+        rounded(r["between"], error),
         f"[{', '.join(bounds)}]" if bounds else "-",
         f"{r['heterogeneity']:.0f} %",
         probability(r["p_alike"]),

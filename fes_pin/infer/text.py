@@ -31,16 +31,22 @@ def percent(value: float | None) -> str:
     return f"{value:.0f} %" if value >= 100.0 else f"{value:.{digits}g} %"
 
 
+def rounded(value: float, std: float) -> str:
+    """A value with the digits that its standard deviation leaves it: two of the uncertain ones."""
+    if not math.isfinite(std) or std <= 0.0:
+        return f"{value:.4g}"
+    digits = 1 - math.floor(math.log10(std))
+    if abs(value) < 1e5 and digits <= 6:
+        return f"{value:.{max(digits, 0)}f}"
+    lead = math.floor(math.log10(abs(value))) if value else 0
+    return f"{value:.{min(max(lead + digits, 0), 8)}e}" if value else "0"
+
+
 def quantity(value: float, std: float, unit: str) -> str:
     """A value with its standard deviation, rounded to what it means."""
-    if not math.isfinite(std):
-        return f"{value:.3g} {unit} (not identified)".replace("  ", " ")
-    if std <= 0.0:
-        return f"{value:.4g} {unit} (held)".replace("  ", " ")
-    digits = max(0, 1 - math.floor(math.log10(std)))
-    if digits > MOST_DIGITS or abs(value) >= LARGE:
-        return f"{value:.3g} +- {std:.2g} {unit}".strip()
-    return f"{value:.{digits}f} +- {std:.{digits}f} {unit}".strip()
+    if math.isfinite(std) and std > 0.0:
+        return f"{rounded(value, std)} +- {rounded(std, std)} {unit}".strip()
+    return f"{value:.4g} {unit} ({'held' if std <= 0.0 else 'not identified'})".replace("  ", " ")
 
 
 def listed(names: list[str], last: str = "and") -> str:

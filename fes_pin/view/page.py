@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import hashlib
 import html
-import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -118,19 +117,6 @@ def document(title: str, parts: Sequence[Markup], residual: str = "") -> str:
         f"{element('title', title).text}\n<style>\n{style}</style>\n</head>\n<body>\n{body.text}\n"
         f"<script>{script}</script>\n</body>\n</html>\n"
     )
-
-
-def value_text(value: float, std: float) -> str:
-    """A value with the digits that its standard deviation leaves it: two of the uncertain ones."""
-    if not math.isfinite(std) or std <= 0.0:
-        return f"{value:.4g}"
-    digits = 1 - math.floor(math.log10(std))
-    if abs(value) >= 1e5 or digits > 6:
-        if value == 0.0:
-            return "0"
-        lead = math.floor(math.log10(abs(value)))
-        return f"{value:.{min(max(lead + digits, 0), 8)}e}"
-    return f"{value:.{max(digits, 0)}f}"
 
 
 def unit_text(unit: str) -> str:

@@ -11,8 +11,9 @@ from typing import Any
 from fes_pin.data.provenance import Provenance
 from fes_pin.data.results import Result
 from fes_pin.infer.result import ParameterEstimate
+from fes_pin.infer.text import rounded
 from fes_pin.models.describe import sentence
-from fes_pin.view.page import Content, Markup, element, folded, html_table, joined, section, unit_text, value_text
+from fes_pin.view.page import Content, Markup, element, folded, html_table, joined, section, unit_text
 
 UNIT_IN_NAME = re.compile(r"(?<=.)(_(nms|nm|us|s|hz|n|kg|rad))?(_per_(rad[23]?|s))?$")
 """What a parameter's name says of its unit, which stands next to the value: of a slide it is another."""
@@ -61,7 +62,7 @@ def value_and_interval(one: ParameterEstimate) -> tuple[str, str, str]:
         return f"{one.value:.4g}", unit, f"{one.one_sided()}, at its bound"
     if one.std == 0.0 or not math.isfinite(one.std):
         return f"{one.value:.4g}", unit, "fixed" if one.std == 0.0 else "not identified"
-    return value_text(one.value, one.std), unit, f"[{value_text(low, one.std)}, {value_text(high, one.std)}]"
+    return rounded(one.value, one.std), unit, f"[{rounded(low, one.std)}, {rounded(high, one.std)}]"
 
 
 def not_testable(result: Result, names: Sequence[str], why: str) -> Markup:

@@ -18,8 +18,8 @@ from fes_pin.infer.text import quantity
         (123.4, 7.0, "123.4 +- 7.0 N"),
         (2.0, math.inf, "2 N (not identified)"),
         (0.25, 0.0, "0.25 N (held)"),
-        (2.5e6, 4e5, "2.5e+06 +- 4e+05 N"),
-        (1e-9, 2e-10, "1e-09 +- 2e-10 N"),
+        (2.5e6, 4e5, "2.50e+06 +- 4.0e+05 N"),
+        (1e-9, 2e-10, "1.00e-09 +- 2.0e-10 N"),
     ],
 )
 def test_a_quantity_is_rounded_to_what_it_means(value, std, words):

@@ -21,11 +21,11 @@ from view.reported import NASTY, ankle_diagnosis, ankle_study, diagnosed, joint_
 import fes_pin as fp
 from fes_pin.diagnosis.errors_ahead import Ahead, AheadErrors, RandomPart
 from fes_pin.infer.result import STOPPED
+from fes_pin.infer.text import rounded
 from fes_pin.models.describe import equation
 from fes_pin.models.effects import effect_named
 from fes_pin.models.predictor import Doubt
 from fes_pin.view.mathml import equations_mathml
-from fes_pin.view.page import value_text
 from fes_pin.view.report import report_html
 from fes_pin.view.report_trials import got_worse
 from fes_pin.view.sections import UNIT_IN_NAME
@@ -325,4 +325,4 @@ def test_words_of_a_size_are_without_its_unit(name, words):
 
 
 def test_a_bound_at_nothing_is_no_row_of_noughts():
-    assert [value_text(v, 3.9e-7) for v in (0.0, 1.05e-6)] == ["0", "1.05e-06"]
+    assert [rounded(v, 3.9e-7) for v in (0.0, 1.05e-6)] == ["0", "1.05e-06"]
