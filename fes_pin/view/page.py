@@ -13,6 +13,7 @@ from urllib.parse import quote
 
 from fes_pin.view.chart import STYLE
 from fes_pin.view.drawing import Drawing
+from fes_pin.view.style import COLOURS
 
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; script-src '{script}'"
 """Content security policy: the page loads nothing, and runs the one script that it brings, by its hash."""
@@ -107,7 +108,9 @@ def document(title: str, parts: Sequence[Markup], residual: str = "") -> str:
     footer = element("footer", f"Made by fes-pin. {residual}Intervals are 95 %. SI units.")
     body = joined([p for p in (*parts, footer) if p.text])
     files = resources.files("fes_pin.view")
-    style = files.joinpath("report.css").read_text(encoding="utf-8") + STYLE.replace("INK", "var(--ink)")
+    colours = " ".join(f"--{name}: {value};" for name, value in COLOURS.items())
+    own = files.joinpath("report.css").read_text(encoding="utf-8") + STYLE.replace("INK", "var(--ink)")
+    style = f":root {{ {colours} }}\n{own}"
     script = files.joinpath("report.js").read_text(encoding="utf-8")
     allowed = "sha256-" + base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     return (

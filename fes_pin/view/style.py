@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-STAGES = {"nerve": "#0072b2", "muscle": "#d55e00", "joint": "#009e73", "rig": "#b8860b", "sensor": "#b2558e"}
-"""Colour of each stage of the signal path; two are darkened, to be read as text on white."""
+STAGES = {"nerve": "#0072b2", "muscle": "#d55e00", "joint": "#00855f", "rig": "#8f6800", "sensor": "#a8477f"}
+"""Colour of each stage of the signal path; three are darkened, to be read as text on white."""
 MEASURED, NOMINAL, EXTENDED = "#17191c", "#8b8f96", "#56b4e9"
 INK, FAINT, BAND, STIMULUS = "#3d4248", "#c9cdd2", "#eceef1", "#6f7680"
 COLOURS = {
