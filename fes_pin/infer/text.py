@@ -6,6 +6,8 @@ import math
 
 LEAST_P, LEAST_PERCENT = 1e-12, 1e-3
 """Below these a p-value and a percentage are printed as smaller than that."""
+LARGE, DIGITS = 1e5, 6
+"""From this value on, and with more digits behind the point, a number is printed with a power of ten."""
 
 
 MOST_DIGITS = 6
@@ -36,7 +38,7 @@ def rounded(value: float, std: float) -> str:
     if not math.isfinite(std) or std <= 0.0:
         return f"{value:.4g}"
     digits = 1 - math.floor(math.log10(std))
-    if abs(value) < 1e5 and digits <= 6:
+    if abs(value) < LARGE and digits <= DIGITS:
         return f"{value:.{max(digits, 0)}f}"
     lead = math.floor(math.log10(abs(value))) if value else 0
     return f"{value:.{min(max(lead + digits, 0), 8)}e}" if value else "0"
