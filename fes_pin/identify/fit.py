@@ -19,10 +19,10 @@ from fes_pin.data.schema import unknown
 from fes_pin.data.show import frame
 from fes_pin.data.trial import Trial
 from fes_pin.identify.problem import Problem
-from fes_pin.infer.noise import ORDERS, Noise, NoiseModel, as_white, estimate_noise, noise_step, thin, thinning
+from fes_pin.infer.noise import ORDERS, Noise, NoiseModel, estimate_noise, noise_step, thin, thinning
 from fes_pin.infer.optimum import MAX_ITERATIONS, Optimum, minimise
-from fes_pin.infer.problem import Linearized, Unknowns, whitened_sse
 from fes_pin.infer.problem import Problem as AnyProblem
+from fes_pin.infer.problem import Unknowns
 from fes_pin.infer.profile import profile_interval
 from fes_pin.infer.result import shown
 from fes_pin.infer.scoring import LITTLE
@@ -223,13 +223,6 @@ class Fit(Optimum, Saveable):
         own = len(self.model.own_unknowns())
         return len(self.free) + sum(int(p.local[:, -own:].any(axis=0).sum()) for p in self.parts if own)
 
-    @cached_property
-    def plain(self) -> float:
-        """Sum of squared residuals over the variance of a single sample, not whitened."""
-        return whitened_sse(
-            Problem(self.model, self.trials, as_white(self.noise), ()).linearize(self.values, self.unknowns)
-        )
-
     @property
     def doubt(self) -> Doubt | None:
         """The noise of a fit by the likelihood, by its old name; None of others. Deprecated: use `noise`."""
@@ -245,10 +238,9 @@ def fit_problem(
     start: Mapping[str, float],
     unknowns: Unknowns | None = None,
     max_iterations: int = MAX_ITERATIONS,
-    parts: Sequence[Linearized] | None = None,
 ) -> Fit:
     """Fit a problem from a start value of every parameter; see `infer.optimum.minimise`."""
-    found = minimise(problem, start, unknowns, max_iterations, parts)
+    found = minimise(problem, start, unknowns, max_iterations)
     return Fit(**ended(problem.model, found), trials=problem.trials, noise=problem.noise)
 
 
@@ -302,17 +294,6 @@ def fit_multistart(
         return plain
     grown = fit_growing(problem, start, max_iterations)
     return grown if grown.sse < plain.sse or not np.isfinite(plain.sse) else plain
-
-
-def go_on(problem: Problem, fitted: Fit, max_iterations: int = MAX_ITERATIONS) -> Fit:
-    """Fit a problem from where a fit of the same model, to the same trials and perhaps more, has ended.
-
-    Under the same noise what that fit has linearized at its end is where this one begins.
-    """
-    at = {id(t): i for i, t in enumerate(fitted.trials)}
-    rows = [at[id(t)] for t in problem.trials]
-    known = [fitted.parts[i] for i in rows] if problem.noise == fitted.noise and problem.free == fitted.free else None
-    return fit_problem(problem, fitted.values, [fitted.unknowns[i] for i in rows], max_iterations, known)
 
 
 def ended(model: Model, found: Optimum) -> dict[str, Any]:

@@ -22,7 +22,7 @@ import numpy as np
 
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
-from fes_pin.identify.autoregressions import autoregressions, residual_powers, with_autoregressions
+from fes_pin.identify.autoregressions import autoregressions, residual_powers
 from fes_pin.identify.problem import limits_of, products_of
 from fes_pin.identify.process_noise import noise_limits, spread_of_start
 from fes_pin.infer.noise import ORDERS
@@ -139,10 +139,11 @@ class LikelihoodProblem(NoisyProblem):
         def in_batch(some: Sequence[tuple[Mapping[str, float], Unknowns, Doubt]]) -> list[list[ForetoldTrial]]:
             check_limit()
             filled = [*some, *[some[-1]] * (count - len(some))]
-            values, doubts = ([one[j] for one in filled for _ in range(trials)] for j in (0, 2))
+            repeated = [one for one in filled for _ in range(trials)]
+            values, noises = ([one[0] for one in repeated], [one[2] for one in repeated])
             own = [{**begin, **u} for one in filled for begin, u in zip(self.begins, one[1], strict=True)]
             with np.errstate(all="ignore"):
-                run = predictor.run(values, doubts, own)  # type: ignore[arg-type]
+                run = predictor.run(values, noises, own)
             return [run[j * trials : (j + 1) * trials] for j in range(len(some))]
 
         told = in_parallel(in_batch, [points[k : k + count] for k in range(0, len(points), count)])
@@ -206,29 +207,30 @@ class LikelihoodProblem(NoisyProblem):
         """Find again, in place, what noise foretells of itself; returns by how much that lowers the cost."""
         if not any(self.noise.ar.values()):
             return 0.0
-        run = self._runs([(values, unknowns, self.noise)])[0]
-        orders = {n: (len(ar),) for n, ar in self.noise.ar.items()}
-        found = {**self.noise.ar, **autoregressions(run, orders)}
-        before, after = (
-            sum(one.cost() for one in some) for some in (run, [with_autoregressions(one, found) for one in run])
-        )
-        if after < before:
-            self.noise = replace(self.noise, ar=found)
-        return max(before - after, 0.0)
-
-    def _simulated_noise_step(self, values: Mapping[str, float], unknowns: Unknowns) -> float:
-        """Set the noise of the readings, in place, to what a simulation leaves; returns by how much the cost falls."""
         (run,) = self._runs([(values, unknowns, self.noise)])
-        orders, limits = {n: (len(ar),) for n, ar in self.noise.ar.items()}, self.noise_limits
-        found = replace(self.noise, ar={**self.noise.ar, **autoregressions(run, orders)})
-        powers = residual_powers([with_noise(one, found) for one in run])
-        white = {n: found.white[n] * math.sqrt(power) for n, power in powers.items()}
-        found = found.with_values({f"white.{n}": float(np.clip(v, *limits[f"white.{n}"])) for n, v in white.items()})
+        return self._adopted(run, self._with_autoregressions(run))
+
+    def _with_autoregressions(self, run: Sequence[ForetoldTrial]) -> Doubt:
+        """The noise with autoregressions of its orders, found in what a run leaves."""
+        orders = {n: (len(ar),) for n, ar in self.noise.ar.items()}
+        return replace(self.noise, ar={**self.noise.ar, **autoregressions(run, orders)})
+
+    def _adopted(self, run: Sequence[ForetoldTrial], found: Doubt) -> float:
+        """Take another noise of the readings, in place, if a run costs less with it; returns by how much."""
         before, after = (sum(one.cost() for one in some) for some in (run, [with_noise(one, found) for one in run]))
         if not after < before:
             return 0.0
         self.noise = found
         return before - after
+
+    def _simulated_noise_step(self, values: Mapping[str, float], unknowns: Unknowns) -> float:
+        """Set the noise of the readings, in place, to what a simulation leaves; returns by how much the cost falls."""
+        (run,) = self._runs([(values, unknowns, self.noise)])
+        found, limits = self._with_autoregressions(run), self.noise_limits
+        powers = residual_powers([with_noise(one, found) for one in run])
+        white = {n: found.white[n] * math.sqrt(power) for n, power in powers.items()}
+        found = found.with_values({f"white.{n}": float(np.clip(v, *limits[f"white.{n}"])) for n, v in white.items()})
+        return self._adopted(run, found)
 
     def with_orders(self, values: Mapping[str, float], unknowns: Unknowns) -> Doubt:
         """What is random, with autoregressions of the orders that what the filter leaves shows."""

@@ -7,21 +7,17 @@ for the distribution of the largest of correlated statistics by simulation.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
-from fes_pin.infer.distributions import chi2_tail, f_tail
-from fes_pin.infer.levels import UNFELT
+from fes_pin.infer.distributions import chi2_tail
 
 DRAWS = 4000
 """Simulated score vectors; the 5 % quantile of the smallest p-value then has a standard error of 7 %."""
 
 SMALLEST_P = 1e-300
 """What a p-value that double precision cannot tell from 0 is given as."""
-
-MIN_UNITS = 8
-"""Units of evidence that coherence is judged on, at least."""
 
 
 class Family:
@@ -77,38 +73,6 @@ class SimulatedFamily:
         if gain <= 0.0:
             return 1.0
         return max(float(-np.expm1(-np.exp(-(gain - self.place) / self.scale))), SMALLEST_P)
-
-
-def coherence_p_value(few: Sequence[np.ndarray], many: Sequence[np.ndarray], gain: float, degrees: int) -> float:
-    """p-value of a gain against its spread between units, whatever the noise within each.
-
-    With x_i what the larger model adds to unit i and r_i what it leaves there, x_i' r_i / |x_i| has the variance phi
-    of the noise along x_i; gain / (degrees phi) is compared with Fisher's F.
-
-    Parameters
-    ----------
-    few, many
-        Whitened residuals of the smaller and of the larger model, by unit.
-    gain, degrees
-        Drop in the sum of their squares, and degrees of freedom that the larger model has more.
-    """
-    units = [
-        (float(x @ x), float(x @ r))
-        for less, more in zip(few, many, strict=True)
-        for x, r in _pieces(less - more, more, len(many), degrees)
-    ]
-    felt = [(size, along) for size, along in units if size > UNFELT * max(u[0] for u in units)]
-    free = len(felt) - degrees
-    if free < 1 or gain <= 0:
-        return 1.0
-    phi = sum(along**2 / size for size, along in felt) / free
-    return f_tail(gain / (degrees * max(phi, 1e-12)), degrees, free)
-
-
-def _pieces(added: np.ndarray, left: np.ndarray, units: int, degrees: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """A unit as one piece of evidence, or in several where there are few units for the degrees of freedom."""
-    count = max(1, -(-max(MIN_UNITS, 2 * degrees) // units))
-    return zip(np.array_split(added, count), np.array_split(left, count), strict=True)
 
 
 def _effective_tests(gram: np.ndarray, blocks: Sequence[slice], seed: int) -> float:

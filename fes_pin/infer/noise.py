@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -202,6 +202,45 @@ def _correlated(values: np.ndarray, stretch: np.ndarray) -> np.ndarray:
     if rest := count - full:
         np.matmul(stretch[:rest, : rest + p], values[full:], out=out[full:])
     return out
+
+
+def likeliest_autoregression(pieces: Sequence[np.ndarray], orders: Sequence[int]) -> tuple[float, ...]:
+    """The autoregression of several pieces, each of shape (n,), by Burg's method: of the order with the lowest price.
+
+    Such an autoregression is stationary, whatever the pieces.
+
+    Source: Burg, Maximum entropy spectral analysis, PhD thesis, Stanford 1975; Brockwell and Davis, Time Series: Theory
+    and Methods, 2nd ed., section 8.2.
+    """
+    count, least = sum(map(len, pieces)), math.inf
+    best: tuple[float, ...] = ()
+    for p, (ar, power) in enumerate(_burg(pieces, max(orders))):
+        cost = count * math.log(power) + PARAMETER_PRICE * p
+        if p in orders and cost < least:
+            best, least = ar, cost
+    return best
+
+
+def _burg(pieces: Sequence[np.ndarray], most: int) -> Iterator[tuple[tuple[float, ...], float]]:
+    """Autoregressions of every order up to the highest, and the power of the residual of each.
+
+    With f the residual of an order forwards and b backwards, the next has the last coefficient
+    2 sum f_t b_(t-1) / sum (f_t^2 + b_(t-1)^2), over all trials.
+    """
+    ar, power = np.zeros(0), float(np.sum([x @ x for x in pieces])) / max(sum(map(len, pieces)), 1)
+    ahead, back = list(pieces), list(pieces)
+    while math.isfinite(power) and power > 0.0:
+        yield tuple(float(a) for a in ar), power
+        if len(ar) == most:
+            return
+        ahead, back = [f[1:] for f in ahead], [b[:-1] for b in back]
+        both = sum(float(f @ f + b @ b) for f, b in zip(ahead, back, strict=True))
+        last = 2.0 * sum(float(f @ b) for f, b in zip(ahead, back, strict=True)) / max(both, 1e-300)
+        ahead, back = (
+            [f - last * b for f, b in zip(ahead, back, strict=True)],
+            [b - last * f for f, b in zip(ahead, back, strict=True)],
+        )
+        ar, power = np.append(ar - last * ar[::-1], last), power * (1.0 - last**2)
 
 
 NoiseModel = Mapping[str, Noise]

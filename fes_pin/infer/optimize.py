@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,17 +58,9 @@ class Descent:
         Value of every parameter.
     unknowns
         Of each trial; by default the problem's own first guess.
-    parts
-        The problem linearized at the start, where that is known already.
     """
 
-    def __init__(
-        self,
-        problem: Problem,
-        start: Mapping[str, float],
-        unknowns: Unknowns | None,
-        parts: Sequence[Linearized] | None = None,
-    ) -> None:
+    def __init__(self, problem: Problem, start: Mapping[str, float], unknowns: Unknowns | None) -> None:
         self.problem, self.names = problem, problem.free
         self.lower = np.array([problem.limits[n][0] for n in self.names])
         self.upper = np.array([problem.limits[n][1] for n in self.names])
@@ -77,9 +69,8 @@ class Descent:
         self.x = np.clip([start[n] for n in self.names], self.lower, self.upper)
         self.unknowns = completed(problem.start_unknowns(), unknowns)
         self.damping, self._gained = 1e-4, 0.0
-        known = parts is not None and all(start[n] == v for n, v in zip(self.names, self.x, strict=True))
         self._system: NormalEquations | None = None
-        self.parts = list(parts) if parts and known else self._linearize(self.x, self.unknowns)
+        self.parts = self._linearize(self.x, self.unknowns)
         self.sse = whitened_sse(self.parts)
 
     def _linearize(self, x: np.ndarray, unknowns: Unknowns) -> list[Linearized]:

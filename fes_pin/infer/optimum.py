@@ -106,7 +106,6 @@ def minimise(
     start: Mapping[str, float],
     unknowns: Unknowns | None = None,
     max_iterations: int = MAX_ITERATIONS,
-    parts: Sequence[Linearized] | None = None,
 ) -> Optimum:
     """Fit a problem from a start value of every parameter.
 
@@ -116,15 +115,13 @@ def minimise(
         Of each trial; by default the problem's own first guess.
     max_iterations
         Steps, at most.
-    parts
-        The problem linearized at the start, where that is known already.
 
     Returns
     -------
     Optimum
         Also if it did not converge: then `converged` is False.
     """
-    search = Descent(problem, start, unknowns, parts)
+    search = Descent(problem, start, unknowns)
     done = search.run(max_iterations)
     with np.errstate(all="ignore"):
         system = normal_equations(search.parts)

@@ -22,14 +22,13 @@ import numpy as np
 from scipy import optimize, special
 
 from fes_pin.infer.distributions import f_tail
-from fes_pin.infer.family import MIN_UNITS
-from fes_pin.infer.levels import UNUSUAL_LEVEL
+from fes_pin.infer.levels import UNFELT, UNUSUAL_LEVEL
 from fes_pin.infer.problem import Linearized
 
 FEWEST_TRIALS = 6
 """Trials that alone show how much repeats differ; of fewer each is cut into pieces, which know less of that."""
-UNFELT = 1e-4
-"""Share of the largest |x_i|^2 that a unit must have to say something of the spread."""
+MIN_UNITS = 8
+"""Units of evidence that the spread is judged on, at least."""
 FEWEST = 1e-3
 """Degrees of freedom of a variance, at least."""
 

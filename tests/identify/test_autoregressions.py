@@ -10,13 +10,14 @@ from scipy.signal import lfilter
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.log import Log
-from fes_pin.identify.autoregressions import autoregressions, with_autoregressions
+from fes_pin.identify.autoregressions import autoregressions
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.problem import Problem
 from fes_pin.identify.process_noise import first_guess, stilled
 from fes_pin.identify.stored import load_random, stored_tables
 from fes_pin.infer.noise import ORDERS, Noise
 from fes_pin.models.autoregression import innovations_of
+from fes_pin.models.free_run import with_noise
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.store import model_toml
 
@@ -61,8 +62,9 @@ def test_how_what_is_left_foretells_itself_is_found(study, ar, order):
     (found,) = autoregressions(left, {"angle_rad": ORDERS}).values()
     assert len(found) >= order
     assert found == pytest.approx((*ar, *[0.0] * (len(found) - order)), abs=0.06)
-    white = [with_autoregressions(one, {}) for one in left]
-    lasting = [with_autoregressions(one, {"angle_rad": found}) for one in left]
+    white, lasting = (
+        [with_noise(one, replace(problem.noise, ar=ar)) for one in left] for ar in ({}, {"angle_rad": found})
+    )
     gained = sum(one.cost() for one in white) - sum(one.cost() for one in lasting)
     assert gained > 1000.0 if order else 0.0 <= gained < 10.0
 

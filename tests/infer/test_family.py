@@ -1,10 +1,10 @@
-"""Error rates: the family of tests, and coherence between units."""
+"""Error rates of the family of tests."""
 
 import numpy as np
 import pytest
 import scipy.stats
 
-from fes_pin.infer.family import Family, SimulatedFamily, coherence_p_value
+from fes_pin.infer.family import Family, SimulatedFamily
 
 
 @pytest.mark.parametrize("correlation", [0.0, 0.6, 0.95])
@@ -46,18 +46,3 @@ def test_a_family_that_is_simulated_alarms_at_its_level():
         assert 0.7 * level < np.mean(p_values < level) < 1.4 * level
     assert families[0].p_value(0.0) == families[0].p_value(-3.0) == 1.0
     assert 0.0 < families[0].p_value(1e9) < 1e-12
-
-
-def test_coherence_is_uniform_under_the_null():
-    """A direction in every unit, noise of unknown size: F-distributed, so that p-values are uniform."""
-    rng = np.random.default_rng(2)
-    p_values = []
-    for _ in range(300):
-        size = rng.uniform(0.5, 3.0)
-        directions = [rng.standard_normal(60) for _ in range(8)]
-        few = [size * rng.standard_normal(60) for _ in range(8)]
-        along = sum(x @ e for x, e in zip(directions, few, strict=True)) / sum(x @ x for x in directions)
-        many = [e - along * x for x, e in zip(directions, few, strict=True)]
-        gain = sum(float(e @ e) for e in few) - sum(float(e @ e) for e in many)
-        p_values.append(coherence_p_value(few, many, gain, 1))
-    assert scipy.stats.kstest(p_values, "uniform").pvalue > 1e-3
