@@ -8,10 +8,7 @@ import numpy as np
 
 from fes_pin.contrasts.grouped import Grouped
 from fes_pin.contrasts.models import ContrastModels
-from fes_pin.diagnosis.remainder.driven import driven_remainder
-from fes_pin.diagnosis.remainder.open_set import unexplained_remainder
-from fes_pin.identify.fit import Fit
-from fes_pin.identify.likelihood_fit import LikelihoodFit
+from fes_pin.diagnosis.remainder.lack_of_fit import lack_of_fit
 from fes_pin.infer.levels import CLAIM_LEVEL
 from fes_pin.infer.result import Remainder
 from fes_pin.workers import in_parallel
@@ -20,7 +17,7 @@ from fes_pin.workers import in_parallel
 def left_in_groups(models: ContrastModels, best: Grouped, seed: int) -> tuple[Remainder, list[str]]:
     """Lack of fit in some groups alone; where all groups have one it is an error of the model, and is reported."""
     parts = in_parallel(lambda g: models.maxima.part(best, g), list(models.trials))
-    each = dict(zip(models.trials, in_parallel(lambda f: _left_by(f, seed), parts), strict=True))
+    each = dict(zip(models.trials, in_parallel(lambda f: lack_of_fit(f, seed), parts), strict=True))
     each = {g: _in_single_trials(models, best, g, r, seed) if r.unexplained else r for g, r in each.items()}
     least = min(each.values(), key=lambda r: r.p_value)
     open_ = [g for g, r in each.items() if r.unexplained]
@@ -33,16 +30,11 @@ def left_in_groups(models: ContrastModels, best: Grouped, seed: int) -> tuple[Re
     return Remainder(True, p, least.where), [f"lack of fit in the group {g}" for g in open_]
 
 
-def _left_by(fitted: Fit, seed: int) -> Remainder:
-    """What a fit of one group leaves."""
-    return driven_remainder(fitted, seed) if isinstance(fitted, LikelihoodFit) else unexplained_remainder(fitted, seed)
-
-
 def _in_single_trials(models: ContrastModels, best: Grouped, group: str, left: Remainder, seed: int) -> Remainder:
     """Lack of fit of a group, if half of its trials have one with nominal values of their own.
 
     Trials whose strength or friction differs, of whatever group, have a lack of fit by values that they share.
     """
     alone = in_parallel(lambda k: models.maxima.part(best, group, k), range(len(models.trials[group])))
-    p = min(1.0, 2.0 * float(np.median([_left_by(one, seed).p_value for one in alone])))
+    p = min(1.0, 2.0 * float(np.median([lack_of_fit(one, seed).p_value for one in alone])))
     return replace(left, unexplained=p < CLAIM_LEVEL, p_value=max(left.p_value, p))

@@ -14,7 +14,7 @@ from fes_pin.diagnosis.errors_ahead import errors_ahead, free_errors
 from fes_pin.diagnosis.held_out import afresh, folds_of
 from fes_pin.diagnosis.misread import NAME, Misread, find_misread, restated_trials
 from fes_pin.diagnosis.parts import in_parts
-from fes_pin.diagnosis.remainder.driven import driven_remainder
+from fes_pin.diagnosis.remainder.lack_of_fit import lack_of_fit
 from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodSearch
 from fes_pin.identify.fit import fit_multistart, rough_noise
@@ -48,7 +48,7 @@ class StudyConditions(Conditions[LikelihoodSearch, Found]):
 
     def is_explained(self, made: Made) -> bool:
         """Whether no test finds a lack of fit in the restated trials."""
-        return not driven_remainder(made.searched.best).unexplained
+        return not lack_of_fit(made.searched.best).unexplained
 
     def saved(self, searched: Found, trials: Sequence[Trial], made: Made) -> float:
         """By how much the price falls."""

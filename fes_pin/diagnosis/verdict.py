@@ -40,7 +40,7 @@ from fes_pin.diagnosis.held_out import (
     with_choices,
 )
 from fes_pin.diagnosis.refused import UNMOVED, is_moved_by_what_is_recorded, no_noise, with_refused_causes
-from fes_pin.diagnosis.remainder.driven import driven_remainder
+from fes_pin.diagnosis.remainder.lack_of_fit import lack_of_fit
 from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.diagnosis.search.cause_sets import names_of
 from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodModels, LikelihoodSearch
@@ -107,7 +107,7 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
         return RigWeighed(
             gains=gains_of(within, found.without, self.models.judged_s, self.seed),
             evidence=evidence_of(folds, found, self._alike) if folds else {},
-            lack_of_fit=driven_remainder(found.best, self.seed),
+            lack_of_fit=lack_of_fit(found.best, self.seed),
             folds=folds,
             random=random_parts(found.best),
             no_noise=no_noise(found.best),

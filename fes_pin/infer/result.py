@@ -234,18 +234,11 @@ class Evidence:
 
 @dataclass(frozen=True)
 class Remainder:
-    """Lack of fit: whether residuals of the model are more than noise, its p-value, and where they are largest.
-
-    Attributes
-    ----------
-    excess
-        By how much the statistic exceeds its 97.5 % quantile.
-    """
+    """Lack of fit: whether residuals of the model are more than noise, its p-value, and where they are largest."""
 
     unexplained: bool
     p_value: float
     where: str | None
-    excess: float = 0.0
 
     def record(self) -> dict[str, Any]:
         """As JSON files have it."""

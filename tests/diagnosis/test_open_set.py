@@ -2,6 +2,7 @@
 
 import math
 from types import SimpleNamespace
+from unittest.mock import MagicMock
 
 import numpy as np
 import oracle.rigs
@@ -11,12 +12,13 @@ from diagnosis.hidden import study_of
 from identify.rigs import trials_of
 
 from fes_pin.data.trial import Trial
+from fes_pin.diagnosis.remainder import lack_of_fit as tests_of_fit
 from fes_pin.diagnosis.remainder import open_set
 from fes_pin.diagnosis.remainder.bursts import burst_p_value
 from fes_pin.diagnosis.remainder.heteroscedastic import heteroscedastic_p_value
 from fes_pin.diagnosis.remainder.innovations import Innovations, channels, under_own_noise
+from fes_pin.diagnosis.remainder.lack_of_fit import lack_of_fit
 from fes_pin.diagnosis.remainder.lines import line_p_value
-from fes_pin.diagnosis.remainder.open_set import unexplained_remainder
 from fes_pin.diagnosis.remainder.play import play_p_value
 from fes_pin.diagnosis.remainder.repeated import repeated_p_value
 from fes_pin.diagnosis.remainder.slips import slip_p_value
@@ -24,10 +26,9 @@ from fes_pin.identify.fit import fit
 from fes_pin.infer.levels import CLAIM_LEVEL, FULL_NOISE
 from fes_pin.infer.noise import Noise, estimate_noise
 from fes_pin.infer.projection import Projection
-from fes_pin.models.model import Model
+from fes_pin.infer.result import Remainder
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.predict import predict
-from fes_pin.models.rigs import Joint
 
 DT = 0.005
 WHITE = Noise(1.0, (), 1.0)
@@ -36,7 +37,7 @@ TREMBLING = Noise(1.0, (1.6, -0.64), 5.0)
 
 
 def left_in(study):
-    return unexplained_remainder(fit(nominal_model(study), study.trials))
+    return lack_of_fit(fit(nominal_model(study), study.trials))
 
 
 def forces(rng, bend=lambda t, force: force, colour=0.0):
@@ -62,7 +63,7 @@ def test_nothing_is_left_of_noise(rig, noise):
 def test_nothing_is_left_of_a_muscles_noise(colour):
     """At a level of 1 %, 2 of 6 have a probability of 1.5e-3."""
     rng = np.random.default_rng(41)
-    assert sum(unexplained_remainder(forces(rng, colour=colour)).unexplained for _ in range(6)) <= 1
+    assert sum(lack_of_fit(forces(rng, colour=colour)).unexplained for _ in range(6)) <= 1
 
 
 def test_eight_tests_together_keep_the_level(monkeypatch):
@@ -77,12 +78,11 @@ def test_eight_tests_together_keep_the_level(monkeypatch):
     monkeypatch.setattr(open_set, "Projection", lambda _: None)
     monkeypatch.setattr(open_set, "under_own_noise", lambda *_: SimpleNamespace(parts=()))
 
-    def smooth(*_):
-        p_value = rng.uniform()
-        return open_set.Remainder(p_value < CLAIM_LEVEL, p_value, "phase")
-
-    monkeypatch.setattr(open_set, "smooth_remainder", smooth)
-    share = np.mean([unexplained_remainder(None).unexplained for _ in range(20_000)])
+    monkeypatch.setattr(tests_of_fit, "LikelihoodFits", MagicMock())
+    monkeypatch.setattr(tests_of_fit, "level_of", lambda _: CLAIM_LEVEL)
+    monkeypatch.setattr(tests_of_fit, "_features_left", lambda *_: Remainder(False, rng.uniform(), "phase"))
+    fitted = SimpleNamespace(model=None, trials=(), sse=1.0)
+    share = np.mean([lack_of_fit(fitted).unexplained for _ in range(20_000)])
     assert share == pytest.approx(CLAIM_LEVEL, abs=0.002)
 
 
@@ -132,9 +132,7 @@ def test_what_comes_again_in_every_trial_is_told_by_how_trials_differ():
 def test_a_strength_that_wanders_is_larger_while_the_muscle_is_active():
     """Of each trial's own phase, so that no feature is coherent."""
     rng = np.random.default_rng(53)
-    left = unexplained_remainder(
-        forces(rng, lambda t, f: f * (1.0 + 0.03 * np.sin(2.5 * t + rng.uniform(0.0, 7.0))), colour=0.6)
-    )
+    left = lack_of_fit(forces(rng, lambda t, f: f * (1.0 + 0.03 * np.sin(2.5 * t + rng.uniform(0.0, 7.0))), colour=0.6))
     assert left.unexplained, left
 
 
@@ -162,23 +160,19 @@ def test_humps_at_random_times_are_bursts(noise):
 def test_ripple_of_the_force_goes_with_the_stimulus(hz):
     """0.06 N on a noise of 0.2 N: d = 15."""
     rng = np.random.default_rng(45)
-    left = unexplained_remainder(
-        forces(rng, lambda t, f: f + 0.06 * f / np.abs(f).mean() * np.sin(2.0 * math.pi * hz * t))
-    )
+    left = lack_of_fit(forces(rng, lambda t, f: f + 0.06 * f / np.abs(f).mean() * np.sin(2.0 * math.pi * hz * t)))
     assert left.unexplained and left.where == "stimulus", left
 
 
 def test_a_line_of_any_phase_is_a_matter_of_time():
     rng = np.random.default_rng(46)
-    left = unexplained_remainder(
-        forces(rng, lambda t, f: f + 0.08 * np.sin(2.0 * math.pi * 31.0 * t + rng.uniform(0.0, 7.0)))
-    )
+    left = lack_of_fit(forces(rng, lambda t, f: f + 0.08 * np.sin(2.0 * math.pi * 31.0 * t + rng.uniform(0.0, 7.0))))
     assert left.unexplained and left.where == "time", left
 
 
 def test_a_sensor_that_slips_is_seen():
     rng = np.random.default_rng(47)
-    left = unexplained_remainder(forces(rng, lambda t, f: f + 0.5 * (t - t[0] > rng.uniform(1.0, 4.0))))
+    left = lack_of_fit(forces(rng, lambda t, f: f + 0.5 * (t - t[0] > rng.uniform(1.0, 4.0))))
     assert left.unexplained, left
 
 
@@ -260,12 +254,3 @@ def test_a_trial_of_which_noise_of_a_long_order_leaves_nothing_has_no_lines():
     time = np.arange(8) * DT
     trial = Trial("short", "motion", {"effort": np.ones(8), "position": time}, time)
     assert line_p_value([Innovations(trial, np.empty(0), DT, ("effort",))]) == (1.0, "time")
-
-
-def test_of_a_simulation_that_runs_away_features_are_those_of_the_measured_motion():
-    time = np.arange(400) * DT
-    trial = Trial("wild", "motion", {"effort": np.sin(3.0 * time), "position": np.sin(2.0 * time)}, time)
-    slide = Joint(constants={"inertia": 1.0, "gravity_cos": 0.0, "gravity_sin": 0.0, "revolute": 0.0}, damping=1e8)
-    made = open_set.features(Model(slide), [trial], {"position": WHITE})
-    assert np.isfinite(made.columns).all()
-    assert made.columns.any(axis=0).all()

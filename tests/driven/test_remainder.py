@@ -5,7 +5,7 @@ from driven.linear_play import LinearPlay
 from driven_rigs.draw import draw
 
 from fes_pin.data.study import read_study
-from fes_pin.diagnosis.remainder import driven
+from fes_pin.diagnosis.remainder import lack_of_fit
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import fit_of
 from fes_pin.infer.optimum import minimise
@@ -19,7 +19,7 @@ BESIDE = (0.99, 1.0, 1.01)
 """Random efforts about that: the likelihood jumps by some 500 between them, and a fit ends where it is high."""
 
 
-class Promised(driven._Featured):
+class Promised(lack_of_fit._Featured):
     """Features that count as slopes promise them."""
 
     def __init__(self, fitted):
@@ -38,10 +38,10 @@ def beside_a_play(tmp_path_factory):
 
 
 def test_slopes_promise_that_something_is_left(beside_a_play, monkeypatch):
-    monkeypatch.setattr(driven, "_Featured", Promised)
-    found = driven.driven_remainder(beside_a_play)
+    monkeypatch.setattr(lack_of_fit, "_Featured", Promised)
+    found = lack_of_fit.lack_of_fit(beside_a_play)
     assert found.unexplained and found.p_value < 1e-10, found
 
 
 def test_a_promise_counts_as_far_as_the_likelihood_keeps_it(beside_a_play):
-    assert not driven.driven_remainder(beside_a_play).unexplained
+    assert not lack_of_fit.lack_of_fit(beside_a_play).unexplained

@@ -18,6 +18,7 @@ from fes_pin.diagnosis.search.likelihood_screen import LikelihoodScreen
 from fes_pin.diagnosis.search.possible import is_possible
 from fes_pin.diagnosis.search.score import Scored, best_by_effect, best_pairs
 from fes_pin.diagnosis.search.starts import STARTS, from_afar, refinements, started
+from fes_pin.identify.fit import Fit
 from fes_pin.identify.lasting import with_new_noise
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit
@@ -135,6 +136,12 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
             found = in_parallel(lambda d: self._maxima.from_start(calm.model, d), begun)
             return self._with_orders(min(found, key=lambda f: f.sse))
         return self._with_orders(self._maxima.from_start(calm.model, self._maxima.likeliest(calm, begun)))
+
+    def by_likelihood(self, fitted: Fit) -> LikelihoodFit:
+        """A fit by simulation again, by the likelihood; with process noise, if that improves the penalised one."""
+        white = replace(first_guess(fitted.model, self.trials), std={}, time={})
+        calm = self._with_orders(self._maxima.from_start(fitted.model, white, fitted.unknowns))
+        return min(calm, self.with_process_noise(calm), key=lambda f: f.price)
 
     def _with_orders(self, fitted: LikelihoodFit) -> LikelihoodFit:
         """A fit again, with autoregressions of the orders that what its filter leaves shows."""

@@ -10,7 +10,7 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.decide.significance import level_of
 from fes_pin.diagnosis.errors_ahead import are_large, random_parts
 from fes_pin.diagnosis.held_out import Fold, Found, gains_of
-from fes_pin.diagnosis.remainder.driven import driven_remainder
+from fes_pin.diagnosis.remainder.lack_of_fit import lack_of_fit
 from fes_pin.diagnosis.search.cause_sets import Names
 from fes_pin.diagnosis.search.likelihood_fits import MEASUREMENT, PROCESS, WHITE, LikelihoodFits
 from fes_pin.diagnosis.search.score import Scored
@@ -135,7 +135,7 @@ class LikelihoodModels(LikelihoodFits):
 
     def leaves_noise(self, fitted: LikelihoodFit) -> bool:
         """Whether a fit has no lack of fit, and its random effort is small."""
-        return not (are_large(random_parts(fitted)) or driven_remainder(fitted, self.seed).unexplained)
+        return not (are_large(random_parts(fitted)) or lack_of_fit(fitted, self.seed).unexplained)
 
     def better_form(self, fitted: LikelihoodFit) -> LikelihoodFit | None:
         """A set with one refinement of a form fewer, one more, or all begun again, where that is better.

@@ -1,12 +1,13 @@
-"""What is left beside a model in which the rig is driven at random: efforts and readings that follow its own state.
+"""Lack of fit: whether a fit by the likelihood leaves more than noise, and what that depends on.
 
 The innovations of the predictor are white where the model is right. Some forty functions of state, input and time, each
-as an effort at the joint (or a force), and some as a part of the reading, are scored against them beside everything
-that was fitted. The random effort that was found is part of the model: what is left must stand out of it.
+as an effort at the joint (or a force), and some as a part of the reading, are scored against them together with
+everything that was fitted. The process noise that was found is part of the model: a lack of fit must exceed it.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import replace
 from typing import Any
@@ -14,8 +15,9 @@ from typing import Any
 import numpy as np
 
 from fes_pin.diagnosis.decide.significance import level_of
-from fes_pin.diagnosis.remainder.open_set import KEPT, beside_smooth, inflation_by_signs, trial_shares
-from fes_pin.identify.fit import fit
+from fes_pin.diagnosis.remainder.open_set import residual_tests
+from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
+from fes_pin.identify.fit import Fit, fit
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.problem import limits_of
@@ -28,22 +30,32 @@ from fes_pin.models.stage import Effect
 
 TRIED = (1.0, 0.5, 0.25, 0.1)
 """Shares of the step to where slopes promise the most at which the cost is looked at."""
+KEPT = 1e-3
+"""Share of its norm that a feature must keep, once what was fitted is projected off."""
+FEWEST_SIGNS = 4
+"""Trials whose signs are drawn, at least."""
+SIGN_DRAWS = 400
+"""Random signs of trials that a statistic's inflation is averaged over."""
 
 
-def driven_remainder(fitted: LikelihoodFit, seed: int = 0) -> Remainder:
-    """Test whether a fit by the likelihood leaves anything but noise.
+def lack_of_fit(fitted: Fit, seed: int = 0) -> Remainder:
+    """Test whether a fit leaves anything but noise; one by simulation is first fitted by the likelihood as well.
 
-    A rig that begins at rest can be simulated freely as well: what the same causes leave then is tested as elsewhere,
-    see `remainder.open_set`, for a random effort would take bursts, detents and slips. The p-value is that of the most
-    significant of the tests, times their number.
+    Where measurement noise may be autoregressive the rig is simulated freely as well, and the residuals of that are
+    tested, see `remainder.open_set`: a random effort would take bursts, detents and slips. The p-value is that of the
+    most significant of the tests, times their number.
     """
-    featured = _features_left(fitted, seed)
-    free = fit(fitted.model, fitted.trials) if fitted.noise.ar else None
-    others = beside_smooth(free, seed) if free is not None and math.isfinite(free.sse) else []
+    if isinstance(fitted, LikelihoodFit):
+        likeliest, free = fitted, fit(fitted.model, fitted.trials) if fitted.noise.ar else None
+    else:
+        likeliest = LikelihoodFits(fitted.model, fitted.trials, (), answered=False).by_likelihood(fitted)
+        free = fitted
+    featured = _features_left(likeliest, seed)
+    others = residual_tests(free, seed) if free is not None and math.isfinite(free.sse) else []
     found = [(featured.p_value, featured.where), *others]
     p_value, where = min(found, key=lambda f: f[0])
     p_value = min(1.0, len(found) * p_value)
-    unexplained = p_value < level_of(fitted)
+    unexplained = p_value < level_of(likeliest)
     return Remainder(unexplained, p_value, where if unexplained else None)
 
 
@@ -64,12 +76,12 @@ def _features_left(fitted: LikelihoodFit, seed: int) -> Remainder:
     if not len(good):
         return Remainder(False, 1.0, None)
     left = left[:, good] / after[good]
-    by_trial = trial_shares(left, projection.residual, fitted)
+    by_trial = _trial_shares(left, projection.residual, fitted)
     values, vectors = np.linalg.eigh(left.T @ left)
     kept = values > UNFELT * values.max()
     shares = by_trial @ vectors[:, kept] / np.sqrt(values[kept])
     rank, statistic = int(kept.sum()), float(np.sum(shares.sum(axis=0) ** 2))
-    inflation = inflation_by_signs(shares, rank, seed)
+    inflation = _inflation_by_signs(shares, rank, seed)
     single = by_trial.sum(axis=0)
     best = int(np.argmax(np.abs(single)))
 
@@ -84,6 +96,20 @@ def _features_left(fitted: LikelihoodFit, seed: int) -> Remainder:
         together[good] = vectors[:, kept] @ (shares.sum(axis=0) / np.sqrt(values[kept])) / after[good]
         p = max(p, p_value(featured.gained(together), featured.gained(alone)))
     return Remainder(p < level_of(fitted), p, featured.names[good[best]].split(":")[0])
+
+
+def _trial_shares(columns: np.ndarray, residual: np.ndarray, fitted: LikelihoodFit) -> np.ndarray:
+    """Each trial's part of the inner products of columns and residual, shape (trials, columns)."""
+    ends = np.cumsum([0, *(len(p.residual) for p in fitted.parts)])
+    return np.array([columns[a:b].T @ residual[a:b] for a, b in itertools.pairwise(ends)])
+
+
+def _inflation_by_signs(shares: np.ndarray, rank: int, seed: int) -> float:
+    """How much larger than its rank the statistic is with random signs of the trials; 1 with fewer than 4 trials."""
+    if len(shares) < FEWEST_SIGNS or not rank:
+        return 1.0
+    signs = np.random.default_rng(seed).choice((-1.0, 1.0), size=(SIGN_DRAWS, len(shares)))
+    return max(1.0, float(np.mean(np.sum((signs @ shares) ** 2, axis=1))) / rank)
 
 
 class _Featured:
