@@ -12,7 +12,7 @@ from fes_pin.models.stage import Bounds, Effect, Measured, Stage, parameter
 
 @dataclass(frozen=True)
 class EffortOffset(Effect):
-    """A constant effort added to the commanded one.
+    """A constant effort beside the commanded one.
 
         effort + offset
 
