@@ -60,11 +60,6 @@ class MeasuredWalk:
             object.__setattr__(self, name, NamedArray(getattr(self, name), JOINT_NAMES))
 
     @property
-    def known_joints(self) -> tuple[str, ...]:
-        """Names of the joints whose torque is known."""
-        return tuple(name for name, known in zip(JOINT_NAMES, self.known, strict=True) if known)
-
-    @property
     def rates(self) -> NamedArray:
         """Joint rates, (samples, 19) rad/s by joint name."""
         return NamedArray(np.gradient(np.asarray(self.q), self.time, axis=0), JOINT_NAMES)
