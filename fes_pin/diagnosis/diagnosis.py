@@ -136,7 +136,7 @@ class _Work:
             recorded, log = found, with_timing_of(found.log, late.log)
             found = likelier(self._logged(study, log), recorded)
             late = None if found is recorded else late
-        return with_words(faults.with_doubt_of_timing(found, late))
+        return with_words(faults.with_timing(found, late))
 
     def _logged(self, study: Study, log: Log) -> Diagnosis:
         """The diagnosis of a study with what a log did to its trials undone."""

@@ -11,10 +11,9 @@ import numpy as np
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.identify.ahead import falls
-from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit
-from fes_pin.identify.problem import Problem, measured_columns
+from fes_pin.identify.problem import measured_columns
 from fes_pin.infer.covariance import least_squares_step
 from fes_pin.infer.levels import SEPARABLE, SURE
 from fes_pin.infer.problem import Linearized, NormalEquations, normal_equations
@@ -116,7 +115,9 @@ class Discrimination:
         return next((n for n in range(1, MOST_REPEATS + 1) if self.margin(n) >= SEPARABLE), None)
 
 
-def next_experiment(best: Fit, rivals: Mapping[str, Fit], name: str, study: Study) -> NextExperiment:
+def next_experiment(
+    best: LikelihoodFit, rivals: Mapping[str, LikelihoodFit], name: str, study: Study
+) -> NextExperiment:
     """The feasible trial on which a model differs most from its rivals, each after it has been fitted to it too.
 
     Either of two may be the wrong one: trials are compared by the smaller separation, and by that of the closest rival.
@@ -131,7 +132,7 @@ def next_experiment(best: Fit, rivals: Mapping[str, Fit], name: str, study: Stud
     study
         What the rig is and has been run under.
     """
-    if isinstance(best, LikelihoodFit) and falls(best.model, best.trials):
+    if falls(best.model, best.trials):
         pair = (name, next(iter(rivals)))
         why = f"{' and '.join(pair)}: the rig falls unless its controller holds it, and no effort is proposed"
         return NextExperiment(f"{why}; move it further, or another way, and diagnose again", pair, None)
@@ -160,14 +161,16 @@ def _often(repeats: int | None) -> str:
     return f"{'once decides' if repeats == 1 else f'{repeats} repeats decide'} 95 times in 100"
 
 
-def discriminations(best: Fit, rival: Fit, trials: Sequence[Trial], study: Study) -> list[Discrimination | None]:
+def discriminations(
+    best: LikelihoodFit, rival: LikelihoodFit, trials: Sequence[Trial], study: Study
+) -> list[Discrimination | None]:
     """What each trial tells of the two; None for one that leaves what the study has measured, or is not finite."""
     own = {n: v for n, v in best.unknowns[0].items() if n in best.model.own_unknowns()}
     begin = [{**best.model.initial_unknowns(t), **own} for t in trials]
-    measured, driven = [], isinstance(best, LikelihoodFit)
+    measured = []
     for trial, one in zip(trials, Simulator(best.model, trials).run(best.values, begin), strict=True):
         names = best.model.rig.outputs(trial.kind)
-        read = {n: one.readings[:, k] for k, n in enumerate(names) if not driven or n in best.noise}
+        read = {n: one.readings[:, k] for k, n in enumerate(names) if n in best.noise}
         measured.append(trial.with_columns(**read))
     ranges = _ranges(measured_columns(best.model, study.trials))
     kept = [all(_inside(t[n], r) for n, r in ranges.items() if n in t) for t in measured]
@@ -175,20 +178,16 @@ def discriminations(best: Fit, rival: Fit, trials: Sequence[Trial], study: Study
     if not inside:
         return [None] * len(trials)
     begin = [u for u, keep in zip(begin, kept, strict=True) if keep]
-    if_best = _problem(rival, inside, best).linearize(rival.values, [rival.model.initial_unknowns(t) for t in inside])
-    slopes = _problem(best, inside, best).linearize(best.values, begin)
+    there = [rival.model.initial_unknowns(t) for t in inside]
+    if_best, slopes = (
+        LikelihoodProblem(one.model, inside, best.noise, one.free).linearize(one.values, start)
+        for one, start in ((rival, there), (best, begin))
+    )
     if_rival = [Linearized(-r.residual, b.jacobian, b.local) for r, b in zip(if_best, slopes, strict=True)]
     known = (normal_equations(rival.parts).hessian, normal_equations(best.parts).hessian)
     lead = rival.price - best.price
     found = iter(zip(if_best, if_rival, strict=True))
     return [Discrimination(lead, _equations(*next(found)), known) if keep else None for keep in kept]
-
-
-def _problem(fitted: Fit, trials: Sequence[Trial], judge: Fit) -> Problem | LikelihoodProblem:
-    """A fit's model on other trials, under the noise, or all that is random, of the fit that judges."""
-    if isinstance(judge, LikelihoodFit):
-        return LikelihoodProblem(fitted.model, trials, judge.noise, fitted.free)
-    return Problem(fitted.model, trials, judge.noise, fitted.free)
 
 
 def _equations(one: Linearized, other: Linearized) -> tuple[NormalEquations, NormalEquations]:
@@ -208,7 +207,9 @@ def _inside(values: np.ndarray, limits: tuple[float, float]) -> bool:
 BestTrial = tuple[dict[str, Discrimination], Trial]
 
 
-def _best(best: Fit, rivals: Mapping[str, Fit], trials: Sequence[Trial], study: Study) -> BestTrial | None:
+def _best(
+    best: LikelihoodFit, rivals: Mapping[str, LikelihoodFit], trials: Sequence[Trial], study: Study
+) -> BestTrial | None:
     """The trial that separates the closest rival best, and what it tells of each."""
     each = {n: discriminations(best, rival, trials, study) for n, rival in rivals.items()}
     found: list[BestTrial] = []
@@ -223,7 +224,7 @@ def _worth(found: BestTrial) -> float:
     return min(p.worth for p in found[0].values())
 
 
-def _refined(best: Fit, rivals: Mapping[str, Fit], found: BestTrial, study: Study) -> BestTrial:
+def _refined(best: LikelihoodFit, rivals: Mapping[str, LikelihoodFit], found: BestTrial, study: Study) -> BestTrial:
     """The trial with stretches of its stimulus held at other levels, where that separates better."""
     rng = np.random.default_rng(7)
     column = rig_of(study).steered(study)

@@ -24,7 +24,6 @@ from fes_pin.identify.effort_timing import (
     with_timing_of_readings,
     words_of_lateness,
 )
-from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood_fit import LikelihoodFit, beside_fresh_efforts, maximum_from
 from fes_pin.infer.levels import PARAMETER_PRICE
 from fes_pin.models.model import Model
@@ -61,8 +60,6 @@ class LogFaults:
     def noise_beside(self, diagnosis: Diagnosis) -> float:
         """The same beside a diagnosis; what was taken out for it is put back where efforts are likelier with it."""
         fitted, known = diagnosis.extended, diagnosis.log.effort_noise
-        if not isinstance(fitted, LikelihoodFit):
-            return known
         if known:
             return known * self._told(lambda: float(fitted.sse < self._as_recorded(fitted).sse), 1.0)
         return self._told(lambda: self._noise(fitted), 0.0) if diagnosis.verdict != "adequate" else 0.0
@@ -84,8 +81,6 @@ class LogFaults:
 
     def _lateness(self, diagnosis: Diagnosis) -> Lateness | None:
         nominal, extended = diagnosis.nominal, diagnosis.extended
-        if not (isinstance(nominal, LikelihoodFit) and isinstance(extended, LikelihoodFit)):
-            return None
         row_s = min(t.dt for t in extended.trials)
         as_logged = round(row_s / min(t.dt for t in self.trials)) == 1
         late = lateness_of(extended, row_s, as_logged)
@@ -96,7 +91,7 @@ class LogFaults:
                 late = late if price < extended.price else None
         return late
 
-    def with_doubt_of_timing(self, diagnosis: Diagnosis, late: Lateness | None) -> Diagnosis:
+    def with_timing(self, diagnosis: Diagnosis, late: Lateness | None) -> Diagnosis:
         """The diagnosis with intervals that hold what is not known of when a reading was taken, and an effort acted.
 
         Parameters
@@ -105,8 +100,6 @@ class LogFaults:
             How late the efforts are, if they were moved.
         """
         row_s, fitted = min(t.dt for t in self.trials), diagnosis.extended
-        if not isinstance(fitted, LikelihoodFit):
-            return diagnosis
 
         def doubted(wide: LikelihoodFit, timed: Log) -> LikelihoodFit:
             log = with_timing_of(diagnosis.log, timed)
@@ -148,21 +141,19 @@ def with_words(diagnosis: Diagnosis) -> Diagnosis:
     return replace(diagnosis, warnings=(*said, *diagnosis.warnings))
 
 
-def _is_likelier(one: Fit, other: Fit) -> bool:
+def _is_likelier(one: LikelihoodFit, other: LikelihoodFit) -> bool:
     """True if the same readings are foretold better for as many parameters: those that are news to both.
 
     Beside random efforts that are new in every sample where those of one are.
     """
-    both = [f.noise for f in (one, other) if isinstance(f, LikelihoodFit)]
-    lasts_s, timed = max(d.lasts_s for d in both), any(d.timed for d in both)
+    both = one.noise, other.noise
+    lasts_s, timed = max(n.lasts_s for n in both), any(n.timed for n in both)
     first, second = (_as_random(f, lasts_s, timed) for f in (one, other))
     return first.price < second.price
 
 
-def _as_random(fitted: Fit, lasts_s: float, timed: bool) -> Fit:
+def _as_random(fitted: LikelihoodFit, lasts_s: float, timed: bool) -> LikelihoodFit:
     """The fit to readings so far apart, and beside random efforts that are new in every one if these are to be."""
-    if not isinstance(fitted, LikelihoodFit):
-        return fitted
     if fitted.noise.lasts_s != lasts_s:
         fitted = maximum_from(fitted, fitted.trials, replace(fitted.noise, lasts_s=lasts_s))
     return beside_fresh_efforts(fitted) if timed and not fitted.noise.timed else fitted

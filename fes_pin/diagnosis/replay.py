@@ -11,7 +11,6 @@ from fes_pin.data.trial import Trial, derived_trial
 from fes_pin.diagnosis.errors_ahead import AheadErrors
 from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.identify.ahead import over_horizon
-from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.per_trial import predictions
 from fes_pin.infer.held_out import percent_of_spread, within
@@ -71,13 +70,15 @@ def replayed_trials(diagnosis: Diagnosis) -> tuple[Replay, ...]:
     return tuple(made)
 
 
-def _predicted(fitted: Fit, trials: Sequence[Trial], noise: NoiseModel, ahead: AheadErrors | None) -> list[Trial]:
+def _predicted(
+    fitted: LikelihoodFit, trials: Sequence[Trial], noise: NoiseModel, ahead: AheadErrors | None
+) -> list[Trial]:
     """Trials as predicted from their inputs; where the effort answers the reading, over the horizon.
 
     A free simulation of such a rig integrates its errors, or falls: it says little of the model, or nothing.
     """
     model, out = fitted.model, []
-    if ahead is not None and isinstance(fitted, LikelihoodFit):
+    if ahead is not None:
         moves = [over_horizon(model, t, fitted.noise, ahead.horizon_s) for t in trials]
         return [derived_trial(t, columns={**t.columns, **m}) for t, m in zip(trials, moves, strict=True)]
     for trial, readings in zip(trials, predictions(model, trials, noise), strict=True):

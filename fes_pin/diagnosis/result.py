@@ -15,7 +15,7 @@ from fes_pin.diagnosis.errors_ahead import AheadErrors, RandomPart
 from fes_pin.diagnosis.experiment import NEXT_FILE, NextExperiment
 from fes_pin.diagnosis.text import in_words, left_out_text
 from fes_pin.identify.error_measures import FREE, ONE_STEP
-from fes_pin.identify.fit import Fit
+from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.stored import log_table, stored_tables
 from fes_pin.infer.result import FITTED, STOPPED, Cause, Explained, Ranked, shown
 from fes_pin.infer.text import percent, probability
@@ -62,8 +62,8 @@ class Diagnosis(Result):
 
     causes: tuple[Cause, ...]
     absorbed: tuple[str, ...]
-    nominal: Fit
-    extended: Fit
+    nominal: LikelihoodFit
+    extended: LikelihoodFit
     nominal_error: tuple[float | None, float | None]
     extended_error: tuple[float | None, float | None]
     ceiling_percent: float

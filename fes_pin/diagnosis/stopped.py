@@ -9,12 +9,13 @@ from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.errors_ahead import free_errors
 from fes_pin.diagnosis.result import Diagnosis
-from fes_pin.identify.fit import Fit, rough_noise
+from fes_pin.identify.fit import rough_noise
+from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.result import FITTED, HELD_OUT, STOPPED, Remainder
 from fes_pin.models.model import Model
 
 
-def unfitted(study: Study, nominal: Fit, reason: str, test: Sequence[Trial]) -> Diagnosis:
+def unfitted(study: Study, nominal: LikelihoodFit, reason: str, test: Sequence[Trial]) -> Diagnosis:
     """The diagnosis where fits did not converge: that the search stopped, and why."""
     floor = rough_noise(Model(nominal.model.rig), nominal.trials)
     inside = free_errors(nominal.model, nominal.trials, floor)

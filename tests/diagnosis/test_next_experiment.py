@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from diagnosis.hidden import shortened, study_of
-from identify.rigs import WHITE, off
+from identify.rigs import WHITE, as_likely, off
 from oracle import make_study, simulate
 from oracle.studies import ankle_rig
 
@@ -65,12 +65,16 @@ def test_a_set_of_two_is_resolved_by_the_trial_that_the_command_writes(monkeypat
     assert (cause["name"], cause["equivalents"]) == (DELAY, [])
 
 
+def fitted_rivals(study, model):
+    both = model + effect_named("coulomb_friction")(), model + effect_named("quadratic_damping")(0.01)
+    return [as_likely(fit(one, study.trials, WHITE)) for one in both]
+
+
 @pytest.fixture(scope="module")
 def rivals():
     study = study_of("ankle", ("coulomb_friction",), seed=5, n_motion=3, n_isometric=1, duration_s=3.0)
     model = nominal_model(study)
-    best = fit(model + effect_named("coulomb_friction")(), study.trials, WHITE)
-    return study, best, fit(model + effect_named("quadratic_damping")(0.01), study.trials, WHITE)
+    return study, *fitted_rivals(study, model)
 
 
 def test_what_is_expected_is_what_a_refit_cannot_take_up(rivals):
@@ -103,8 +107,7 @@ def test_a_proposed_trial_stays_near_what_was_measured(rivals):
 def test_the_next_experiment_can_be_read_back_and_predicted(tmp_path):
     study = shortened(study_of("ankle", ("coulomb_friction",), seed=5, duration_s=3.0), ("motion",))
     model = nominal_model(study)
-    best = fit(model + effect_named("coulomb_friction")(), study.trials, WHITE)
-    rival = fit(model + effect_named("quadratic_damping")(0.01), study.trials, WHITE)
+    best, rival = fitted_rivals(study, model)
     plan = next_experiment(best, {"quadratic_damping": rival}, "coulomb_friction", study)
     assert plan.trial is not None and plan.separates == ("coulomb_friction", "quadratic_damping")
     assert "squared noise units" in plan.why
@@ -121,7 +124,7 @@ def test_the_next_experiment_can_be_read_back_and_predicted(tmp_path):
 
 def test_what_no_input_separates_says_so():
     study = study_of("muscle", n_isometric=2, duration_s=2.0)
-    same = fit(off(nominal_model(study)), study.trials, WHITE)
+    same = as_likely(fit(off(nominal_model(study)), study.trials, WHITE))
     plan = next_experiment(same, {"other": same}, "one", study)
     assert plan.trial is None and "separates one and other: the models differ by nothing" in plan.why
     assert "the same force with another sensor" in plan.why  # a muscle held still has no base to turn

@@ -9,6 +9,7 @@ from fes_pin.data.study import Study
 from fes_pin.diagnosis.experiment import NextExperiment, next_experiment
 from fes_pin.diagnosis.search.score import Scored, best_by_effect
 from fes_pin.identify.fit import Fit
+from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.per_trial import amplitude
 from fes_pin.infer.levels import ABSORBED_BELOW
 from fes_pin.infer.result import Cause, ParameterEstimate, Ranked
@@ -64,12 +65,12 @@ def ranking(best: Fit, rivals: Mapping[str, Sequence[Fit]]) -> dict[str, tuple[R
 
 
 def experiment(
-    best: Fit, rivals: Mapping[str, Sequence[Fit]], causes: Sequence[Cause], study: Study
+    best: LikelihoodFit, rivals: Mapping[str, Sequence[LikelihoodFit]], causes: Sequence[Cause], study: Study
 ) -> NextExperiment | None:
     """The experiment that would tell the first cause that is confounded from its equivalents."""
     for cause in causes:
         others = {e.name for e in best.model.effects} - {cause.name}
-        confounded: dict[str, Fit] = {}
+        confounded: dict[str, LikelihoodFit] = {}
         for rival in sorted(rivals[cause.name], key=lambda f: f.price):
             (instead,) = {e.name for e in rival.model.effects} - others
             if instead in cause.equivalents:
