@@ -166,7 +166,7 @@ def stubs(monkeypatch, inputs):
         monkeypatch.setattr(f"fes_pin.{name}", lambda *given, **named: Told(told(*given, **named)))
     files = report.answer_files
     monkeypatch.setattr(report, "answer_files", lambda one: one.files() if isinstance(one, Told) else files(one))
-    monkeypatch.setattr("fes_pin.data.datasets.download", told)
+    monkeypatch.setattr("fes_pin.data.datasets.download_all", lambda *given, **named: {told(*given, **named): "there"})
     monkeypatch.setattr(
         "fes_pin.cli.allocate.walk_table", lambda folder, nerves, passive: f"{folder} {nerves} {passive}"
     )
