@@ -53,7 +53,7 @@ def test_spikes_change_no_verdict(rig, names, seed, tmp_path):
     assert 0.85 * count <= told <= count + 3
     assert "left out as spikes" in str(diagnosis)
     report(diagnosis, tmp_path / "report.html")
-    assert "left out as spikes" in (tmp_path / "report.html").read_text()
+    assert "Left out as spikes" in (tmp_path / "report.html").read_text()
 
 
 @pytest.mark.parametrize("driven", [True, False])

@@ -80,7 +80,7 @@ def test_a_diagnosis_names_the_trial_and_everything_else_is_told_with_its_value(
     record = json.loads(json.dumps(diagnosis.record(), allow_nan=False))
     assert record["causes"][0]["trial"] == name
     assert f"trial {name}" in str(diagnosis)
-    assert "was not run as it states" in report_html(diagnosis)
+    assert f"Trial {name} states load_kg = " in report_html(diagnosis)
 
 
 @pytest.mark.long
