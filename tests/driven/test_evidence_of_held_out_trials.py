@@ -26,7 +26,9 @@ def unsupported(evidence, low, random):
     verdict = RigVerdict(SimpleNamespace(models=SimpleNamespace(horizon_s=0.3)), (), 0)
     gains = {"coulomb_friction": Gain(low + 1.0, low, low + 2.0)}
     found = SimpleNamespace(without={"coulomb_friction": None})
-    return verdict.unsupported(State(found, RigWeighed(gains, evidence, NOTHING, (), random), {}, frozenset(gains)))
+    return verdict.unsupported(
+        State(found, RigWeighed(gains, evidence, NOTHING, (), random, None), {}, frozenset(gains))
+    )
 
 
 @pytest.mark.parametrize(
