@@ -309,7 +309,8 @@ def test_joint_vectors_hold_their_names_whatever_the_order(stance):
     for same in (q, q.arranged(JOINT_NAMES), q.arranged(body.joint_names[::-1])):
         assert np.array_equal(nerves.torque_matrix(same), nerves.torque_matrix(named))
         rows = np.zeros((2, 1)) + same
-        assert np.array_equal(nerves.torque_matrix(rows)[1], nerves.torque_matrix(named))
+        # rows of a stack are summed in another order than one posture, by kernels that differ between processors
+        assert np.allclose(nerves.torque_matrix(rows)[1], nerves.torque_matrix(named), rtol=1e-12, atol=1e-12)
     linear = linearize(body, q)
     assert linear.C["right_hip_flexion"] == -linear.holding_torque["right_hip_flexion"]
     assert dict(linear.q) == named
