@@ -53,6 +53,7 @@ from fes_pin.infer.result import CROSS_VALIDATED, FITTED, HELD_OUT, Cause, Remai
 from fes_pin.infer.scatter import as_wide_as_estimates_differ, as_wide_as_trials_differ, with_honest_intervals
 from fes_pin.infer.verdict import State, Verdict, Weighed, share_in, word_of
 from fes_pin.models.stage import Effect
+from fes_pin.workers import in_parallel
 
 
 @dataclass(frozen=True)
@@ -251,7 +252,7 @@ def diagnosis_of(
     if judged.left.unexplained and again is None:
         again = least_error(search)
     if again is not None:
-        judged = _predicting_better(judged_of(*again, trials[1], seed), judged)
+        judged = _predicting_better(judged_of(*again, trials[1], seed), judged, search.models)
     found, left = judged.found, judged.left
     best = as_wide_as_trials_differ(with_honest_intervals(found.best), judged.again)
     other = fresh if judged.found is likeliest.found else likeliest.found.best
@@ -291,20 +292,31 @@ def _words(fitted: LikelihoodFit, trials: Sequence[Trial]) -> tuple[str, ...]:
     return (*said, FRESH) if fitted.noise.timed else said
 
 
-def _predicting_better(other: Judged, one: Judged) -> Judged:
-    """What errs less, on trials held out where there are such; what is left by either is left.
+def _predicting_better(other: Judged, one: Judged, models: LikelihoodModels) -> Judged:
+    """The estimator whose set predicts better; what either says is unexplained stays unexplained.
 
-    Of a rig that a controller drives by errors over the horizon, of others by those of free simulations. Beside efforts
-    that are new in every sample little of what is left stands out: it is not what they say is random.
+    Errors are those of fits to a part of the fitted trials on the other part, or of the fits themselves where there is
+    but one trial. Trials that the study holds out have no say: gains on them would be optimistic. Of a rig that a
+    controller drives errors are judged over the horizon, of others those of free simulations. With efforts that are new
+    in every sample little lack of fit stands out: it is not what these say is random.
     """
-
-    def error(judged: Judged) -> float:
-        ahead = (judged.held_out_ahead or judged.ahead)[1]
-        return ahead.horizon if ahead.free is None or not judged.is_free else ahead.free
-
-    if not error(other) < error(one):
+    if not error_within(other, models) < error_within(one, models):
         return one
     return other if other.left.unexplained else replace(other, left=one.left, reason=one.reason)
+
+
+def error_within(judged: Judged, models: LikelihoodModels) -> float:
+    """E of a set on the fitted trials, percent, each predicted by a fit to the others."""
+    train, folds = models.trials, judged.state.weighed.folds
+    if folds and folds[0].within:
+        _, ahead = judged.held_out_ahead or judged.ahead
+    else:
+        best = judged.found.best
+        held = folds_of(train) if len(train) > 1 else []
+        others = in_parallel(lambda out: afresh(best, [t for i, t in enumerate(train) if i not in out]), held)
+        pairs = [(f, f, [train[i] for i in out]) for f, out in zip(others, held, strict=True)]
+        ahead = errors_ahead(pairs or [(best, best, train)], judged.horizon_s, falling=False)
+    return ahead.horizon if ahead.free is None or not judged.is_free else ahead.free
 
 
 def _cause(judged: Judged, one: Effect, best: LikelihoodFit, on: str) -> Cause:
