@@ -18,6 +18,7 @@ from fes_pin.data.recorded.columns import FILE_KEYS, columns_of
 from fes_pin.data.results import RESULT, TABLE, TEXT
 from fes_pin.data.schema import known_rigs
 from fes_pin.data.units import UNITS
+from fes_pin.infer import held_out, levels
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -227,6 +228,25 @@ def test_few_numbers_decide_and_each_says_where_it_comes_from():
     assert [n.name for n in deciding if not sources.search(n.reason)] == []
     scripts = [path for n in deciding for path in re.findall(r"`((?:scripts|tests)/[\w/.]+)", n.reason)]
     assert scripts and [path for path in scripts if not (ROOT / path).exists()] == []
+
+
+WORDS = {0.0625: "sixteenth", 4: "four", 5: "five"}
+
+
+@pytest.mark.parametrize(
+    "sentence",
+    [
+        f"p-value below {levels.CLAIM_LEVEL:g}, or below {levels.DRIVEN_LEVEL:g} where process noise acts",
+        f"more than a {WORDS[levels.FORM_SHARE]} of what all causes explain",
+        f"cannot separate from a named one at {100.0 * (1.0 - levels.UNUSUAL_LEVEL):g} %",
+        f"dealt to at most {WORDS[held_out.FOLDS]} folds",
+        f"by more than {levels.NOTHING_PERCENT:g} % of the nominal model's error",
+        f"`horizon_s` of the study, else {levels.HORIZON_S:g} s or a tenth of",
+        f"At least {WORDS[levels.FEWEST_STATED]} trials must state something",
+    ],
+)
+def test_the_page_of_a_verdict_states_the_numbers_that_decide(sentence):
+    assert sentence in " ".join((ROOT / "docs" / "verdict.md").read_text().split())
 
 
 def test_the_page_of_decisions_names_files_that_are_there():
