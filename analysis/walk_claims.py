@@ -16,6 +16,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 import pinocchio as pin
+from yardsticks.walking import joint_torques, rooted_motion
 
 from fes_pin.body.build import Body
 from fes_pin.body.linearize import linearize
@@ -23,8 +24,8 @@ from fes_pin.body.measured_walk import data_folder
 from fes_pin.body.passive import PassiveLegs
 from fes_pin.data.errors import InputError
 from fes_pin.data.motion import read_coordinates, read_ground_reaction
-from fes_pin.walk.dynamics import about, centre_of_mass, joint_torques, required
-from fes_pin.walk.motion import motion_of, pelvis_to_hip, rooted_motion
+from fes_pin.walk.dynamics import about, centre_of_mass, required
+from fes_pin.walk.motion import motion_of, pelvis_to_hip
 from fes_pin.walk.plates import plates_of
 
 OUT = Path("out")
@@ -95,7 +96,7 @@ for side in ("left", "right"):
     moved, coordinates, pressed = walk(free, side)
     for foot, rows in pressed.single_supports():
         if foot == side:
-            rooted = rooted_motion(moved, coordinates, HIP, rows)
+            rooted = rooted_motion(moved, coordinates, rows)
             centre = centre_of_mass(moved)[rows]
             standing.append(about(pressed.total[rows], centre) - about(required(rooted), centre))
 row("19 joints on a resting forefoot", np.concatenate(standing))
@@ -177,7 +178,7 @@ def missed(full, linear, rows=slice(None)):
 
 
 side, rows = next((s, r) for s, r in plates.single_supports() if s == "right")
-rooted = rooted_motion(motion, own, HIP, rows)
+rooted = rooted_motion(motion, own, rows)
 full, one, neglected = along(rooted, 1)
 assert np.abs(full - one - neglected.sum(axis=0)).max() < 1e-8  # the three terms are the whole difference
 joints = rooted.body.joint_names

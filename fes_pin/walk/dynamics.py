@@ -1,13 +1,11 @@
-"""Inverse dynamics of the whole body: the ground reaction that a motion requires, and the torque of every joint."""
+"""Inverse dynamics of the whole body: the ground reaction that a motion requires, and its segments' share in it."""
 
 from __future__ import annotations
-
-from collections.abc import Mapping
 
 import numpy as np
 import pinocchio as pin
 
-from fes_pin.body.joints import SEGMENT_NAMES, SIDES
+from fes_pin.body.joints import SEGMENT_NAMES
 from fes_pin.walk.motion import Motion
 
 
@@ -78,58 +76,3 @@ def segment_parameters(motion: Motion) -> dict[str, np.ndarray]:
     model = motion.model
     joints = {s: model.frames[model.getFrameId(s)].parentJoint for s in SEGMENT_NAMES}
     return {s: model.inertias[j].toDynamicParameters() for s, j in joints.items()}
-
-
-def joint_torques(
-    motion: Motion, feet: Mapping[str, np.ndarray], residual_on: str = "pelvis"
-) -> tuple[np.ndarray, np.ndarray]:
-    """Torques of the 19 joints under a measured ground reaction, and what the measured reaction leaves to be made.
-
-    A foot's reaction pushes the part that its centre of pressure lies under: the forefoot ahead of the MTP joint, the
-    hindfoot behind it.
-
-    Parameters
-    ----------
-    motion
-        The motion.
-    feet
-        Ground reaction of `left` and `right`: (n, 6) force and moment about the world's origin.
-    residual_on
-        The segment that the residual wrench acts on, so that no joint between it and the feet carries that wrench.
-
-    Returns
-    -------
-    torque
-        (n, 19) N m in the order of `motion.joint_names`.
-    left
-        (n, 6) force and moment about the world's origin that the motion requires and no plate measured.
-    """
-    model, data = motion.model, motion.model.createData()
-    torque, left = np.empty((len(motion.time), model.nv - 6)), np.empty((len(motion.time), 6))
-    carrier = model.frames[model.getFrameId(residual_on)].parentJoint
-    frames = {s: [model.getFrameId(f"{s}_{part}") for part in ("hindfoot", "forefoot")] for s in SIDES}
-    for k, (q, v, a) in enumerate(zip(motion.q, motion.v, motion.a, strict=True)):
-        pin.forwardKinematics(model, data, q)
-        pin.updateFramePlacements(model, data)
-        external = pin.StdVec_Force()
-        external.extend(pin.Force.Zero() for _ in range(model.njoints))
-        for side in SIDES:
-            push = feet[side][k]
-            joint = model.frames[frames[side][_part(model, data, side, push)]].parentJoint
-            external[joint] = external[joint] + data.oMi[joint].actInv(pin.Force(push))
-        missing = data.oMi[1].act(pin.Force(pin.rnea(model, data, q, v, a, external)[:6]))
-        external[carrier] = external[carrier] + data.oMi[carrier].actInv(missing)
-        torque[k], left[k] = pin.rnea(model, data, q, v, a, external)[6:], missing.vector
-    return torque, left
-
-
-def _part(model: pin.Model, data: pin.Data, side: str, push: np.ndarray) -> int:
-    """0 where the reaction's centre of pressure lies under the hindfoot, 1 ahead of the MTP joint."""
-    if push[2] <= 0.0:
-        return 0
-    hind, fore = (data.oMf[model.getFrameId(f"{side}_{part}")] for part in ("hindfoot", "forefoot"))
-    ahead = hind.rotation[:, 0]
-    joint = model.getJointId(f"{side}_mtp_extension")
-    origin = data.oMi[joint].translation if joint > 1 else fore.translation
-    pressure = np.array([-push[4] / push[2], push[3] / push[2], 0.0])
-    return int(float(ahead[:2] @ (pressure - origin)[:2]) > 0.0)

@@ -155,53 +155,19 @@ def motion_of(
     return Motion(body, model, np.asarray(time, dtype=float), q, v, a, bandwidth)
 
 
-def rooted_motion(free: Motion, columns: Mapping[str, np.ndarray], hip: np.ndarray, rows: slice) -> Motion:
-    """The paper's motion in one single support: the stance forefoot rests flat on the ground, and only joints move.
-
-    The stance ankle takes up what the foot turned, so that the other segments stand in space as measured; the forefoot
-    keeps the mean of its place and heading.
-
-    Parameters
-    ----------
-    free
-        The motion of the body let go, whose `body.stance` is the foot that stands.
-    columns
-        As in `motion_of`, on the same times.
-    hip
-        As in `motion_of`.
-    rows
-        The samples of the single support.
-    """
-    cutoff = free.bandwidth_hz[0] if free.bandwidth_hz else CUTOFF_HZ
-    at, _ = _followed(free.body, free.time, columns, hip, cutoff, flat_foot=True)
-    q, v, a = _joints(free.model, [angles[rows] for angles, _, _ in at])
-    data = free.model.createData()
-    foot = free.model.getFrameId(f"{free.body.stance}_forefoot")
-    places = []
-    for posture in free.q[rows]:
-        pin.framesForwardKinematics(free.model, data, posture)
-        places.append(data.oMf[foot].copy())
-    ahead = np.mean([place.rotation[:, 0] for place in places], axis=0)
-    middle = np.mean([place.translation for place in places], axis=0)
-    level = pin.utils.rotate("z", float(np.arctan2(ahead[1], ahead[0])))
-    q[:, :7] = pin.SE3ToXYZQUAT(pin.SE3(level, middle * [1.0, 1.0, 0.0]))
-    return Motion(free.body, free.model, free.time[rows], q, v, a, free.bandwidth_hz)
-
-
 def _followed(
     body: Body,
     time: np.ndarray,
     columns: Mapping[str, np.ndarray],
     hip: np.ndarray,
     cutoff_hz: float,
-    flat_foot: bool = False,
 ) -> tuple[list[tuple[np.ndarray, np.ndarray, np.ndarray]], tuple[float, float] | None]:
     """Poses now, a small step later and a small step before, in every sample; the coordinates' bandwidth."""
     names = [n.removeprefix("q_") for n in columns if n.startswith("q_")]
     (place, rate, change), bandwidth = _paths(names, time, columns, cutoff_hz)
     moved = [place + step * rate + 0.5 * step**2 * change for step in (0.0, _STEP, -_STEP)]
     labels = [f"q_{n}" for n in names]
-    return [_pose(body, dict(zip(labels, m.T, strict=True)), hip, flat_foot) for m in moved], bandwidth
+    return [_pose(body, dict(zip(labels, m.T, strict=True)), hip) for m in moved], bandwidth
 
 
 def _joints(model: pin.Model, angles: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -231,13 +197,11 @@ def _paths(
     return (smooth, *rates(smooth, time)), (cutoff_hz, cutoff_hz)
 
 
-def _pose(
-    body: Body, coordinates: dict[str, np.ndarray], hip: np.ndarray, flat_foot: bool = False
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _pose(body: Body, coordinates: dict[str, np.ndarray], hip: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Joint angles (n, 19), the pelvis's orientation (n, 3, 3) and where its link's origin is, (n, 3) m."""
     for name in OPTIONAL:
         coordinates.setdefault(f"q_{name}", np.zeros_like(coordinates["q_pelvis_tx"]))
-    angles = np.asarray(postures_of_walk(coordinates, body.stance, flat_foot))
+    angles = np.asarray(postures_of_walk(coordinates, body.stance, flat_foot=False))
     turn = pelvis_turns(coordinates)
     origin = np.stack([coordinates[f"q_pelvis_t{c}"] for c in "xyz"], axis=1) @ TO_WORLD.T
     side = np.array([1.0, 1.0, 1.0 if body.stance == "right" else -1.0])
