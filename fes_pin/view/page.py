@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from importlib import resources
 from urllib.parse import quote
 
-from fes_pin.view.chart import STYLE
 from fes_pin.view.drawing import Drawing
 from fes_pin.view.style import COLOURS
 
@@ -109,8 +108,7 @@ def document(title: str, parts: Sequence[Markup], residual: str = "") -> str:
     body = joined([p for p in (*parts, footer) if p.text])
     files = resources.files("fes_pin.view")
     colours = " ".join(f"--{name}: {value};" for name, value in COLOURS.items())
-    own = files.joinpath("report.css").read_text(encoding="utf-8") + STYLE.replace("INK", "var(--ink)")
-    style = f":root {{ {colours} }}\n{own}"
+    style = f":root {{ {colours} }}\n{files.joinpath('report.css').read_text(encoding='utf-8')}"
     script = files.joinpath("report.js").read_text(encoding="utf-8")
     allowed = "sha256-" + base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     return (

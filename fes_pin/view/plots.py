@@ -8,15 +8,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.replay import Replay
 from fes_pin.infer.noise import NoiseModel
 from fes_pin.infer.text import percent
-from fes_pin.view.chart import Panel, limits_of, svg, tick_text
+from fes_pin.view.chart import panels, svg
 from fes_pin.view.drawing import Drawing, rows_csv
 from fes_pin.view.missing import Missing, binned, explained, smoothed
-from fes_pin.view.style import WIDTHS, label, milli, thin_curve, unit_of
+from fes_pin.view.style import COLOURS, WIDTHS, label, milli, thin_curve, unit_of
 
 DOTS = 500
 """Dots of one panel."""
@@ -28,8 +29,8 @@ FEWEST = 60
 """Of these, in a study of so many trials that the page would be too large."""
 ON_PAGE = 25_000
 """Stretches of all trials of a study together."""
-WIDE, NARROW, LEFT, GAP = 420.0, 330.0, 66.0, 10.0
-"""Widths of a trial's figure and of a panel of the missing torque, room for the axis on the left and between panels."""
+NARROW = 330.0
+"""Width of a figure of the missing torque."""
 
 
 def points_of(trials: int) -> int:
@@ -37,9 +38,7 @@ def points_of(trials: int) -> int:
     return max(FEWEST, min(POINTS, ON_PAGE // max(trials, 1)))
 
 
-def trial_drawing(
-    one: Replay, noise: NoiseModel, position_unit: str = "rad", points: int = POINTS, alone: bool = False
-) -> Drawing:
+def trial_drawing(one: Replay, noise: NoiseModel, position_unit: str = "rad", points: int = POINTS) -> Drawing:
     """One trial: measured over simulated, the residual (measured - simulated) below, the stimulus as a strip.
 
     The residual is drawn as it is, faint, and smoothed.
@@ -54,31 +53,26 @@ def trial_drawing(
         "rad" or "m".
     points
         Stretches of each curve that keep their extremes.
-    alone
-        True for a file of its own.
     """
-    time, top, panels = one.measured.time, 8.0, []
+    time, inputs = one.measured.time, [n for n in one.measured.columns if n not in one.outputs]
     columns = {"time_s": time}
+    drawing, axes = panels([130.0, 76.0] * len(one.outputs) + [28.0] * len(inputs))
+    rows = iter(axes[:, 0])
     for name in one.outputs:
         curves = {of: trial[name] for of, trial in (*one.models.items(), ("measured", one.measured))}
         columns |= {f"{name}_{of}": values for of, values in reversed(curves.items())}
-        panel = Panel(LEFT, top, WIDE - LEFT - 8, 130, (time[0], time[-1]), limits_of(*curves.values()))
+        panel = next(rows)
         for of, values in curves.items():
-            panel.line(*thin_curve(time, values, points), of, WIDTHS[of])
-        panel.y_axis(label(name, position_unit))
+            panel.plot(*thin_curve(time, values, points), color=COLOURS[of], linewidth=WIDTHS[of])
+        panel.set_ylabel(label(name, position_unit))
         factor, unit = milli(one.residuals(name)["nominal"], unit_of(name, position_unit))
         band = factor * 2.0 * noise[name].std if name in noise else 0.0
-        beneath = _residuals(one, name, factor, band, points, top + 130 + GAP)
-        beneath.y_axis(f"residual\n({unit})", title_at=26)
-        panels += [panel, beneath]
-        top += 130 + GAP + 76 + GAP
-    for name in (n for n in one.measured.columns if n not in one.outputs):
+        _residuals(next(rows), one, name, factor, band, points, f"residual\n({unit})")
+    for name in inputs:
         columns[name] = one.measured[name]
-        panels.append(_strip(one.measured, name, top, position_unit, points))
-        top += 28 + GAP
-    panels[-1].x_axis("time (s)")
-    drawn = svg(panels, WIDE, top + 28, described(one, position_unit), alone)
-    return Drawing.of(drawn, columns, 2 * points)
+        _strip(next(rows), one.measured, name, position_unit, points)
+    axes[-1, 0].set_xlabel("time (s)")
+    return Drawing.of(svg(drawing, described(one, position_unit)), columns, 2 * points)
 
 
 def described(one: Replay, position_unit: str) -> str:
@@ -97,44 +91,32 @@ def _short(value: float) -> str:
     return f"{float(value):.3g}"
 
 
-def _residuals(one: Replay, name: str, factor: float, band: float, points: int, top: float) -> Panel:
+def _residuals(panel: Axes, one: Replay, name: str, factor: float, band: float, points: int, title: str) -> None:
     """Residuals of the models, as they are and smoothed."""
     time, few = one.measured.time, max(FEWEST, round(0.6 * points))
     residuals = {of: factor * r for of, r in one.residuals(name).items()}
+    panel.axhspan(-band, band, color=COLOURS["band"])
+    panel.axhline(color=COLOURS["faint"], linewidth=0.8)
+    for of, residual in residuals.items():
+        panel.plot(*thin_curve(time, residual, few), color=COLOURS[of], linewidth=0.6, alpha=0.45)
+    for of, residual in residuals.items():
+        panel.plot(*thin_curve(*smoothed(time, residual), few), color=COLOURS[of], linewidth=1.9)
     limit = 1.1 * max(float(np.abs(r).max()) for r in residuals.values()) or 1.0
-    panel = Panel(LEFT, top, WIDE - LEFT - 8, 76, (time[0], time[-1]), (-limit, limit))
-    panel.box(panel.x, (-band, band), "band")
-    panel.zero()
-    for of, residual in residuals.items():
-        panel.line(*thin_curve(time, residual, few), of, 0.6, 0.45)
-    for of, residual in residuals.items():
-        panel.line(*thin_curve(*smoothed(time, residual), few), of, 1.9)
-    return panel
+    panel.set(ylim=(-limit, limit), ylabel=title)
 
 
-def _strip(trial: Trial, name: str, top: float, position_unit: str, points: int) -> Panel:
-    """The stimulus, thin and without a scale of its own but its end points."""
-    time, values = trial.time, trial[name]
-    low, high = min(0.0, float(values.min())), max(0.0, float(values.max()))
-    limits = (low, high if high > low else low + 1.0)
-    panel = Panel(LEFT, top, WIDE - LEFT - 8, 28, (float(time[0]), float(time[-1])), limits)
-    if name == "stim":
-        times = time[values > 0.5]
-        if len(times) <= PULSES:
-            edges = np.repeat(times, 3)
-            panel.line(edges, np.tile([0.0, 1.0, np.nan], len(times)), "stimulus", 0.7)
-        else:
-            panel.filled(*thin_curve(time, values, points), "stimulus", 0.6)
-        panel.y_axis("pulses", [], 30)
-        return panel
-    panel.filled(*thin_curve(time, values, points), "stimulus", 0.55)
-    ends = [low, high] if low < 0.0 < high else [high if high > 0 else low]
-    step = 1.0 if max(map(abs, ends)) >= 100 else 10.0 ** np.floor(np.log10(max(*map(abs, ends), 1e-9)) - 1)
-    panel.y_axis("", [(v, tick_text(v, step)) for v in ends])
-    words = label(name, position_unit).replace("pulse width", "width").replace(" (", "\n(").split("\n")
-    for k, line in enumerate(words):
-        panel.text(2, top + 11 + 12 * k, line)
-    return panel
+def _strip(panel: Axes, trial: Trial, name: str, position_unit: str, points: int) -> None:
+    """The stimulus, thin."""
+    pulses = trial.time[trial[name] > 0.5]
+    if name == "stim" and len(pulses) <= PULSES:
+        panel.vlines(pulses, 0.0, 1.0, color=COLOURS["stimulus"], linewidth=0.7)
+    else:
+        panel.fill_between(
+            *thin_curve(trial.time, trial[name], points), step="post", color=COLOURS["stimulus"], alpha=0.55
+        )
+    panel.locator_params(axis="y", nbins=2)
+    words = label(name, position_unit).replace("pulse width", "width").replace(" (", "\n(")
+    panel.set_ylabel(words, rotation=0.0, ha="right", va="center")
 
 
 def missing_drawing(
@@ -158,32 +140,32 @@ def missing_drawing(
     """
     x, value = _joined(before, name)
     factor, unit = milli(value, before[0].unit)
-    limit, room = factor * _limit(before), 0.03 * float(np.ptp(x)) or 1.0
-    panel = Panel(58, 22, NARROW - 66, 150, (float(x.min()) - room, float(x.max()) + room), (-limit, limit))
-    panel.zero()
+    drawing, axes = panels([150.0], NARROW, 58.0)
+    panel = axes[0, 0]
+    panel.axhline(color=COLOURS["faint"], linewidth=0.8)
     chosen = _spread(x, value)
-    panel.dots(x[chosen], factor * value[chosen], "nominal", opacity=0.6)
+    panel.plot(x[chosen], factor * value[chosen], ".", color=COLOURS["nominal"], markersize=2.4)
     at, middle = _medians(x, value)
-    panel.line(at, factor * middle, "measured", 1.8)
+    panel.plot(at, factor * middle, color=COLOURS["measured"], linewidth=1.8)
     rows: list[tuple[str | float, ...]] = [("instant", a, b) for a, b in zip(x[chosen], value[chosen], strict=True)]
     rows += [("median_nominal", a, b) for a, b in zip(at, middle, strict=True)]
     left = ""
     if after:
         there, stays = _medians(*_joined(after, name))
-        panel.line(there, factor * stays, "extended", 2.8)
+        panel.plot(there, factor * stays, color=COLOURS["extended"], linewidth=2.8)
         rows += [("median_extended", a, b) for a, b in zip(there, stays, strict=True)]
         left = f"; of the extended model from {_short(stays.min())} to {_short(stays.max())} {before[0].unit}"
     share_of = explained(value, x)
-    panel.text(NARROW - 8, 14, f"{100 * share_of:.0f} % of its variance", "end")
-    panel.x_axis(label(name, position_unit))
-    panel.y_axis(f"missing {before[0].kind} ({unit})")
+    limit = factor * _limit(before)
+    panel.set(ylim=(-limit, limit), xlabel=label(name, position_unit), ylabel=f"missing {before[0].kind} ({unit})")
+    panel.set_title(f"{100 * share_of:.0f} % of its variance", loc="right", color=COLOURS["ink"], fontsize=10)
     words = (
         f"Missing {before[0].kind} against {label(name, position_unit)}: its median in bins runs from "
         f"{_short(middle.min())} to {_short(middle.max())} {before[0].unit}{left}. "
         f"{100 * share_of:.0f} % of its variance is a function of this alone."
     )
     head = ("what", label(name, position_unit).replace(",", ""), f"missing {before[0].kind} ({before[0].unit})")
-    return Drawing(svg([panel], NARROW, 212, words), rows_csv(head, rows))
+    return Drawing(svg(drawing, words), rows_csv(head, rows))
 
 
 def share(before: Sequence[Missing], name: str) -> float:
@@ -218,10 +200,12 @@ def _medians(x: np.ndarray, value: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def stimulus_drawing(trial: Trial, position_unit: str = "rad") -> Drawing:
     """The inputs of a trial that is still to be run."""
-    panels = [_strip(trial, name, 8 + 38 * k, position_unit, POINTS) for k, name in enumerate(trial.columns)]
-    panels[-1].x_axis("time (s)")
+    drawing, axes = panels([28.0] * len(trial.columns))
+    for panel, name in zip(axes[:, 0], trial.columns, strict=True):
+        _strip(panel, trial, name, position_unit, POINTS)
+    axes[-1, 0].set_xlabel("time (s)")
     ranges = ", ".join(
         f"{label(n, position_unit)} from {_short(v.min())} to {_short(v.max())}" for n, v in trial.columns.items()
     )
-    drawn = svg(panels, WIDE, 8 + 38 * len(panels) + 28, f"Inputs of the next trial, {trial.duration:.3g} s: {ranges}.")
-    return Drawing.of(drawn, {"time_s": trial.time, **trial.columns})
+    words = f"Inputs of the next trial, {trial.duration:.3g} s: {ranges}."
+    return Drawing.of(svg(drawing, words), {"time_s": trial.time, **trial.columns})

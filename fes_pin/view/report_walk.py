@@ -6,19 +6,19 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from fes_pin.view.chart import Panel, limits_of, svg
+from fes_pin.view.chart import panels, svg
 from fes_pin.view.drawing import Drawing
 from fes_pin.view.page import Markup, element, figure, key, section
 from fes_pin.view.sections import Parts, not_testable
-from fes_pin.view.style import thin_curve
+from fes_pin.view.style import COLOURS, thin_curve
 from fes_pin.view.walk_playback import PLAYBACK_FILE, playback_html
 from fes_pin.walk.judge import CHANNELS
 from fes_pin.walk.result import BODY_FILE, WalkDiagnosis
 
 SHOWN_S = 4.0
 """Of each trial, s."""
-WIDE, ROW, AXIS = 420.0, 160.0, 66.0
-"""Width of a figure's half and height of a channel, room for the axis on the left."""
+ROW = 144.0
+"""Height of a channel."""
 PYTHON = f'import fes_pin as fp\n\nbody = fp.Body.from_urdf("{BODY_FILE}")\nlinear = fp.linearize(body, "mid_stance")'
 
 
@@ -66,24 +66,21 @@ def _drawing(trial: str, time: np.ndarray, curves: Mapping[str, np.ndarray], sin
     """
     shown = time <= time[0] + SHOWN_S
     time, edges = time[shown], np.flatnonzero(np.diff(single[shown], prepend=False, append=False))
-    panels, columns, words = [], {"time_s": time}, []
-    for channel, name in enumerate(CHANNELS):
+    columns, words = {"time_s": time}, []
+    drawing, axes = panels([ROW] * 3, columns=2)
+    for channel, (name, panel) in enumerate(zip(CHANNELS, axes.T.flat, strict=True)):
         unit = "N" if channel < 3 else "N m"
         own = {of: values[shown, channel] for of, values in curves.items()}
         columns |= {f"{name.replace(' ', '_')}_{of}": values for of, values in reversed(own.items())}
-        left, top, inner = AXIS + (channel // 3) * WIDE, 8.0 + (channel % 3) * ROW, WIDE - AXIS - 8.0
-        panel = Panel(left, top, inner, ROW - 16.0, (time[0], time[-1]), limits_of(*own.values()))
         for begin, end in edges.reshape(-1, 2).tolist():
-            panel.box((time[begin], time[end - 1]), panel.y, "band")
+            panel.axvspan(time[begin], time[end - 1], color=COLOURS["band"])
         for of, values in own.items():
-            panel.line(*thin_curve(time, values), of, 2.4 if of == "extended" else 1.2)
-        panel.y_axis(f"{name} ({unit})".replace(" about", "\nabout"), title_at=left - AXIS + 26.0)
-        if channel % 3 == 2:
-            panel.x_axis("time (s)")
-        panels.append(panel)
+            panel.plot(*thin_curve(time, values), color=COLOURS[of], linewidth=2.4 if of == "extended" else 1.2)
+        panel.set_ylabel(f"{name} ({unit})".replace(" about", "\nabout"))
         words.append(f"{name} from {own['measured'].min():.3g} to {own['measured'].max():.3g} {unit}")
-    drawn = svg(panels, 2.0 * WIDE, 3.0 * ROW + 30.0, f"Ground reaction of trial {trial}: {', '.join(words)}.")
-    return Drawing.of(drawn, columns)
+    for panel in axes[-1]:
+        panel.set_xlabel("time (s)")
+    return Drawing.of(svg(drawing, f"Ground reaction of trial {trial}: {', '.join(words)}."), columns)
 
 
 PARTS = Parts(_counts, _sections, ("not testable",), {PLAYBACK_FILE: playback_html}, "Residual = measured - required. ")
