@@ -84,13 +84,13 @@ def in_parallel(function: Callable[[In], Out], items: Iterable[In]) -> list[Out]
     if threads() == 1 or len(work) < 2 or _IS_ONE_OF_MANY.get():
         return [function(item) for item in work]
 
-    def beside_others(item: In) -> Out:
+    def in_one_thread(item: In) -> Out:
         _IS_ONE_OF_MANY.set(True)
         return function(item)
 
     contexts = [copy_context() for _ in work]  # the limit of time holds in every thread
     with ThreadPoolExecutor(threads()) as pool:
-        return list(pool.map(lambda context, item: context.run(beside_others, item), contexts, work))
+        return list(pool.map(lambda context, item: context.run(in_one_thread, item), contexts, work))
 
 
 _STOPS: ContextVar[list[float] | None] = ContextVar("stops", default=None)

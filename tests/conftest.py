@@ -46,7 +46,7 @@ LONG = {
         "off[ankle",
         "off[joint",
     ),
-    "diagnosis/test_doubts.py": ("test_two_real_trials",),
+    "diagnosis/test_few_trials.py": ("test_two_real_trials",),
     "diagnosis/test_driven_far.py": ("_gain]", "_damping]", "_hum]", "test_a_twin_is_found", "one_muscle[12]"),
     "diagnosis/test_found.py": (
         *("test_intervals_hold", "-1-True", "-2-True", "-5-True", "-6-False", "-9-True", "-10-True", "-11-True"),
@@ -81,7 +81,7 @@ LONG = {
         *("read[effort_offset]", "read[quadratic", "read[cogging", "read[joint_stop", "read[parallel", "read[coulomb"),
         "test_a_seed_makes",
     ),
-    "driven/test_lasting.py": ("is_no_motion[5", "is_no_motion[40", "misses[('joint_stop'"),
+    "driven/test_correlation_time.py": ("is_no_motion[5", "is_no_motion[40", "misses[('joint_stop'"),
     "driven/test_late_effort.py": (
         *("test_a_reading_that_is_late", "moved[friction]", "moved[nothing else]"),
         *("test_a_log_of_every", "test_an_effort_that_acts_later"),

@@ -20,7 +20,7 @@ from fes_pin.models.compile.virtual import VirtualProgram
 from fes_pin.models.effects.electromechanical_delay import ElectromechanicalDelay
 from fes_pin.models.effects.sensor_offset import SensorOffset
 from fes_pin.models.model import Model
-from fes_pin.models.predictor import Doubt, Predictor
+from fes_pin.models.predictor import Predictor, StateSpaceNoise
 from fes_pin.models.simulate import Simulator, simulate
 from fes_pin.muscles.nerves import Nerves
 from fes_pin.workers import in_parallel, one_thread_each
@@ -74,11 +74,11 @@ def test_a_predictor_that_delays_the_stimulus_is_shared():
     model = Model(RIGS["muscle"]) + ElectromechanicalDelay(delay_s=0.01)
     bare = trial("muscle", "isometric", rng, 100)
     measured = bare.with_columns(force_n=simulate(model, bare)["force_n"] + 0.2 * rng.standard_normal(100))
-    predictor, doubt = Predictor(model, [measured], (), (), [{}]), Doubt({"force_n": 0.2})
+    predictor, noise = Predictor(model, [measured], (), (), [{}]), StateSpaceNoise({"force_n": 0.2})
 
     def run(delay_s):
         values = {**model.parameters(), "electromechanical_delay.delay_s": delay_s}
-        (told,) = predictor.run(values, doubt, [{}])
+        (told,) = predictor.run(values, noise, [{}])
         return told.values
 
     alone_and_together(run, list(rng.choice([0.005, 0.010, 0.015, 0.020, 0.025], 400)))

@@ -181,7 +181,7 @@ def _readable(path: Path) -> Iterator[Path]:
 def _along(path: Path, model: Model, trial: Trial, horizon_s: float) -> Trial:
     """A trial's outputs predicted from what was measured so long before."""
     from fes_pin.data.trial import derived_trial
-    from fes_pin.identify.ahead import foretell
+    from fes_pin.identify.ahead import predict_ahead
     from fes_pin.identify.stored import load_random
 
     random = load_random(path)
@@ -189,7 +189,7 @@ def _along(path: Path, model: Model, trial: Trial, horizon_s: float) -> Trial:
         raise InputError(
             "expected a table [random], as diagnose writes it: --horizon needs to know the noise", file=path
         )
-    return derived_trial(trial, columns=foretell(model, trial, random, horizon_s))
+    return derived_trial(trial, columns=predict_ahead(model, trial, random, horizon_s))
 
 
 def _errors(path: Path, measured: Sequence[Trial], found: Sequence[Trial], horizon_s: float | None) -> list[str]:

@@ -10,7 +10,7 @@ from fes_pin.contrasts.screen import ItemScore
 from fes_pin.contrasts.words import of_cause, of_nominal
 from fes_pin.diagnosis.misread import NAME, Misread
 from fes_pin.infer.distributions import normal_quantile
-from fes_pin.infer.levels import ABSORBED_BELOW, CLAIM_LEVEL, SEEN_POWER, SEPARABLE
+from fes_pin.infer.levels import CLAIM_LEVEL, IDENTIFIABLE_SHARE, SEEN_POWER, SEPARABLE
 from fes_pin.infer.result import Change, Evidence, ParameterEstimate
 from fes_pin.models.catalogue import Catalogue
 from fes_pin.models.stage import Effect
@@ -71,8 +71,8 @@ def _equivalents(found: Found, item: Item) -> tuple[str, ...]:
     """What could stand in a change's place; of driven rigs also with more parameters, if it is as likely."""
     best, near = found.best, set[str]()
     for rival in found.rivals[str(item)]:
-        price = min(rival.price, rival.sse + best.price - best.sse) if best.is_driven else rival.price
-        if price < best.price + SEPARABLE:
+        criterion = min(rival.criterion, rival.sse + best.criterion - best.sse) if best.is_driven else rival.criterion
+        if criterion < best.criterion + SEPARABLE:
             near |= {i.name for i in rival.items - best.items}
     return tuple(sorted(near - {item.name}))
 
@@ -94,7 +94,7 @@ def not_changed(
     shares = _largest([(s, size / abs(v)) for s, size in sizes if s.effect is None and (v := _value(best, s))])
     largest = _largest([(s, size) for s, size in sizes if s.effect is not None])
     units = {s.item.name: _unit(best, s.effect) for s in others if s.effect is not None}
-    felt = {s.item.name for s in others if s.kept >= ABSORBED_BELOW}
+    felt = {s.item.name for s in others if s.kept >= IDENTIFIABLE_SHARE}
     excluded = {n: ParameterEstimate(v, 0.0, units[n]) for n, v in largest.items() if n in felt and math.isfinite(v)}
     unchanged = {n: v for n, v in shares.items() if v < 1.0}
     return unchanged, excluded, tuple(sorted({*largest, *shares} - {*excluded, *unchanged}))

@@ -25,10 +25,10 @@ from fes_pin.diagnosis.logged import LogFaults
 from fes_pin.diagnosis.long_records import searched_part
 from fes_pin.diagnosis.misread import Misread
 from fes_pin.diagnosis.plausibility import check_study
+from fes_pin.identify.correlation_time import words_of_reading
 from fes_pin.identify.effort_noise import words_of_noise
 from fes_pin.identify.effort_timing import words_of_lateness
 from fes_pin.identify.feedback import is_fed_back
-from fes_pin.identify.lasting import words_of_reading
 from fes_pin.infer.result import STOPPED
 from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
 from fes_pin.models.nominal import nominal_model
@@ -141,7 +141,7 @@ class _Work:
         if not self.fed_back or not all(EFFORT in self.nominal.rig.input_columns(t) for t in self.study.trials):
             return 0.0
         faults = LogFaults(self.study.trials, lambda trials: self._searched(trials)[0], self.end)
-        return faults.noise_beside_nominal(self.nominal)
+        return faults.effort_noise_of_nominal(self.nominal)
 
     def _searched(self, trials: Sequence[Trial]) -> tuple[list[Trial], list[str]]:
         """What a search takes of the trials of each group, and what is to be said."""
@@ -174,7 +174,7 @@ class _Work:
         changes = [change_of(models, found, i, self.catalogue, evidence.get(str(i))) for i in best.changes]
         changes += [misread_change(models, misread)] if misread is not None else []
         unchanged, excluded, untestable = not_changed(models, best)
-        said += [*state.weighed.said, *_smoothed(best), *(UNCONFIRMED.format(n) for n in state.refused)]
+        said += [*state.weighed.said, *_smoothed(best), *(UNCONFIRMED.format(n) for n in state.rejected)]
         if left.unexplained:  # sizes that would have been seen hold for a model that is right
             unchanged, excluded = {}, {}
             said.append("with a lack of fit in one group it cannot be said what did not change")

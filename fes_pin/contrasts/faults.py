@@ -18,7 +18,7 @@ from fes_pin.diagnosis.misread import Misread, find_misread
 from fes_pin.identify.effort_timing import lateness_of
 from fes_pin.identify.likelihood_fit import LikelihoodFit, maximum_from
 from fes_pin.infer.levels import CLAIM_LEVEL
-from fes_pin.models.predictor import Doubt
+from fes_pin.models.predictor import StateSpaceNoise
 from fes_pin.workers import in_parallel
 
 
@@ -47,7 +47,7 @@ class GroupConditions(Conditions[ContrastSearch, Found]):
         """The fall of the penalised likelihood, with the noise of the restated trials."""
         best, after = searched.best, made.searched.best
         fits = ContrastModels(self.nominal, in_groups(trials), (), best.is_driven).maxima
-        return fits.converged(best.model, best.items, after.weights, best.fit.unknowns).price - after.price
+        return fits.converged(best.model, best.items, after.weights, best.fit.unknowns).criterion - after.criterion
 
 
 def late_in_groups(models: ContrastModels, found: Found) -> float | None:
@@ -59,10 +59,10 @@ def late_in_groups(models: ContrastModels, found: Found) -> float | None:
     if not models.driven or not all(EFFORT in rig.input_columns(t) for t in trials):
         return None
     asked = [found.best, found.nominal] if set(found.best.items) - set(found.best.changes) else [found.best]
-    return next((late for one in asked if (late := _late_beside(models, one)) is not None), None)
+    return next((late for one in asked if (late := _late_in(models, one)) is not None), None)
 
 
-def _late_beside(models: ContrastModels, one: Grouped) -> float | None:
+def _late_in(models: ContrastModels, one: Grouped) -> float | None:
     """How late efforts are by a set, each group with nominal values of its own; None where one is in time."""
 
     def late_in(group: str) -> float:
@@ -81,5 +81,7 @@ def _late_beside(models: ContrastModels, one: Grouped) -> float | None:
 
 def is_likelier(timed: Grouped, recorded: Grouped) -> bool:
     """True if efforts in time explain the same readings with a lower penalised likelihood."""
-    one, other = ({w.lasts_s for w in f.weights.values() if isinstance(w, Doubt)} for f in (timed, recorded))
-    return one == other and timed.price < recorded.price
+    one, other = (
+        {w.correlation_s for w in f.weights.values() if isinstance(w, StateSpaceNoise)} for f in (timed, recorded)
+    )
+    return one == other and timed.criterion < recorded.criterion

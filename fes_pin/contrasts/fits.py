@@ -12,8 +12,8 @@ from fes_pin.contrasts.grouped import Grouped, GroupedModel, GroupedProblem, Ite
 from fes_pin.contrasts.repeats import Repeats, scatter, without_scatter
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.search.library import Library
+from fes_pin.identify.correlation_time import with_new_noise
 from fes_pin.identify.fit import Fit, fit_multistart, fit_problem, noise_of, rough_noise
-from fes_pin.identify.lasting import with_new_noise
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit, fit_of, maximise
 from fes_pin.identify.noise_floor import rich_noise
@@ -25,7 +25,7 @@ from fes_pin.infer.optimum import MAX_ITERATIONS, minimise
 from fes_pin.infer.problem import Unknowns
 from fes_pin.infer.projection import without_locals
 from fes_pin.models.model import Model
-from fes_pin.models.predictor import Doubt
+from fes_pin.models.predictor import StateSpaceNoise
 from fes_pin.models.stage import Effect
 
 FIRST_LOOK = 15
@@ -91,7 +91,7 @@ class GroupedFits(ABC):
             for g, own in by_group(range(len(one.fit.trials)), self.trials).items()
         }
         trials = {g: [self.trials[g][k] for k in ks] for g, ks in kept.items()}
-        weights = {g: w if isinstance(w, Doubt) else w.of_trials(kept[g]) for g, w in one.weights.items()}
+        weights = {g: w if isinstance(w, StateSpaceNoise) else w.of_trials(kept[g]) for g, w in one.weights.items()}
         problem = GroupedProblem(one.model, trials, weights)
         unknowns = [u for k, u in enumerate(one.fit.unknowns) if k not in held]
         return Grouped.of(one.items, problem, minimise(problem, one.fit.values, unknowns), weights)
@@ -102,7 +102,7 @@ class GroupedFits(ABC):
         rows = slice(None) if alone is None else slice(alone, alone + 1)
         trials = self.trials[group][rows]
         unknowns = by_group(one.fit.unknowns, self.trials)[group][rows]
-        if isinstance(weight, Doubt):
+        if isinstance(weight, StateSpaceNoise):
             problem = LikelihoodProblem(model, trials, weight)
             return fit_of(problem, minimise(problem, model.parameters(), unknowns, LOOK_DRIVEN))
         return fit_problem(Problem(model, trials, weight.noise), model.parameters(), unknowns)
@@ -128,7 +128,7 @@ class PredictedGroups(GroupedFits):
         """Fit the nominal model to all groups; the search starts from the noise of each group fitted alone."""
         alone = self._alone()
         noises = {g: f.noise for g, f in alone.items()}
-        little = {g: first_guess(self.nominal, t, noises[g].lasts_s) for g, t in self.trials.items()}
+        little = {g: first_guess(self.nominal, t, noises[g].correlation_s) for g, t in self.trials.items()}
         self._begun: list[Mapping[str, Weight]] = [dict(little), dict(noises)]
         model = GroupedModel(dict.fromkeys(self.trials, self.nominal))
         return self.converged(model.with_parameters(next(iter(alone.values())).values), (), noises, None)
@@ -136,14 +136,14 @@ class PredictedGroups(GroupedFits):
     def _alone(self) -> dict[str, LikelihoodFit]:
         """The nominal fit of each group alone; measurement noise has the same correlation time in all groups."""
 
-        def fitted(group: str, lasts_s: float) -> LikelihoodFit:
+        def fitted(group: str, correlation_s: float) -> LikelihoodFit:
             trials = self.trials[group]
-            problem = LikelihoodProblem(self.nominal, trials, first_guess(self.nominal, trials, lasts_s))
+            problem = LikelihoodProblem(self.nominal, trials, first_guess(self.nominal, trials, correlation_s))
             return maximise(problem, self.nominal.parameters())
 
         each = {g: with_new_noise(t, partial(fitted, g)) for g, t in self.trials.items()}
-        lasts = max(f.noise.lasts_s for f in each.values())
-        return {g: f if f.noise.lasts_s == lasts else fitted(g, lasts) for g, f in each.items()}
+        longest = max(f.noise.correlation_s for f in each.values())
+        return {g: f if f.noise.correlation_s == longest else fitted(g, longest) for g, f in each.items()}
 
     def converged(
         self, model: GroupedModel, items: Collection[Item], weights: Mapping[str, Weight], unknowns: Unknowns | None
@@ -159,7 +159,9 @@ class PredictedGroups(GroupedFits):
         A smaller set's random effort has taken what it got wrong, and might keep it: a likelihood can have two optima.
         """
         starts = [one.weights, *self._begun]
-        return min((self.converged(one.model, one.items, w, one.fit.unknowns) for w in starts), key=lambda f: f.price)
+        return min(
+            (self.converged(one.model, one.items, w, one.fit.unknowns) for w in starts), key=lambda f: f.criterion
+        )
 
 
 class SimulatedGroups(GroupedFits):

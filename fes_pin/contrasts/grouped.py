@@ -16,26 +16,26 @@ from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit, ended
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.problem import products_of
-from fes_pin.infer.levels import PARAMETER_PRICE, SEPARABLE
+from fes_pin.infer.levels import PARAMETER_PENALTY, SEPARABLE
 from fes_pin.infer.noise import Noise, NoiseModel
 from fes_pin.infer.optimum import Optimum
 from fes_pin.infer.problem import Linearized, Unknowns
 from fes_pin.infer.scoring import Evaluation, NoisyProblem, Point
 from fes_pin.models.model import Model
 from fes_pin.models.parameters import ParameterInfo
-from fes_pin.models.predictor import Doubt
+from fes_pin.models.predictor import StateSpaceNoise
 from fes_pin.models.rigs.base import Rig
 from fes_pin.models.stage import Effect
 
 T = TypeVar("T")
-Weight = Repeats | Doubt
+Weight = Repeats | StateSpaceNoise
 """What weighs the residuals of a group: the noise of simulations with the scatter of repeats, or what is random about
 predictions."""
 
 
 def group_problem(model: Model, trials: Sequence[Trial], weight: Weight, free: tuple[str, ...] | None = None) -> Any:
     """A model on the trials of one group, as their weight demands; predictions move all that can be fitted."""
-    if isinstance(weight, Doubt):
+    if isinstance(weight, StateSpaceNoise):
         return LikelihoodProblem(model, trials, weight)
     return RepeatedProblem(model, trials, weight, free)
 
@@ -47,7 +47,7 @@ def noise_in(weight: Weight) -> NoiseModel:
 
 def reweigh(problem: Any, weight: Weight) -> None:
     """Change the weight of the problem of a group, in place."""
-    if isinstance(weight, Doubt):
+    if isinstance(weight, StateSpaceNoise):
         problem.noise = weight
     else:
         problem.noise, problem.weight = weight.noise, weight
@@ -324,12 +324,12 @@ class Grouped:
         return len(self.fit.free)
 
     @property
-    def price(self) -> float:
+    def criterion(self) -> float:
         """`sse` with a penalty for each parameter, and for each change: a common cause that explains as much is taken.
 
         A model that is wrong in all groups is no change.
         """
-        return self.sse + PARAMETER_PRICE * self.degrees + SEPARABLE * len(self.changes)
+        return self.sse + PARAMETER_PENALTY * self.degrees + SEPARABLE * len(self.changes)
 
     @property
     def changes(self) -> tuple[Item, ...]:
@@ -345,7 +345,7 @@ class Grouped:
     @property
     def is_driven(self) -> bool:
         """True if predictions are judged, with everything that is random."""
-        return any(isinstance(w, Doubt) for w in self.weights.values())
+        return any(isinstance(w, StateSpaceNoise) for w in self.weights.values())
 
     @property
     def repeats(self) -> dict[str, float]:

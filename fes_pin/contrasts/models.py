@@ -12,7 +12,7 @@ from fes_pin.contrasts.screen import ItemScore, Screen
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.search.library import Library
 from fes_pin.diagnosis.search.likelihood_forms import demanded_form
-from fes_pin.diagnosis.search.starts import STARTS, forms_beside, refinements
+from fes_pin.diagnosis.search.starts import STARTS, number_of_forms, refinements
 from fes_pin.infer.distributions import chi2_tail
 from fes_pin.infer.fits import Candidate, FittedSets, more_degrees
 from fes_pin.infer.levels import CLAIM_LEVEL, DRIVEN_LEVEL, MOST_ITEMS
@@ -102,7 +102,7 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
             items = base.items | {one.item}
             model = base.model.having(items, () if one.effect is None else (one.effect,)).with_parameters(one.start)
             out.append(self.maxima.look(model, items, base))
-        best = min(out, key=lambda f: f.price)
+        best = min(out, key=lambda f: f.criterion)
         return self.maxima.go_on(best) if scores[0].item.name in base.repeats else best
 
     def converged(self, fits: Sequence[Grouped]) -> list[Grouped]:
@@ -135,7 +135,7 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
         if self._compared.get((names, name)) is not whole:
             items = whole.items - {Item.of(name)}
             own = self.maxima.converged(whole.model.having(items), items, whole.weights, whole.fit.unknowns)
-            if rest not in self.fits or own.price < self.fits[rest].price:
+            if rest not in self.fits or own.criterion < self.fits[rest].criterion:
                 self.fits[rest] = own
             self._converged.add(rest)
             self._compared[names, name] = whole
@@ -195,7 +195,7 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
         starts, tried = [], 0
         for group, effect in _causes(fitted):
             own = fitted.model.models[group]
-            tried += forms_beside(own, [effect])
+            tried += number_of_forms(own, [effect])
             starts += [_moved(fitted.model, group, m) for m in refinements(own, effect, self._library.measured)]
         looks = in_parallel(lambda start: self.maxima.look(start, fitted.items, fitted), starts)
         return demanded_form(fitted, looks, DRIVEN_LEVEL / max(tried, 1), self.converged)

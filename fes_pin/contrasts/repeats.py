@@ -21,7 +21,7 @@ import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.identify.problem import Problem
-from fes_pin.infer.levels import PARAMETER_PRICE
+from fes_pin.infer.levels import PARAMETER_PENALTY
 from fes_pin.infer.noise import NoiseModel
 from fes_pin.infer.problem import Linearized, Unknowns
 from fes_pin.infer.projection import without_locals
@@ -162,7 +162,7 @@ class _Scatter:
         while True:
             more = [self._with(best, k) for k in np.flatnonzero((best == 0.0) & (self.size > 0.0)).tolist()]
             least, wanted = min(more, key=lambda m: m[0], default=(np.inf, best))
-            if not cost - least > PARAMETER_PRICE:
+            if not cost - least > PARAMETER_PENALTY:
                 return {n: float(s) for n, s in zip(self.names, best, strict=True) if s > 0.0}
             best, cost = wanted, least
 

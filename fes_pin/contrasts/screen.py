@@ -15,7 +15,7 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.search.library import Library
 from fes_pin.diagnosis.search.starts import near_null, started
 from fes_pin.infer.family import Family
-from fes_pin.infer.levels import PARAMETER_PRICE
+from fes_pin.infer.levels import PARAMETER_PENALTY
 from fes_pin.infer.problem import Linearized, Unknowns, completed
 from fes_pin.infer.projection import Projection
 from fes_pin.infer.spread import ByUnit, Spread, usual_spread
@@ -65,7 +65,7 @@ class ItemScore:
     @property
     def net_gain(self) -> float:
         """Gain less the penalty of the parameters."""
-        return self.gain - PARAMETER_PRICE * self.degrees
+        return self.gain - PARAMETER_PENALTY * self.degrees
 
 
 @dataclass(frozen=True)

@@ -34,14 +34,14 @@ class ImposedMotion:
     ----------
     values
         Shape (3, n): position, velocity and acceleration, as `MOTION` names them.
-    doubt
+    std
         Standard deviations of the noise that stays in each.
     bandwidth_hz
         Of velocity and acceleration.
     """
 
     values: np.ndarray
-    doubt: tuple[float, float, float]
+    std: tuple[float, float, float]
     bandwidth_hz: float
 
     @property
@@ -50,7 +50,7 @@ class ImposedMotion:
         return float(self.values[0, 0])
 
     def known(self, time: np.ndarray) -> np.ndarray:
-        """True where velocity and acceleration are as sure as `doubt` says, shape (n,).
+        """True where velocity and acceleration are as sure as `std` says, shape (n,).
 
         Within one knot of either end, half a period of the bandwidth, a spline has no neighbours on one side, and its
         acceleration is several times as uncertain. At most a tenth of a trial is given away at each end.
@@ -87,11 +87,11 @@ def driving_values(trial: Trial, name: str, columns: tuple[str, ...]) -> np.ndar
 
 def _smoothed(trial: Trial, columns: tuple[str, ...]) -> ImposedMotion:
     measured = [_Reading.of(trial, n) for n in columns if n in trial]
-    values, doubt, bandwidth = _rates(measured[0])
+    values, std, bandwidth = _rates(measured[0])
     if len(measured) > 1:
-        rate, rate_doubt, bandwidth = _rates(measured[1])
-        values, doubt = np.stack([values[0], rate[0], rate[1]]), np.array([doubt[0], rate_doubt[0], rate_doubt[1]])
-    return ImposedMotion(values, (float(doubt[0]), float(doubt[1]), float(doubt[2])), bandwidth)
+        rate, rate_std, bandwidth = _rates(measured[1])
+        values, std = np.stack([values[0], rate[0], rate[1]]), np.array([std[0], rate_std[0], rate_std[1]])
+    return ImposedMotion(values, (float(std[0]), float(std[1]), float(std[2])), bandwidth)
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """Implausible numbers of a study, found before anything is fitted: errors, and warnings of one line each.
 
-Refused, as no verdict could follow from it: no stimulus above threshold in any trial, outputs that never change or go
+Rejected, as no verdict could follow from it: no stimulus above threshold in any trial, outputs that never change or go
 to and fro between two counts, too few samples, a load that only grams explain, an imposed motion that never moves; and
 what `check_trial` refuses of each trial: an angle that only degrees explain. Everything else is a warning, and the
 diagnosis goes on. Trials that are only to be predicted are held to the same list, but for what a fit needs.
@@ -221,8 +221,8 @@ def _imposed(study: Study | ToPredict) -> Iterable[str]:
     ends = [(float(m.values[0].min()), float(m.values[0].max())) for m in motions]
     moved = max(high for _, high in ends) - min(low for low, _ in ends)
     longest = max(float(np.abs(t[name]).max()) for t in trials)
-    if not moved > max(STILL * max(m.doubt[0] for m in motions), 1e-9 * longest):
-        message = f"{name} never moves in any imposed trial: nothing but noise of {motions[0].doubt[0]:.2g} is in it"
+    if not moved > max(STILL * max(m.std[0] for m in motions), 1e-9 * longest):
+        message = f"{name} never moves in any imposed trial: nothing but noise of {motions[0].std[0]:.2g} is in it"
         raise InputError(message, file=study.folder, column=name)
     bands = [m.bandwidth_hz for m in motions]
     band = f"{min(bands):.2g} Hz" if max(bands) < 1.1 * min(bands) else f"{min(bands):.2g} to {max(bands):.2g} Hz"

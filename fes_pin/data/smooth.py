@@ -95,7 +95,7 @@ def smoothed_rates(values: np.ndarray, time: np.ndarray) -> tuple[np.ndarray, np
     -------
     derivatives
         (3, n).
-    doubt
+    std
         (3,): standard deviations of white noise in them, s^2 2 f dt (2 pi f)^2k / (2 k + 1) the variances, with s that
         of a sample and f the bandwidth.
     bandwidth_hz
@@ -109,8 +109,8 @@ def smoothed_rates(values: np.ndarray, time: np.ndarray) -> tuple[np.ndarray, np
     spline = _spline(time, values, _knot_places(time, inner))
     noise = float(np.sqrt(np.sum((values - spline(time)) ** 2) / (n - inner - DEGREE - 1)))
     bandwidth = 0.5 * (inner + 1) / float(time[-1] - time[0])
-    doubt = [2.0 * bandwidth * apart * dt * (2.0 * np.pi * bandwidth) ** (2 * k) / (2 * k + 1) for k in range(3)]
-    return np.stack([spline(time, k) for k in range(3)]), noise * np.sqrt(doubt), bandwidth
+    variances = [2.0 * bandwidth * apart * dt * (2.0 * np.pi * bandwidth) ** (2 * k) / (2 * k + 1) for k in range(3)]
+    return np.stack([spline(time, k) for k in range(3)]), noise * np.sqrt(variances), bandwidth
 
 
 def _knots(values: np.ndarray, time: np.ndarray) -> tuple[int, int]:

@@ -11,7 +11,7 @@ from fes_pin.data.asked import asked
 from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.show import frame, table_html
 from fes_pin.data.study import Study
-from fes_pin.diagnosis.decide.doubts import few_trials
+from fes_pin.diagnosis.decide.few_trials import few_trials
 from fes_pin.diagnosis.diagnosis import measured_study, split
 from fes_pin.diagnosis.plausibility import check_study
 from fes_pin.diagnosis.testable import Testable, testable_causes
@@ -50,14 +50,14 @@ class Checked(ReadOnly):
 
     def as_dict(self) -> dict[str, Any]:
         """The same for JSON; `shown` holds the share of each cause's sensitivity that nothing else takes up."""
-        told: dict[str, Any] = {"study": self.study.name, "rig": self.study.rig, "trials": len(self.study.trials)}
-        told |= {"odd": list(self.odd), "limits": list(self.limits)}
+        record: dict[str, Any] = {"study": self.study.name, "rig": self.study.rig, "trials": len(self.study.trials)}
+        record |= {"odd": list(self.odd), "limits": list(self.limits)}
         found = self.testable
         if isinstance(found, str):
-            return {**told, "not_known": found}
+            return {**record, "not_known": found}
         lists = {"absorbed": list(found.absorbed), "silent": list(found.silent), "alike": [*map(list, found.alike)]}
         shares = {name: shown(share, 4) for name, share in found.shown.items()}
-        return {**told, "shown": shares, **lists, "unexplained_percent": shown(100.0 * found.unexplained, 4)}
+        return {**record, "shown": shares, **lists, "unexplained_percent": shown(100.0 * found.unexplained, 4)}
 
     def to_frame(self) -> pandas.DataFrame:
         """One row a cause: whether it would show, and the share of its sensitivity that nothing else takes up (0 to 1).

@@ -18,7 +18,7 @@ import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.misread import Misread, restated_trials, takes_most
-from fes_pin.infer.levels import PARAMETER_PRICE, SEPARABLE
+from fes_pin.infer.levels import PARAMETER_PENALTY, SEPARABLE
 from fes_pin.models.model import Model
 from fes_pin.workers import OutOfTime
 
@@ -113,8 +113,8 @@ class Conditions(ABC, Generic[S, R]):
         """Whether the price falls by more than that of a condition, of all that are stated."""
         if search.was_stopped or made.search.was_stopped:
             return False
-        price = PARAMETER_PRICE + 2.0 * math.log(sum(len(self.nominal.rig.stated(t)) for t in trials))
-        return self.saved(searched, trials, made) > price + SEPARABLE
+        criterion = PARAMETER_PENALTY + 2.0 * math.log(sum(len(self.nominal.rig.stated(t)) for t in trials))
+        return self.saved(searched, trials, made) > criterion + SEPARABLE
 
     def _misread(self, trials: Sequence[Trial], searched: R | None) -> Misread | None:
         """A misreading; none where time is over, or where the model cannot be calculated with."""

@@ -19,7 +19,7 @@ from fes_pin.data.spikes import without_spikes
 from fes_pin.data.stuck import without_stuck
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.decide.doubts import few_trials
+from fes_pin.diagnosis.decide.few_trials import few_trials
 from fes_pin.diagnosis.estimators import searched
 from fes_pin.diagnosis.logged import LogFaults, likelier, with_timing_of, with_words
 from fes_pin.diagnosis.long_records import searched_part, thinned
@@ -34,7 +34,7 @@ from fes_pin.diagnosis.stopped import unfitted
 from fes_pin.diagnosis.testable import given_away
 from fes_pin.diagnosis.verdict import diagnosis_of
 from fes_pin.identify.feedback import is_fed_back, is_stimulus_fed_back
-from fes_pin.identify.recording import earns, low_pass_of
+from fes_pin.identify.recording import improves, low_pass_of
 from fes_pin.infer.result import STOPPED
 from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
 from fes_pin.models.model import Model
@@ -123,13 +123,13 @@ class _Work:
         driven = _is_answered(nominal.rig, train)
         logged = all(EFFORT in nominal.rig.input_columns(t) for t in study.trials)
         faults = LogFaults(study.trials, lambda trials: _searched(study, trials, driven), self.end)
-        log = Log(effort_noise=faults.noise_beside_nominal(nominal)) if driven and logged else Log()
+        log = Log(effort_noise=faults.effort_noise_of_nominal(nominal)) if driven and logged else Log()
         found = self._logged(study, log)
         if not self.stops and (passed := _low_passed(found, self.end)) is not None:
             found = _likelier(self.diagnosis(passed), found)
         if not (driven and logged):
             return found
-        if not self.stops and (noise := faults.noise_beside(found)) != found.log.effort_noise:
+        if not self.stops and (noise := faults.effort_noise_of(found)) != found.log.effort_noise:
             found = likelier(self._logged(study, replace(found.log, effort_noise=noise)), found)
         late = None if self.stops else faults.lateness(found)
         if late is not None:
@@ -193,8 +193,8 @@ def _searched(study: Study, trials: Sequence[Trial], driven: bool) -> list[Trial
 def _low_passed(diagnosis: Diagnosis, end: float) -> Study | None:
     """The study with the low pass that its readings seem to have gone through; None where nothing speaks for one.
 
-    Only where something is left is it asked for. Of rigs that are judged by the likelihood, `identify.lasting` finds
-    how long noise lasts instead.
+    It is asked for only where a test of lack of fit rejects the model. Of rigs whose input answers their reading,
+    `identify.correlation_time` finds the correlation time of the noise instead.
     """
     restated = any(c.name == MISREAD for c in diagnosis.causes)
     if not diagnosis.remainder.unexplained or diagnosis.is_driven or restated:
@@ -212,7 +212,7 @@ def _low_passed(diagnosis: Diagnosis, end: float) -> Study | None:
 def _likelier(passed: Diagnosis, recorded: Diagnosis) -> Diagnosis:
     """The diagnosis of readings as low-passed, if what it leaves is the likelier noise by what a low pass must earn."""
     fits = passed.extended, recorded.extended
-    if not earns(*fits):
+    if not improves(*fits):
         return recorded
     trials = passed.extended.trials
     names = " and ".join(dict.fromkeys(n for t in trials for n in passed.extended.model.rig.outputs(t.kind) if n in t))

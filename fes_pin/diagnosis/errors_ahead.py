@@ -19,13 +19,13 @@ from fes_pin.infer.levels import AVERAGED_S, RUNAWAY, SMALL_SHARE
 from fes_pin.infer.noise import NoiseModel
 from fes_pin.models.autoregression import weights_ahead
 from fes_pin.models.model import Model
-from fes_pin.models.predictor import Doubt
+from fes_pin.models.predictor import StateSpaceNoise
 from fes_pin.workers import in_parallel
 
 TENTHS = 10
 """Pieces of a trial that is simulated freely, where there are fewer than `FOLDS` trials."""
 
-_Told = tuple[dict[str, np.ndarray], dict[str, np.ndarray]]
+_Predicted = tuple[dict[str, np.ndarray], dict[str, np.ndarray]]
 
 
 @dataclass(frozen=True)
@@ -149,9 +149,9 @@ def _free_squares(model: Model, trial: Trial, noise: NoiseModel, pieces: int) ->
 
 def _squares(fitted: LikelihoodFit, floor: LikelihoodFit, trial: Trial, horizon_s: float) -> np.ndarray:
     """`Errors` of a trial by its seconds, shape (4, seconds); errors of as long as the horizon have one origin."""
-    told, noise = _told(fitted, trial, horizon_s)
+    predicted, noise = _predicted(fitted, trial, horizon_s)
     lines = np.zeros((4, len(trial)))
-    for name, values in told.items():
+    for name, values in predicted.items():
         variance, measured = floor.noise.white[name] ** 2, trial[name]
         squares = noise[name] / variance
         lines[0] += np.nan_to_num(measured - values, posinf=0.0, neginf=0.0) ** 2 / variance
@@ -163,40 +163,40 @@ def _squares(fitted: LikelihoodFit, floor: LikelihoodFit, trial: Trial, horizon_
     return np.array([p.sum(axis=1) for p in pieces]).T
 
 
-_TOLD: WeakKeyDictionary[LikelihoodFit, dict[tuple[int, float], tuple[Trial, _Told]]] = WeakKeyDictionary()
+_PREDICTED: WeakKeyDictionary[LikelihoodFit, dict[tuple[int, float], tuple[Trial, _Predicted]]] = WeakKeyDictionary()
 
 
-def _told(fitted: LikelihoodFit, trial: Trial, horizon_s: float) -> _Told:
+def _predicted(fitted: LikelihoodFit, trial: Trial, horizon_s: float) -> _Predicted:
     """What is foretold over the horizon, and the variance of its errors by noise alone, shape (n,) by output.
 
     The same is asked where causes are judged and where errors are told: it is kept as long as the fit is.
     """
-    known, key = _TOLD.setdefault(fitted, {}), (id(trial), horizon_s)
+    known, key = _PREDICTED.setdefault(fitted, {}), (id(trial), horizon_s)
     if key not in known:
-        known[key] = (trial, _foretold(fitted, trial, horizon_s))  # as long as the trial is here no other has its id
+        known[key] = (trial, _predict(fitted, trial, horizon_s))  # as long as the trial is here no other has its id
     return known[key][1]
 
 
-def _foretold(fitted: LikelihoodFit, trial: Trial, horizon_s: float) -> _Told:
+def _predict(fitted: LikelihoodFit, trial: Trial, horizon_s: float) -> _Predicted:
     if is_simulated(fitted.noise, [trial]):
-        return _foretold_freely(fitted, trial, horizon_s)
+        return _predict_freely(fitted, trial, horizon_s)
     calm = noise_that_is_small(fitted)
-    told = forecasts(fitted.model, trial, fitted.noise, horizon_s)
-    alone = told if calm is fitted.noise else forecasts(fitted.model, trial, calm, horizon_s)
+    predicted = forecasts(fitted.model, trial, fitted.noise, horizon_s)
+    alone = predicted if calm is fitted.noise else forecasts(fitted.model, trial, calm, horizon_s)
     noise = {n: np.where(np.isfinite(trial[n]), np.nan_to_num(one.variances), 0.0) for n, one in alone.items()}
-    return {n: one.values for n, one in told.items()}, noise
+    return {n: one.values for n, one in predicted.items()}, noise
 
 
-def _foretold_freely(fitted: LikelihoodFit, trial: Trial, horizon_s: float) -> _Told:
+def _predict_freely(fitted: LikelihoodFit, trial: Trial, horizon_s: float) -> _Predicted:
     """The same without process noise: a free simulation, and what measurement noise predicts of what it misses."""
-    told, variances = {}, {}
+    predicted, variances = {}, {}
     steps = max(1, round(horizon_s / trial.dt))
     for name, missed in free_residuals(fitted.model, trial, fitted.noise).items():
         noise = fitted.noise[name]
-        told[name] = trial[name] - missed + forecast(np.nan_to_num(missed), noise, trial.dt, horizon_s)
+        predicted[name] = trial[name] - missed + forecast(np.nan_to_num(missed), noise, trial.dt, horizon_s)
         grown = np.append(1.0, weights_ahead(noise.ar, steps - 1)[:, 0] if noise.ar else np.zeros(steps - 1))
         variances[name] = np.where(np.isfinite(missed), (noise.innovation_std**2) * float(grown @ grown), 0.0)
-    return told, variances
+    return predicted, variances
 
 
 def _first(fitted: LikelihoodFit, trial: Trial, horizon_s: float) -> int:
@@ -206,7 +206,7 @@ def _first(fitted: LikelihoodFit, trial: Trial, horizon_s: float) -> int:
     return first if first < len(trial) else 0
 
 
-def noise_that_is_small(fitted: LikelihoodFit) -> Doubt:
+def noise_that_is_small(fitted: LikelihoodFit) -> StateSpaceNoise:
     """What is random about a rig and its readings that is noise.
 
     A random effort as far as it is small beside what drives the rig: what is more than `SMALL_SHARE` of that, is
@@ -238,7 +238,7 @@ def _sums(fitted: LikelihoodFit, floor: LikelihoodFit, trial: Trial, horizon_s: 
     One sample ahead, over the horizon, free, and over the horizon by noise alone; in units of the noise of `floor`.
     """
     name = fitted.model.rig.output(trial.kind)
-    measured, (told, noise) = trial[name], _told(fitted, trial, horizon_s)
+    measured, (predicted, noise) = trial[name], _predicted(fitted, trial, horizon_s)
     begun = np.arange(len(trial)) < _first(fitted, trial, horizon_s)
     free = free_residuals(fitted.model, trial, fitted.noise)[name]
     if is_simulated(fitted.noise, [trial]):
@@ -247,7 +247,7 @@ def _sums(fitted: LikelihoodFit, floor: LikelihoodFit, trial: Trial, horizon_s: 
         next_one = one_step(fitted.model, trial, fitted.noise)[name]
     errors = (
         next_one,
-        np.where(begun, np.nan, measured - told[name]),
+        np.where(begun, np.nan, measured - predicted[name]),
         free,
         np.where(begun, np.nan, np.sqrt(noise[name])),
     )

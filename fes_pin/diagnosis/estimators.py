@@ -11,14 +11,16 @@ from fes_pin.diagnosis.errors_ahead import squared_errors
 from fes_pin.diagnosis.search.cause_sets import names_of
 from fes_pin.diagnosis.search.likelihood_fits import MEASUREMENT, PROCESS, WHITE
 from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodSearch, NominalFitError
-from fes_pin.identify.likelihood_fit import LikelihoodFit, beside_fresh_efforts
+from fes_pin.identify.likelihood_fit import LikelihoodFit, with_white_process_noise
 from fes_pin.identify.process_noise import step_s
 from fes_pin.infer.held_out import held_out_gain
 from fes_pin.infer.levels import NOTHING_PERCENT
 from fes_pin.infer.search import Policy
 from fes_pin.workers import OutOfTime, in_parallel, time_limit
 
-FRESH = "what acts at random was taken for new in every sample: beside what lasts, the model foretold less"
+WHITE_PROCESS_NOISE = (
+    "what acts at random was taken for new in every sample: beside what lasts, the model foretold less"
+)
 """What is told of it."""
 
 
@@ -36,7 +38,7 @@ def searched(search: LikelihoodSearch) -> tuple[LikelihoodSearch, Found]:
             acting = search.models.with_process_noise(found.best)
     except (ArithmeticError, np.linalg.LinAlgError, OutOfTime):
         return search, found
-    if not acting.price < found.best.price:
+    if not acting.criterion < found.best.criterion:
         return search, found
     return _with_process_noise(search) or (search, found)
 
@@ -74,18 +76,18 @@ def _with_process_noise(search: LikelihoodSearch) -> tuple[LikelihoodSearch, Fou
     return None if other.was_stopped else (other, found)
 
 
-def beside_what_is_new(search: LikelihoodSearch, found: Found) -> LikelihoodFit | None:
+def found_with_white_process_noise(search: LikelihoodSearch, found: Found) -> LikelihoodFit | None:
     """What was found, beside random efforts that are new in every sample; None where none that lasts acts."""
     if search.was_stopped or not search.models.answered or not _may_last(found.best):
         return None
     try:
         with time_limit(search.seconds_left):
-            return beside_fresh_efforts(found.best)
+            return with_white_process_noise(found.best)
     except (ArithmeticError, np.linalg.LinAlgError, OutOfTime):
         return None
 
 
-def judged_again(search: LikelihoodSearch, found: Found, fresh: LikelihoodFit) -> tuple[LikelihoodSearch, Found] | None:
+def judged_again(search: LikelihoodSearch, found: Found, white: LikelihoodFit) -> tuple[LikelihoodSearch, Found] | None:
     """What was found beside random efforts that are new in every sample; None where it gains nothing there.
 
     It gains where its errors over the horizon are less, by a thousandth of what the nominal model gets wrong: a random
@@ -96,14 +98,14 @@ def judged_again(search: LikelihoodSearch, found: Found, fresh: LikelihoodFit) -
     Parameters
     ----------
     fresh
-        Of `beside_what_is_new`.
+        Of `found_with_white_process_noise`.
     """
     try:
         with time_limit(search.seconds_left):
-            if not _foretells_more(fresh, search, found):
+            if not _predicts_better(white, search, found):
                 return None
-            sets = search.models.begun_with([fresh, *_beside(found)])
-            again = LikelihoodSearch(sets, search.progress, Policy(given=names_of(fresh)))
+            sets = search.models.begun_with([white, *_parts_and_rivals(found)])
+            again = LikelihoodSearch(sets, search.progress, Policy(given=names_of(white)))
         with time_limit(search.seconds_left):
             other = again.run()
     except (ArithmeticError, np.linalg.LinAlgError, OutOfTime, NominalFitError):
@@ -111,19 +113,19 @@ def judged_again(search: LikelihoodSearch, found: Found, fresh: LikelihoodFit) -
     return None if again.was_stopped else (again, other)
 
 
-def _foretells_more(fresh: LikelihoodFit, search: LikelihoodSearch, found: Found) -> bool:
+def _predicts_better(white: LikelihoodFit, search: LikelihoodSearch, found: Found) -> bool:
     """Whether errors over the horizon are less beside efforts that are new."""
-    many = [[(f, found.best, f.trials)] for f in (found.nominal, found.best, fresh)]
-    nominal, lasting, new = (squared_errors(one, search.models.horizon_s) for one in many)
-    return held_out_gain(nominal, lasting, new, search.models.seed).percent > NOTHING_PERCENT
+    many = [[(f, found.best, f.trials)] for f in (found.nominal, found.best, white)]
+    nominal, coloured, new = (squared_errors(one, search.models.horizon_s) for one in many)
+    return held_out_gain(nominal, coloured, new, search.models.seed).percent > NOTHING_PERCENT
 
 
-def _beside(found: Found) -> list[LikelihoodFit]:
+def _parts_and_rivals(found: Found) -> list[LikelihoodFit]:
     """The parts of what was found, and what cannot be told from it, beside efforts that are new."""
     parts = {names_of(f): f for f in (*found.without.values(), found.nominal)}
     parts |= {names_of(f): f for many in found.rivals.values() for f in not_excluded(found.best, many)}
     parts.pop(names_of(found.best), None)
-    return in_parallel(beside_fresh_efforts, list(parts.values()))
+    return in_parallel(with_white_process_noise, list(parts.values()))
 
 
 def _may_last(fitted: LikelihoodFit) -> bool:
@@ -132,8 +134,8 @@ def _may_last(fitted: LikelihoodFit) -> bool:
     Where the motion is imposed effort itself is read, and a reading of it lasts as it does; where a rig begins at rest
     noise that foretells itself is told from a random effort (`LikelihoodFits.nominal`).
     """
-    lasts = any(fitted.noise.time[n] > step_s(fitted.noise, fitted.trials) for n in fitted.noise.acting)
-    return lasts and all(t.kind != IMPOSED and fitted.model.rig.unknowns(t.kind) for t in fitted.trials)
+    is_coloured = any(fitted.noise.time[n] > step_s(fitted.noise, fitted.trials) for n in fitted.noise.acting)
+    return is_coloured and all(t.kind != IMPOSED and fitted.model.rig.unknowns(t.kind) for t in fitted.trials)
 
 
-__all__ = ["FRESH", "beside_what_is_new", "judged_again", "least_error", "searched"]
+__all__ = ["WHITE_PROCESS_NOISE", "found_with_white_process_noise", "judged_again", "least_error", "searched"]

@@ -143,16 +143,16 @@ def next_experiment(
         return NextExperiment(why, pair, None)
     expected, trial = _refined(best, rivals, found, study)
     closest = min(expected, key=lambda n: expected[n].worth)
-    pair, told = (name, closest), expected[closest]
-    if told.worth < 1.0:
-        most = f"{told.worth:.2g} squared noise units at most" if told.worth >= ALIKE else "nothing"
+    pair, separation = (name, closest), expected[closest]
+    if separation.worth < 1.0:
+        most = f"{separation.worth:.2g} squared noise units at most" if separation.worth >= ALIKE else "nothing"
         why = f"no stimulus or load of this rig separates {name} and {closest}: the models differ by {most}"
         why = f"{why}; {best.model.rig.elsewhere}"
         return NextExperiment(why, pair, None)
     others = ", the other rivals by more" if len(rivals) > 1 else ""
-    differ = f"{name} and {closest} differ by {told.worth:.3g} squared noise units{others}"
-    why = f"on this trial {differ}; {_often(told.repeats())}"
-    return NextExperiment(why, pair, trial, (told.distance(0), told.distance(1)))
+    differ = f"{name} and {closest} differ by {separation.worth:.3g} squared noise units{others}"
+    why = f"on this trial {differ}; {_often(separation.repeats())}"
+    return NextExperiment(why, pair, trial, (separation.distance(0), separation.distance(1)))
 
 
 def _often(repeats: int | None) -> str:
@@ -185,7 +185,7 @@ def discriminations(
     )
     if_rival = [Linearized(-r.residual, b.jacobian, b.local) for r, b in zip(if_best, slopes, strict=True)]
     known = (normal_equations(rival.parts).hessian, normal_equations(best.parts).hessian)
-    lead = rival.price - best.price
+    lead = rival.criterion - best.criterion
     found = iter(zip(if_best, if_rival, strict=True))
     return [Discrimination(lead, _equations(*next(found)), known) if keep else None for keep in kept]
 

@@ -90,7 +90,7 @@ def with_choices(folds: Sequence[Fold], chosen: Sequence[LikelihoodFit], refitte
     return [replace(fold, chosen=one) for fold, one in zip(folds, again, strict=True)]
 
 
-def afresh(fitted: LikelihoodFit, trials: Sequence[Trial]) -> LikelihoodFit:
+def refit(fitted: LikelihoodFit, trials: Sequence[Trial]) -> LikelihoodFit:
     """A fit again, to other trials, with what is random in these."""
     problem, unknowns = _problem(fitted, trials)
     return maximise(problem, fitted.values, unknowns, near=True)
@@ -117,16 +117,16 @@ def evidence_of(folds: Sequence[Fold], found: Found, alike: Again) -> dict[str, 
     What is random is as in all trials: learned without one that is unlike the others, it made that one so unlikely
     that no cause could speak for itself. See `infer.held_out.marginal_cost`.
     """
-    foretold = {n: 0.0 for n in ("", *found.without)}
+    predicted = {n: 0.0 for n in ("", *found.without)}
     for fold in folds:
         whole = part = {"": found.best, **found.without}
         if fold.within:
             part = dict(zip(whole, alike([(f, fold.best.trials) for f in whole.values()]), strict=True))
         else:
             whole = dict(zip(part, alike([(f, (*f.trials, *fold.test)) for f in part.values()]), strict=True))
-        for n in foretold:
-            foretold[n] += _cost(whole[n]) - _cost(part[n])
-    return {n: Evidence.of(foretold[n] - foretold[""]) for n in found.without}
+        for n in predicted:
+            predicted[n] += _cost(whole[n]) - _cost(part[n])
+    return {n: Evidence.of(predicted[n] - predicted[""]) for n in found.without}
 
 
 def _cost(fitted: LikelihoodFit) -> float:
@@ -165,10 +165,10 @@ def gains_of(
         return found_over
     shortest = min(t.duration for f in folds for t in f.test)
     for name, gain in found_over.items():
-        lasts = min(max(without[name].noise.time.values(), default=0.0), shortest)
-        if not gain.is_material and lasts > horizon_s:
-            longer = _gains_over(folds, (name,), lasts, seed)[name]
-            found_over[name] = replace(longer, ahead_s=lasts) if longer.is_material else gain
+        correlation_s = min(max(without[name].noise.time.values(), default=0.0), shortest)
+        if not gain.is_material and correlation_s > horizon_s:
+            longer = _gains_over(folds, (name,), correlation_s, seed)[name]
+            found_over[name] = replace(longer, ahead_s=correlation_s) if longer.is_material else gain
     return found_over
 
 

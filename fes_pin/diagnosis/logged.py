@@ -24,8 +24,8 @@ from fes_pin.identify.effort_timing import (
     with_timing_of_readings,
     words_of_lateness,
 )
-from fes_pin.identify.likelihood_fit import LikelihoodFit, beside_fresh_efforts, maximum_from
-from fes_pin.infer.levels import PARAMETER_PRICE
+from fes_pin.identify.likelihood_fit import LikelihoodFit, maximum_from, with_white_process_noise
+from fes_pin.infer.levels import PARAMETER_PENALTY
 from fes_pin.models.model import Model
 from fes_pin.workers import OutOfTime, in_parallel, time_limit
 
@@ -53,16 +53,18 @@ class LogFaults:
         """What the effort of each trial answers."""
         return in_parallel(answered, self.trials)
 
-    def noise_beside_nominal(self, nominal: Model) -> float:
+    def effort_noise_of_nominal(self, nominal: Model) -> float:
         """Noise of the efforts, in their unit, beside a model without causes; 0 where nothing speaks for it."""
-        return self._told(lambda: self._noise(LikelihoodFits(nominal, self.prepared(self.trials), ()).nominal()), 0.0)
+        return self._in_time(
+            lambda: self._noise(LikelihoodFits(nominal, self.prepared(self.trials), ()).nominal()), 0.0
+        )
 
-    def noise_beside(self, diagnosis: Diagnosis) -> float:
+    def effort_noise_of(self, diagnosis: Diagnosis) -> float:
         """The same beside a diagnosis; what was taken out for it is put back where efforts are likelier with it."""
         fitted, known = diagnosis.extended, diagnosis.log.effort_noise
         if known:
-            return known * self._told(lambda: float(fitted.sse < self._as_recorded(fitted).sse), 1.0)
-        return self._told(lambda: self._noise(fitted), 0.0) if diagnosis.verdict != "adequate" else 0.0
+            return known * self._in_time(lambda: float(fitted.sse < self._as_recorded(fitted).sse), 1.0)
+        return self._in_time(lambda: self._noise(fitted), 0.0) if diagnosis.verdict != "adequate" else 0.0
 
     def _as_recorded(self, fitted: LikelihoodFit) -> LikelihoodFit:
         """The same model on trials with all the noise that their efforts were recorded with."""
@@ -77,7 +79,7 @@ class LogFaults:
         What was found may stand for it: the nominal model is asked where something is left beside, or where it is
         cheaper with efforts in time than all that was found.
         """
-        return self._told(lambda: self._lateness(diagnosis), None)
+        return self._in_time(lambda: self._lateness(diagnosis), None)
 
     def _lateness(self, diagnosis: Diagnosis) -> Lateness | None:
         nominal, extended = diagnosis.nominal, diagnosis.extended
@@ -87,8 +89,8 @@ class LogFaults:
         if late is None and diagnosis.causes:
             late = lateness_of(nominal, row_s, as_logged)
             if late is not None and not diagnosis.remainder.unexplained:
-                price = late.cost + PARAMETER_PRICE * (nominal.degrees + 1)
-                late = late if price < extended.price else None
+                criterion = late.cost + PARAMETER_PENALTY * (nominal.degrees + 1)
+                late = late if criterion < extended.criterion else None
         return late
 
     def with_timing(self, diagnosis: Diagnosis, late: Lateness | None) -> Diagnosis:
@@ -101,18 +103,18 @@ class LogFaults:
         """
         row_s, fitted = min(t.dt for t in self.trials), diagnosis.extended
 
-        def doubted(wide: LikelihoodFit, timed: Log) -> LikelihoodFit:
+        def widened(wide: LikelihoodFit, timed: Log) -> LikelihoodFit:
             log = with_timing_of(diagnosis.log, timed)
             moved = self.prepared([log.applied(t) for t in self.trials])
             return with_lateness(wide, maximum_from(fitted, moved))
 
-        wide = known = self._told(lambda: with_timing_of_readings(fitted, row_s), fitted)
+        wide = known = self._in_time(lambda: with_timing_of_readings(fitted, row_s), fitted)
         if late is not None:
-            wide = self._told(lambda: doubted(known, late.at_most), known)
+            wide = self._in_time(lambda: widened(known, late.at_most), known)
         causes = tuple(replace(c, parameters=estimates(wide, c.name)) for c in diagnosis.causes)
         return replace(diagnosis, extended=wide, causes=causes)
 
-    def _told(self, ask: Callable[[], T], otherwise: T) -> T:
+    def _in_time(self, ask: Callable[[], T], otherwise: T) -> T:
         """What is told in the time that is left."""
         try:
             with time_limit(self._end - time.perf_counter()):
@@ -147,13 +149,13 @@ def _is_likelier(one: LikelihoodFit, other: LikelihoodFit) -> bool:
     Beside random efforts that are new in every sample where those of one are.
     """
     both = one.noise, other.noise
-    lasts_s, timed = max(n.lasts_s for n in both), any(n.timed for n in both)
-    first, second = (_as_random(f, lasts_s, timed) for f in (one, other))
-    return first.price < second.price
+    correlation_s, timed = max(n.correlation_s for n in both), any(n.timed for n in both)
+    first, second = (_as_random(f, correlation_s, timed) for f in (one, other))
+    return first.criterion < second.criterion
 
 
-def _as_random(fitted: LikelihoodFit, lasts_s: float, timed: bool) -> LikelihoodFit:
+def _as_random(fitted: LikelihoodFit, correlation_s: float, timed: bool) -> LikelihoodFit:
     """The fit to readings so far apart, and beside random efforts that are new in every one if these are to be."""
-    if fitted.noise.lasts_s != lasts_s:
-        fitted = maximum_from(fitted, fitted.trials, replace(fitted.noise, lasts_s=lasts_s))
-    return beside_fresh_efforts(fitted) if timed and not fitted.noise.timed else fitted
+    if fitted.noise.correlation_s != correlation_s:
+        fitted = maximum_from(fitted, fitted.trials, replace(fitted.noise, correlation_s=correlation_s))
+    return with_white_process_noise(fitted) if timed and not fitted.noise.timed else fitted

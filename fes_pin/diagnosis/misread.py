@@ -210,17 +210,17 @@ def _left_out(
         return None
     own = _step(fitted, trials[i], name, noise, sizes[name])
     steps = [_step(fitted, trials[k], n, noise, sizes[n], 1) for k, n in wanted if k != i]
-    told = [s for s in steps if math.isfinite(s.z)]
-    if len(told) < FEWEST_STATED - 1 or not math.isfinite(own.z):
+    finite = [s for s in steps if math.isfinite(s.z)]
+    if len(finite) < FEWEST_STATED - 1 or not math.isfinite(own.z):
         return None
-    phi = max(1.0, float(np.mean([s.z**2 for s in told])))
+    phi = max(1.0, float(np.mean([s.z**2 for s in finite])))
     t = abs(own.z) / math.sqrt(phi)
-    p = min(1.0, 2.0 * len(wanted) * float(special.stdtr(len(told), -t)))
+    p = min(1.0, 2.0 * len(wanted) * float(special.stdtr(len(finite), -t)))
     usual = max(float(part.residual @ part.residual) / len(part.residual) for part in fitted.parts)
     if not p < CLAIM_LEVEL or own.left > EXPLAINED_AS_WELL * max(usual, 1.0):
         return None
     stated = whole.model.rig.stated(trials[i])[name]
-    told_by = [_step(fitted, trials[i], name, noise, sizes[name], half=k).value for k in (0, 1)]
+    halves = [_step(fitted, trials[i], name, noise, sizes[name], half=k).value for k in (0, 1)]
     return Misread(
         trials[i].name,
         name,
@@ -228,7 +228,7 @@ def _left_out(
         stated + own.value,
         own.std * math.sqrt(phi),
         p,
-        (stated + told_by[0], stated + told_by[1]),
+        (stated + halves[0], stated + halves[1]),
         whole,
         fitted,
     )

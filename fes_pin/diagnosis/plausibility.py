@@ -63,16 +63,16 @@ def _steps(study: Study | ToPredict, model: Model) -> Iterable[str]:
         message = f"the time step of trial {slowest.name} is {slowest.dt:.4g} s; expected at most {SLOWEST_S:g} s"
         raise InputError(f"{message}: is time_s in ms?", file=study.folder, column="time_s")
     for name, constant in model.rig.time_constants({t.kind for t in study.trials}).items():
-        told = f"the time step of trial {slowest.name} is {slowest.dt:.4g} s, and {name} {constant:.4g} s"
+        said = f"the time step of trial {slowest.name} is {slowest.dt:.4g} s, and {name} {constant:.4g} s"
         is_fitted = isinstance(
             study, ToPredict
         )  # a constant that a fit found may be short, and that is no slip of units
         if slowest.dt > COARSE * constant and not (is_fitted and slowest.dt < SLOW_S):
             raise InputError(
-                f"{told}: is time_s in ms, or the value in [start] wrong?", file=study.folder, column="time_s"
+                f"{said}: is time_s in ms, or the value in [start] wrong?", file=study.folder, column="time_s"
             )
         if slowest.dt > constant:
-            yield f"{told}: what happens between samples is lost; is time_s in another unit?"
+            yield f"{said}: what happens between samples is lost; is time_s in another unit?"
         if longest < constant and name != RUN_OUT:
             yield f"the longest trial lasts {longest:.4g} s, and {name} is {constant:.4g} s: is time_s in another unit?"
 
@@ -124,8 +124,8 @@ def _swings(study: Study | ToPredict, model: Model) -> Iterable[str]:
             continue
         rest = float(np.mean(end))
         if math.cos(rest - hangs) < math.cos(ASKEW):
-            told = f"trial {trial.name} comes to rest at {rest:.4g} rad, and by the URDF it hangs at {hangs:.4g}"
-            yield f"{told}: is the position's zero elsewhere (zero in [columns]), or its sign another?"
+            said = f"trial {trial.name} comes to rest at {rest:.4g} rad, and by the URDF it hangs at {hangs:.4g}"
+            yield f"{said}: is the position's zero elsewhere (zero in [columns]), or its sign another?"
             return
     length = c["inertia"] * 9.81 / weight
     if length > LONGEST_M:

@@ -35,8 +35,8 @@ def errors_record(
     """E of one of the two models, by the names of `identify.error_measures`."""
     out = {"fit": shown(free[0]), "held_out": shown(free[1])}
     if ahead is not None:
-        told = getattr(ahead, f"{which}_held_out") or getattr(ahead, which)
-        out.update({n: shown(getattr(told, n)) for n in ("one_step", "horizon", "free")})
+        errors = getattr(ahead, f"{which}_held_out") or getattr(ahead, which)
+        out.update({n: shown(getattr(errors, n)) for n in ("one_step", "horizon", "free")})
     return out
 
 
@@ -55,5 +55,5 @@ def ahead_record(ahead: AheadErrors | None, driven: bool, random: Sequence[Rando
         }
         for r in random
     }
-    told = ahead.extended_held_out or ahead.extended
-    return {**horizon, "horizon_ceiling_percent": shown(told.noise), "random": parts}
+    errors = ahead.extended_held_out or ahead.extended
+    return {**horizon, "horizon_ceiling_percent": shown(errors.noise), "random": parts}

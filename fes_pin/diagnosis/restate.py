@@ -11,7 +11,7 @@ from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.conditions import Conditions, Restated
 from fes_pin.diagnosis.errors_ahead import errors_ahead, free_errors
-from fes_pin.diagnosis.held_out import afresh, folds_of
+from fes_pin.diagnosis.held_out import folds_of, refit
 from fes_pin.diagnosis.misread import NAME, Misread, find_misread, restated_trials
 from fes_pin.diagnosis.parts import in_parts
 from fes_pin.diagnosis.remainder.lack_of_fit import lack_of_fit
@@ -52,7 +52,7 @@ class StudyConditions(Conditions[LikelihoodSearch, Found]):
 
     def saved(self, searched: Found, trials: Sequence[Trial], made: Made) -> float:
         """By how much the price falls."""
-        return searched.best.price - made.searched.best.price
+        return searched.best.criterion - made.searched.best.criterion
 
 
 def restated_study(study: Study, nominal: Model, misread: Misread) -> Study:
@@ -77,16 +77,16 @@ def with_misread(
     floor = rough_noise(before.model, trials)
     pair = (free_errors(before.model, trials, floor), free_errors(diagnosis.nominal.model, made.trials, floor))
     cause = _cause(made, held_out_gain(pair[0], *pair, seed).percent, trials, seed)
-    told = replace(diagnosis, causes=(cause, *diagnosis.causes), verdict="causes_found")
+    restated = replace(diagnosis, causes=(cause, *diagnosis.causes), verdict="causes_found")
     if diagnosis.ahead is None:
-        return told
+        return restated
     parts = in_parts(before.model.rig, trials)
     nominal = maximum_from(made.searched.nominal, parts)
     held = [(nominal, best, test)] if test else [_without(nominal, best, out) for out in folds_of(parts)]
     horizon, falling = diagnosis.ahead.horizon_s, diagnosis.ahead.nominal.free is None
     inside, outside = (errors_ahead(some, horizon, falling) for some in ([(nominal, best, parts)], held))
     ahead = replace(diagnosis.ahead, nominal=inside, nominal_held_out=outside)
-    return replace(told, nominal_error=(inside.free, outside.free), ahead=ahead)
+    return replace(restated, nominal_error=(inside.free, outside.free), ahead=ahead)
 
 
 def _without(
@@ -94,14 +94,14 @@ def _without(
 ) -> tuple[LikelihoodFit, LikelihoodFit, list[Trial]]:
     """A fit without some of its trials, the fit whose noise is the unit of its errors, and those trials."""
     others = [t for i, t in enumerate(fitted.trials) if i not in out]
-    return afresh(fitted, others), floor, [fitted.trials[i] for i in out]
+    return refit(fitted, others), floor, [fitted.trials[i] for i in out]
 
 
 def _cause(made: Made, gain_fit: float, trials: Sequence[Trial], seed: int) -> Cause:
     misread = made.misread
     unit = made.misread.whole.model.rig.schema.conditions.get(misread.condition)
     trial = next(t for t in trials if t.name == misread.trial)
-    stated, told = _errors_of_halves(made, trial)
+    stated, restated = _errors_of_halves(made, trial)
     return Cause(
         name=NAME,
         stage=str(Stage.RIG),
@@ -111,7 +111,7 @@ def _cause(made: Made, gain_fit: float, trials: Sequence[Trial], seed: int) -> C
         equivalents=(),
         p_value=misread.p_value,
         gain_fit=gain_fit,
-        gain_held_out=held_out_gain(stated, stated, told, seed),
+        gain_held_out=held_out_gain(stated, stated, restated, seed),
         trial=misread.trial,
         words=misread.words,
     )

@@ -122,7 +122,7 @@ class Diagnosis(Result):
         state = "more than noise" if left.unexplained else "none found"
         where = f", most on {left.where}" if left.where else ""
         own = [e.name for e in self.model.effects if e.each_trial]
-        told = [
+        topics = [
             ("noise of the readings alone", f"E {percent(self.ceiling_percent)}"),
             ("falls", "by itself: free errors are meaningless" if self.is_falling else ""),
             *((f"random {r.name}", in_words(r, unit)) for r in self.random),
@@ -140,7 +140,7 @@ class Diagnosis(Result):
             ),
             ("not testable here", ", ".join(self.absorbed)),
         ]
-        return [(topic, words) for topic, words in told if words] + super().notes()
+        return [(topic, words) for topic, words in topics if words] + super().notes()
 
     def files(self) -> dict[str, str | bytes]:
         """Content of every file of the diagnosis but the report, by name: with the extended model."""

@@ -22,7 +22,7 @@ from fes_pin.diagnosis.search.score import Scores, score_test
 from fes_pin.identify.feedback import is_fed_back
 from fes_pin.identify.fit import Fit, fit_multistart, rough_noise
 from fes_pin.identify.problem import Problem
-from fes_pin.infer.levels import ABSORBED_BELOW, ALIKE_COSINE, LEAST_SHIFT_S, REVERSED_LEAVES, SMALL_SHARE
+from fes_pin.infer.levels import ALIKE_COSINE, IDENTIFIABLE_SHARE, LEAST_SHIFT_S, REVERSED_LEAVES, SMALL_SHARE
 from fes_pin.models.catalogue import Catalogue, installed
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
@@ -89,9 +89,9 @@ def testable_causes(study: Study, catalogue: Catalogue | None = None) -> Testabl
     for one in scores.scored:
         kept[one.probe.name] = max(kept.get(one.probe.name, 0.0), one.kept)
     return Testable(
-        shown={n: k for n, k in sorted(kept.items()) if k >= ABSORBED_BELOW},
-        absorbed=tuple(sorted(n for n, k in kept.items() if k < ABSORBED_BELOW)),
-        silent=library.silent(),
+        shown={n: k for n, k in sorted(kept.items()) if k >= IDENTIFIABLE_SHARE},
+        absorbed=tuple(sorted(n for n, k in kept.items() if k < IDENTIFIABLE_SHARE)),
+        silent=library.not_excited(),
         alike=_alike(scores, kept),
         unexplained=_unexplained(fitted),
         warnings=tuple(warnings),
@@ -144,7 +144,9 @@ def _alike(scores: Scores, kept: Mapping[str, float]) -> tuple[tuple[str, ...], 
     single = [
         (one.probe.name, block.start)
         for one, block in zip(scores.scored, scores.blocks, strict=False)
-        if block.stop - block.start == 1 and kept[one.probe.name] >= ABSORBED_BELOW and one.kept >= ABSORBED_BELOW
+        if block.stop - block.start == 1
+        and kept[one.probe.name] >= IDENTIFIABLE_SHARE
+        and one.kept >= IDENTIFIABLE_SHARE
     ]
     groups: list[set[str]] = []
     for (name, i), (other, j) in itertools.combinations(single, 2):

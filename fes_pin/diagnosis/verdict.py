@@ -15,7 +15,7 @@ import numpy as np
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.decide.chosen_again import ChosenAgain, is_chosen, share_of
-from fes_pin.diagnosis.decide.rivals import absorbed, alternatives, estimates, experiment, ranking
+from fes_pin.diagnosis.decide.rivals import alternatives, estimates, experiment, not_identifiable, ranking
 from fes_pin.diagnosis.errors_ahead import (
     Ahead,
     AheadErrors,
@@ -26,26 +26,26 @@ from fes_pin.diagnosis.errors_ahead import (
     noise_that_is_small,
     random_parts,
 )
-from fes_pin.diagnosis.estimators import FRESH, beside_what_is_new, judged_again, least_error
+from fes_pin.diagnosis.estimators import WHITE_PROCESS_NOISE, found_with_white_process_noise, judged_again, least_error
 from fes_pin.diagnosis.held_out import (
     Again,
     Fold,
-    afresh,
     as_random_as_in_all,
     evidence_of,
     folds_of,
     gains_of,
     held_errors_ahead,
     make_folds,
+    refit,
     with_choices,
 )
-from fes_pin.diagnosis.refused import UNMOVED, is_moved_by_what_is_recorded, no_noise, with_refused_causes
+from fes_pin.diagnosis.rejected import UNMOVED, is_moved_by_what_is_recorded, no_noise, with_rejected_causes
 from fes_pin.diagnosis.remainder.lack_of_fit import lack_of_fit
 from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.diagnosis.search.cause_sets import names_of
 from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodModels, LikelihoodSearch
 from fes_pin.identify.ahead import falls
-from fes_pin.identify.lasting import words_of_reading
+from fes_pin.identify.correlation_time import words_of_reading
 from fes_pin.identify.likelihood import is_simulated
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.levels import FORM_SHARE
@@ -98,7 +98,7 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
     def __init__(self, search: LikelihoodSearch, test: Sequence[Trial], seed: int) -> None:
         super().__init__(search)
         self.models, self.test, self.seed = search.models, tuple(test), seed
-        self.again, self._alike = Again(afresh), Again(as_random_as_in_all)
+        self.again, self._alike = Again(refit), Again(as_random_as_in_all)
         self._chosen: dict[int, tuple[Found, list[LikelihoodFit]]] = {}
 
     def weigh(self, found: Found) -> RigWeighed:
@@ -127,7 +127,7 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
     def lack_of_fit(self, state: Judgement) -> Remainder:
         """What is left: by the features, or a random effort that is too large, or a cause that was refused."""
         stages = {e.name: str(e.stage) for e in self.models.library.effects}
-        left = with_refused_causes(state.weighed.lack_of_fit, state.weighed.random, state.refused, stages)
+        left = with_rejected_causes(state.weighed.lack_of_fit, state.weighed.random, state.rejected, stages)
         wrong = not left.unexplained and state.weighed.no_noise is not None
         return replace(left, unexplained=True, where="time") if wrong else left
 
@@ -142,7 +142,7 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
             return []
         if id(found) not in self._chosen:
             fits = {**self.search.possible(), names_of(found.best): found.best}
-            choose = ChosenAgain(fits, self.search.earns)
+            choose = ChosenAgain(fits, self.search.improves)
             self._chosen[id(found)] = found, [choose.without(out) for out in folds_of(self.models.trials)]
         return self._chosen[id(found)][1]
 
@@ -247,15 +247,15 @@ def diagnosis_of(
 ) -> Diagnosis:
     """The diagnosis of a rig whose effort answers what is read, from a search that has run."""
     judged = likeliest = judged_of(search, found, trials[1], seed)
-    fresh = beside_what_is_new(search, judged.found)
-    again = None if fresh is None else judged_again(search, judged.found, fresh)
+    white = found_with_white_process_noise(search, judged.found)
+    again = None if white is None else judged_again(search, judged.found, white)
     if judged.left.unexplained and again is None:
         again = least_error(search)
     if again is not None:
         judged = _predicting_better(judged_of(*again, trials[1], seed), judged, search.models)
     found, left = judged.found, judged.left
     best = as_wide_as_trials_differ(with_honest_intervals(found.best), judged.again)
-    other = fresh if judged.found is likeliest.found else likeliest.found.best
+    other = white if judged.found is likeliest.found else likeliest.found.best
     if other is not None and names_of(other) == names_of(best):
         best = as_wide_as_estimates_differ(best, other)
     fitted, held = judged.ahead, judged.held_out_ahead
@@ -267,7 +267,7 @@ def diagnosis_of(
         verdict=word_of(bool(causes), left),
         causes=tuple(causes),
         remainder=left,
-        absorbed=absorbed(best, search.models.scored(found), search.models.library.silent()),
+        absorbed=not_identifiable(best, search.models.scored(found), search.models.library.not_excited()),
         nominal=found.nominal,
         extended=best,
         nominal_error=(fitted[0].free, held[0].free if held else None),
@@ -289,7 +289,7 @@ def diagnosis_of(
 def _words(fitted: LikelihoodFit, trials: Sequence[Trial]) -> tuple[str, ...]:
     """What is to be said of what is random in a fit."""
     said = words_of_reading(fitted.noise, fitted.model.rig, trials)
-    return (*said, FRESH) if fitted.noise.timed else said
+    return (*said, WHITE_PROCESS_NOISE) if fitted.noise.timed else said
 
 
 def _predicting_better(other: Judged, one: Judged, models: LikelihoodModels) -> Judged:
@@ -313,7 +313,7 @@ def error_within(judged: Judged, models: LikelihoodModels) -> float:
     else:
         best = judged.found.best
         held = folds_of(train) if len(train) > 1 else []
-        others = in_parallel(lambda out: afresh(best, [t for i, t in enumerate(train) if i not in out]), held)
+        others = in_parallel(lambda out: refit(best, [t for i, t in enumerate(train) if i not in out]), held)
         pairs = [(f, f, [train[i] for i in out]) for f, out in zip(others, held, strict=True)]
         ahead = errors_ahead(pairs or [(best, best, train)], judged.horizon_s, falling=False)
     return ahead.horizon if ahead.free is None or not judged.is_free else ahead.free

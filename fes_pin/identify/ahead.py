@@ -3,7 +3,7 @@
 One sample ahead any model is right where sampling is fast; free simulation goes astray where a rig integrates or falls,
 with the best of models; over a horizon in between a model is tried for what it is used for.
 
-What was measured tells the state by a Kalman filter where a random effort acts (`Doubt`), and the reading's noise by
+A Kalman filter estimates the state from what was measured where process noise acts (`StateSpaceNoise`), and noise by
 its autoregression (`NoiseModel`) where a rig is simulated freely:
 
     y_t = free_t + e_t,    e_(t|t-k) = e_1' A^k (e_(t-k), e_(t-k-1), ...)',    A the companion matrix.
@@ -21,16 +21,16 @@ from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit, noise_of
 from fes_pin.identify.likelihood import LikelihoodProblem
-from fes_pin.identify.per_trial import foretold_unknowns, predictions
+from fes_pin.identify.per_trial import cross_fitted_unknowns, predictions
 from fes_pin.infer.levels import HORIZON_S, RUNAWAY
 from fes_pin.infer.noise import Noise, NoiseModel, thin, thinning
 from fes_pin.models.autoregression import weights_ahead
-from fes_pin.models.foretold import ForetoldOutput
 from fes_pin.models.model import Model
-from fes_pin.models.predictor import Doubt, masked
+from fes_pin.models.predictions import PredictedOutput
+from fes_pin.models.predictor import StateSpaceNoise, masked
 from fes_pin.models.simulate import Simulator
 
-Random = Doubt | NoiseModel
+Random = StateSpaceNoise | NoiseModel
 """What is random about a rig: in its effort and readings, or in its readings alone."""
 
 STRIDE = 0.25
@@ -64,14 +64,14 @@ def forecast(residual: np.ndarray, noise: Noise, dt: float, ahead_s: float) -> n
     every = thinning(dt, noise.step_s)
     seen, order = thin(residual, every), len(noise.ar)
     steps = max(1, math.ceil((ahead_s - dt) / (every * dt) - 1e-9) + 1)
-    foretold = np.zeros(len(seen))
+    predicted = np.zeros(len(seen))
     if order and len(seen) > steps:
-        foretold[steps:] = np.convolve(seen, weights_ahead(noise.ar, steps)[-1])[: len(seen) - steps]
-    out = np.repeat(foretold, every)
+        predicted[steps:] = np.convolve(seen, weights_ahead(noise.ar, steps)[-1])[: len(seen) - steps]
+    out = np.repeat(predicted, every)
     return np.pad(out, (0, len(residual) - len(out)), mode="edge") if len(out) else np.zeros(len(residual))
 
 
-def foretell(model: Model, trial: Trial, random: Random, horizon_s: float) -> dict[str, np.ndarray]:
+def predict_ahead(model: Model, trial: Trial, random: Random, horizon_s: float) -> dict[str, np.ndarray]:
     """What a model foretells of each sample of a trial from what was measured `horizon_s` before it or earlier.
 
     Parameters
@@ -97,7 +97,7 @@ def foretell(model: Model, trial: Trial, random: Random, horizon_s: float) -> di
     if not outputs:
         expected = " or ".join(model.rig.outputs(trial.kind))
         raise InputError(f"expected a column {expected}: a prediction over a horizon goes on from what was measured")
-    if isinstance(random, Doubt):
+    if isinstance(random, StateSpaceNoise):
         return over_horizon(model, trial, random, horizon_s)
     (readings,) = predictions(model, [trial], random)
     out = {}
@@ -110,28 +110,28 @@ def foretell(model: Model, trial: Trial, random: Random, horizon_s: float) -> di
     return out
 
 
-def one_step(model: Model, trial: Trial, doubt: Doubt) -> dict[str, np.ndarray]:
+def one_step(model: Model, trial: Trial, noise: StateSpaceNoise) -> dict[str, np.ndarray]:
     """Measured minus foretold one sample ahead, shape (n,), by output column.
 
     It is 0 where nothing was measured, and at the first sample, before which nothing was.
     """
-    problem = LikelihoodProblem(model, [trial], doubt, ())
+    problem = LikelihoodProblem(model, [trial], noise, ())
     judged = model.rig.follows(trial) & (np.arange(len(trial)) > 0)
     out: dict[str, np.ndarray] = {}
-    for rows, own in foretold_unknowns(model, trial, doubt):
-        (foretold,) = problem.foretold(model.parameters(), [own])
-        for n, one in foretold.items():
+    for rows, own in cross_fitted_unknowns(model, trial, noise):
+        (predicted,) = problem.predicted(model.parameters(), [own])
+        for n, one in predicted.items():
             missed = np.where(judged & np.isfinite(trial[n]), trial[n] - one.values, 0.0)
             out[n] = np.where(rows, missed, out.get(n, missed))
     return out
 
 
-def over_horizon(model: Model, trial: Trial, doubt: Doubt, horizon_s: float) -> dict[str, np.ndarray]:
+def over_horizon(model: Model, trial: Trial, noise: StateSpaceNoise, horizon_s: float) -> dict[str, np.ndarray]:
     """The values of `forecasts`, shape (n,), by output column that the trial has."""
-    return {n: one.values for n, one in forecasts(model, trial, doubt, horizon_s).items()}
+    return {n: one.values for n, one in forecasts(model, trial, noise, horizon_s).items()}
 
 
-def forecasts(model: Model, trial: Trial, doubt: Doubt, horizon_s: float) -> dict[str, ForetoldOutput]:
+def forecasts(model: Model, trial: Trial, noise: StateSpaceNoise, horizon_s: float) -> dict[str, PredictedOutput]:
     """What a model foretells of each sample from what was measured up to `horizon_s` before it.
 
     Parameters
@@ -142,24 +142,24 @@ def forecasts(model: Model, trial: Trial, doubt: Doubt, horizon_s: float) -> dic
 
     Returns
     -------
-    dict of str to ForetoldOutput
+    dict of str to PredictedOutput
         By output column that the trial has. The first sample, before which nothing was measured, is as measured.
     """
     ahead, stride = reach_of(trial, horizon_s)
     outputs = tuple(n for n in model.rig.outputs(trial.kind) if n in trial.columns)
     starts = range(0, max(len(trial) - ahead, 1), stride)
-    abreast = [starts[k :: _abreast(ahead, stride)] for k in range(min(_abreast(ahead, stride), len(starts)))]
-    shown = [masked(trial, outputs, [range(s + 1, s + ahead + stride) for s in own]) for own in abreast]
-    problem = LikelihoodProblem(model, shown, doubt, (), starts=[trial] * len(shown))
-    out = {n: ForetoldOutput(np.array(trial[n]), np.zeros(len(trial))) for n in outputs}
-    for wanted, unknowns in foretold_unknowns(model, trial, doubt):
-        run = problem.foretold(model.parameters(), [unknowns] * len(shown))
-        for own, foretold in zip(abreast, run, strict=True):
+    batches = [starts[k :: _lanes(ahead, stride)] for k in range(min(_lanes(ahead, stride), len(starts)))]
+    shown = [masked(trial, outputs, [range(s + 1, s + ahead + stride) for s in own]) for own in batches]
+    problem = LikelihoodProblem(model, shown, noise, (), starts=[trial] * len(shown))
+    out = {n: PredictedOutput(np.array(trial[n]), np.zeros(len(trial))) for n in outputs}
+    for wanted, unknowns in cross_fitted_unknowns(model, trial, noise):
+        run = problem.predicted(model.parameters(), [unknowns] * len(shown))
+        for own, predicted in zip(batches, run, strict=True):
             for s in own:
                 rows = np.arange(s + ahead if s else 1, min(s + ahead + stride, len(trial)))
                 rows = rows[wanted[rows]]
                 for n in outputs:
-                    for whole, part in zip(out[n], foretold[n], strict=True):
+                    for whole, part in zip(out[n], predicted[n], strict=True):
                         whole[rows] = part[rows]
     return out
 
@@ -170,7 +170,7 @@ def reach_of(trial: Trial, horizon_s: float) -> tuple[int, int]:
     return ahead, max(1, round(STRIDE * ahead))
 
 
-def _abreast(ahead: int, stride: int) -> int:
+def _lanes(ahead: int, stride: int) -> int:
     """Runs that share the predictions of a trial, so that each sees enough between two of them."""
     return math.ceil((1 + SEEN_AGAIN) * (ahead + stride) / stride)
 

@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from fes_pin.infer.noise import SAMPLES_EACH, likeliest_autoregression
-from fes_pin.models.foretold import ForetoldTrial
+from fes_pin.models.predictions import PredictedTrial
 
 MOST = 8
 """Highest order. A sensor's noise is white beside a few coefficients; the tens that a random torque's would need
@@ -21,7 +21,7 @@ MOST = 8
 phase is each trial's own, before it is looked for; beside these few it is found (`tests/driven/test_stimulated.py`)."""
 
 
-def autoregressions(run: Sequence[ForetoldTrial], orders: Mapping[str, Sequence[int]]) -> dict[str, tuple[float, ...]]:
+def autoregressions(run: Sequence[PredictedTrial], orders: Mapping[str, Sequence[int]]) -> dict[str, tuple[float, ...]]:
     """That of each output that is measured in some trial, of one of its orders."""
     out = {}
     for name, own in orders.items():
@@ -32,7 +32,7 @@ def autoregressions(run: Sequence[ForetoldTrial], orders: Mapping[str, Sequence[
     return out
 
 
-def residual_powers(run: Sequence[ForetoldTrial]) -> dict[str, float]:
+def residual_powers(run: Sequence[PredictedTrial]) -> dict[str, float]:
     """By output, the factor on the variance of its noise that makes what is left of it likeliest.
 
     A count that was read n times in a row is one reading: its errors count as one.
@@ -50,7 +50,7 @@ def residual_powers(run: Sequence[ForetoldTrial]) -> dict[str, float]:
     return out
 
 
-def _left(one: ForetoldTrial, name: str) -> np.ndarray:
+def _left(one: PredictedTrial, name: str) -> np.ndarray:
     """Innovations of an output over their deviations, shape (n,); 0 where none was seen."""
     k = one.outputs.index(name)
     with np.errstate(all="ignore"):

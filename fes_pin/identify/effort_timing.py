@@ -158,12 +158,12 @@ def cost_of_answers(fitted: LikelihoodFit, logged: Sequence[Trial], log: Log) ->
     """
     if log.effort_late_s <= 0.0 and log.effort_over_s <= 0.0:
         return 0.0
-    lasts_s = fitted.noise.lasts_s
-    rows = [_pulse_rows(t, lasts_s) for t in logged]
+    correlation_s = fitted.noise.correlation_s
+    rows = [_pulse_rows(t, correlation_s) for t in logged]
     sizes = [PULSE * float(np.std(t[EFFORT])) for t in logged]
     pulsed = [_pulsed(t, at, size) for t, at, size in zip(logged, rows, sizes, strict=True)]
     plain, moved = (
-        LikelihoodProblem(fitted.model, [log.applied(t) for t in some], fitted.noise).foretold(fitted.values)
+        LikelihoodProblem(fitted.model, [log.applied(t) for t in some], fitted.noise).predicted(fitted.values)
         for some in (logged, pulsed)
     )
     total = 0.0
@@ -172,15 +172,15 @@ def cost_of_answers(fitted: LikelihoodFit, logged: Sequence[Trial], log: Log) ->
             continue
         gains = answer_of(trial[EFFORT], [trial[n] for n in before]).gains[at]
         loop = sum(_loop((after[n].values - before[n].values) / size, at, gains[:, k]) for k, n in enumerate(before))
-        counted = int(np.sum(are_news(trial, lasts_s)))
+        counted = int(np.sum(are_news(trial, correlation_s)))
         with np.errstate(divide="ignore"):
             total -= 2.0 * counted * float(np.mean(np.log(np.abs(1.0 - loop))))
     return total
 
 
-def _pulse_rows(trial: Trial, lasts_s: float) -> np.ndarray:
+def _pulse_rows(trial: Trial, correlation_s: float) -> np.ndarray:
     """Where the pulses of a trial are: at readings that count."""
-    news = np.flatnonzero(are_news(trial, lasts_s))
+    news = np.flatnonzero(are_news(trial, correlation_s))
     return news[(news >= SPACING) & (np.diff(news // SPACING, prepend=-1) > 0)]
 
 

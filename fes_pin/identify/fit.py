@@ -28,7 +28,7 @@ from fes_pin.infer.result import shown
 from fes_pin.infer.scoring import LITTLE
 from fes_pin.models.accepted import accepted_trials
 from fes_pin.models.model import Model
-from fes_pin.models.predictor import Doubt
+from fes_pin.models.predictor import StateSpaceNoise
 from fes_pin.workers import one_thread_each
 
 if TYPE_CHECKING:
@@ -224,10 +224,10 @@ class Fit(Optimum, Saveable):
         return len(self.free) + sum(int(p.local[:, -own:].any(axis=0).sum()) for p in self.parts if own)
 
     @property
-    def doubt(self) -> Doubt | None:
+    def doubt(self) -> StateSpaceNoise | None:
         """The noise of a fit by the likelihood, by its old name; None of others. Deprecated: use `noise`."""
         warnings.warn("Fit.doubt is Fit.noise now; it ends with version 0.3", DeprecationWarning, stacklevel=2)
-        return self.noise if isinstance(self.noise, Doubt) else None
+        return self.noise if isinstance(self.noise, StateSpaceNoise) else None
 
     def _kind(self) -> str:
         return "Fit"
@@ -381,8 +381,8 @@ def _chosen(
         low, high = [end for end in pair if end is not None] if len(pair) == 2 and None not in pair else (1.0, 0.0)
         narrower[name] = (max(low, least), min(high, most))
         if not narrower[name][0] < narrower[name][1]:
-            told = f"expected (lower, upper) of {name} within {least:g} to {most:g}, found {ends!r}"
-            raise InputError(told, column="bounds")
+            message = f"expected (lower, upper) of {name} within {least:g} to {most:g}, found {ends!r}"
+            raise InputError(message, column="bounds")
     return free, narrower
 
 

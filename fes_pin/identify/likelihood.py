@@ -4,9 +4,9 @@ Twice the negative log-likelihood of the innovations r_k of an extended Kalman f
 
     cost = sum r_k^2 / V_k + log V_k - (1 - 1 / n_k) log N_k,
 
-depends on the model's parameters and on what is random (`Doubt`) alone. Its maximum: `infer.maximise`. The last term
-is 0 but where a count is read n times in a row: that is one reading, to which the filter gives the variance
-N = n white^2 each time (`models.compile.predictor`). Its one error has one logarithm, and not n of them.
+depends on the model's parameters and on process and measurement noise (`StateSpaceNoise`) alone. `infer.maximise`
+maximises it. The last term is 0 unless a count is read n times in a row: that is one reading, to which the filter gives
+the variance N = n white^2 each time (`models.compile.predictor`). Its one error has one logarithm, and not n of them.
 
 Source: Kristensen, Madsen and Jorgensen, Parameter estimation in stochastic grey-box models, Automatica 40 (2004).
 """
@@ -29,10 +29,10 @@ from fes_pin.infer.noise import ORDERS
 from fes_pin.infer.problem import Linearized, Unknowns, whitened_sse
 from fes_pin.infer.scoring import Evaluation, NoisyProblem, Point, fisher_scoring
 from fes_pin.models.compile.layout import WIDE
-from fes_pin.models.foretold import ForetoldOutput, ForetoldTrial
 from fes_pin.models.free_run import FreeRun, with_noise
 from fes_pin.models.model import Model
-from fes_pin.models.predictor import Doubt, Predictor
+from fes_pin.models.predictions import PredictedOutput, PredictedTrial
+from fes_pin.models.predictor import Predictor, StateSpaceNoise
 from fes_pin.workers import check_limit, in_parallel
 
 NOISE_STEPS = 2
@@ -62,7 +62,7 @@ class LikelihoodProblem(NoisyProblem):
         self,
         model: Model,
         trials: Sequence[Trial],
-        noise: Doubt,
+        noise: StateSpaceNoise,
         free: tuple[str, ...] | None = None,
         starts: Sequence[Trial] | None = None,
     ) -> None:
@@ -80,8 +80,8 @@ class LikelihoodProblem(NoisyProblem):
     def _made(self, count: int, columns: tuple[str, ...]) -> Predictor | FreeRun:
         """What predicts the trials so many times over, with sensitivities to some parameters and unknowns."""
         if self.is_simulated:
-            return FreeRun(self.model, self.trials * count, columns, self.noise.lasts_s)
-        own = (self.noise.processes, self.priors * count, self.noise.lasts_s)
+            return FreeRun(self.model, self.trials * count, columns, self.noise.correlation_s)
+        own = (self.noise.processes, self.priors * count, self.noise.correlation_s)
         return Predictor(self.model, self.trials * count, columns, *own)
 
     @cached_property
@@ -95,8 +95,8 @@ class LikelihoodProblem(NoisyProblem):
         return [{**begin, **own} if self.is_simulated else dict(own) for begin in self.begins]
 
     def innovations(
-        self, values: Mapping[str, float], unknowns: Unknowns, noise: Doubt | None = None
-    ) -> list[ForetoldTrial]:
+        self, values: Mapping[str, float], unknowns: Unknowns, noise: StateSpaceNoise | None = None
+    ) -> list[PredictedTrial]:
         """Every trial as foretold, with sensitivities to `free` and to the effects' unknowns; see `linearize`."""
         check_limit()
         if self._linearized is None:
@@ -115,7 +115,7 @@ class LikelihoodProblem(NoisyProblem):
     @property
     def noise_limits(self) -> dict[str, tuple[float, float]]:
         """How small and how large those may become."""
-        return noise_limits(self.model, self.trials, self.noise.lasts_s)
+        return noise_limits(self.model, self.trials, self.noise.correlation_s)
 
     def evaluate(self, points: Sequence[Point]) -> list[Evaluation]:
         """One-step predictions of all trials at each of several points."""
@@ -125,18 +125,22 @@ class LikelihoodProblem(NoisyProblem):
         """The cost at several parameter values, without sensitivities: less work than linearizing at one of them."""
         return [one.cost for one in self._evaluated([(*point, self.noise) for point in points])]
 
-    def _evaluated(self, points: Sequence[tuple[Mapping[str, float], Unknowns, Doubt]]) -> list[Evaluation]:
+    def _evaluated(self, points: Sequence[tuple[Mapping[str, float], Unknowns, StateSpaceNoise]]) -> list[Evaluation]:
         with np.errstate(all="ignore"):
             return [_joined(run) for run in self._runs(points)]
 
-    def _runs(self, points: Sequence[tuple[Mapping[str, float], Unknowns, Doubt]]) -> list[list[ForetoldTrial]]:
+    def _runs(
+        self, points: Sequence[tuple[Mapping[str, float], Unknowns, StateSpaceNoise]]
+    ) -> list[list[PredictedTrial]]:
         """Every trial as foretold by each of several points, as many side by side as leave no lane idle."""
         count, trials = self.batch, len(self.trials)
         if self._batched is None:
             self._batched = self._made(count, ())
         predictor = self._batched
 
-        def in_batch(some: Sequence[tuple[Mapping[str, float], Unknowns, Doubt]]) -> list[list[ForetoldTrial]]:
+        def in_batch(
+            some: Sequence[tuple[Mapping[str, float], Unknowns, StateSpaceNoise]],
+        ) -> list[list[PredictedTrial]]:
             check_limit()
             filled = [*some, *[some[-1]] * (count - len(some))]
             repeated = [one for one in filled for _ in range(trials)]
@@ -146,25 +150,25 @@ class LikelihoodProblem(NoisyProblem):
                 run = predictor.run(values, noises, own)
             return [run[j * trials : (j + 1) * trials] for j in range(len(some))]
 
-        told = in_parallel(in_batch, [points[k : k + count] for k in range(0, len(points), count)])
-        return [one for some in told for one in some]
+        runs = in_parallel(in_batch, [points[k : k + count] for k in range(0, len(points), count)])
+        return [one for some in runs for one in some]
 
     @property
     def batch(self) -> int:
         """How many points are tried in one run."""
         return max(1, WIDE // len(self.trials))
 
-    def foretold(
+    def predicted(
         self, values: Mapping[str, float], unknowns: Unknowns | None = None
-    ) -> list[dict[str, ForetoldOutput]]:
+    ) -> list[dict[str, PredictedOutput]]:
         """What is foretold of each output of each trial, also where nothing was measured."""
         given = self.start_unknowns() if unknowns is None else unknowns
         own = [{**begin, **u} for begin, u in zip(self.begins, given, strict=True)]
         if self._predictor is None:  # what was read tells the state, also where nothing acts at random
-            random = (self.noise.processes, self.priors, self.noise.lasts_s)
+            random = (self.noise.processes, self.priors, self.noise.correlation_s)
             self._predictor = Predictor(self.model, self.trials, (), *random)
         with np.errstate(all="ignore"):
-            return self._predictor.foretell(values, self.noise, own)
+            return self._predictor.predict(values, self.noise, own)
 
     def linearize(self, values: Mapping[str, float], unknowns: Unknowns) -> list[Linearized]:
         """Innovations over their deviations, and sensitivities, at a parameter value; see `check_limit`."""
@@ -210,12 +214,12 @@ class LikelihoodProblem(NoisyProblem):
         (run,) = self._runs([(values, unknowns, self.noise)])
         return self._adopted(run, self._with_autoregressions(run))
 
-    def _with_autoregressions(self, run: Sequence[ForetoldTrial]) -> Doubt:
+    def _with_autoregressions(self, run: Sequence[PredictedTrial]) -> StateSpaceNoise:
         """The noise with autoregressions of its orders, found in what a run leaves."""
         orders = {n: (len(ar),) for n, ar in self.noise.ar.items()}
         return replace(self.noise, ar={**self.noise.ar, **autoregressions(run, orders)})
 
-    def _adopted(self, run: Sequence[ForetoldTrial], found: Doubt) -> float:
+    def _adopted(self, run: Sequence[PredictedTrial], found: StateSpaceNoise) -> float:
         """Take another noise of the readings, in place, if a run costs less with it; returns by how much."""
         before, after = (sum(one.cost() for one in some) for some in (run, [with_noise(one, found) for one in run]))
         if not after < before:
@@ -232,7 +236,7 @@ class LikelihoodProblem(NoisyProblem):
         found = found.with_values({f"white.{n}": float(np.clip(v, *limits[f"white.{n}"])) for n, v in white.items()})
         return self._adopted(run, found)
 
-    def with_orders(self, values: Mapping[str, float], unknowns: Unknowns) -> Doubt:
+    def with_orders(self, values: Mapping[str, float], unknowns: Unknowns) -> StateSpaceNoise:
         """What is random, with autoregressions of the orders that what the filter leaves shows."""
         (run,) = self._runs([(values, unknowns, self.noise)])
         return replace(self.noise, ar=autoregressions(run, dict.fromkeys(self.noise.white, ORDERS)))
@@ -276,7 +280,7 @@ class LikelihoodProblem(NoisyProblem):
         out[felt] = -slopes - sum(p.residual @ p.jacobian[:, at] for p in parts)[felt]
         return np.nan_to_num(out)
 
-    def _whitened(self, one: ForetoldTrial) -> Linearized:
+    def _whitened(self, one: PredictedTrial) -> Linearized:
         """A trial's innovations over their deviations; its sensitivities are scaled where they are."""
         with np.errstate(all="ignore"):
             residual, logs = one.whitened
@@ -285,17 +289,17 @@ class LikelihoodProblem(NoisyProblem):
         split = len(self.free)
         return Linearized(residual, moved[:, :split], moved[:, split:], float(np.sum(logs)))
 
-    def cost(self, values: Mapping[str, float], unknowns: Unknowns, noise: Doubt | None = None) -> float:
+    def cost(self, values: Mapping[str, float], unknowns: Unknowns, noise: StateSpaceNoise | None = None) -> float:
         """Twice the negative log-likelihood."""
         return sum(one.cost() for one in self.innovations(values, unknowns, noise))
 
 
-def is_simulated(noise: Doubt, trials: Sequence[Trial]) -> bool:
+def is_simulated(noise: StateSpaceNoise, trials: Sequence[Trial]) -> bool:
     """True where there is no process noise: one-step predictions are then a free simulation."""
     return not noise.processes and all(t.kind != IMPOSED for t in trials)
 
 
-def unknown_names(model: Model, noise: Doubt, trials: Sequence[Trial]) -> tuple[str, ...]:
+def unknown_names(model: Model, noise: StateSpaceNoise, trials: Sequence[Trial]) -> tuple[str, ...]:
     """Unknowns that each trial has of its own, by name: of its start, where that is fitted, and of effects."""
     begins = [n for t in trials for n in model.rig.unknowns(t.kind)] if is_simulated(noise, trials) else []
     return (*dict.fromkeys(begins), *model.own_unknowns())
@@ -308,11 +312,11 @@ def _added(part: Linearized, at: Sequence[int], factors: np.ndarray) -> Lineariz
     return replace(part, jacobian=jacobian)
 
 
-def _joined(run: Sequence[ForetoldTrial]) -> Evaluation:
+def _joined(run: Sequence[PredictedTrial]) -> Evaluation:
     return Evaluation(
         float(sum(one.cost() for one in run)),
         np.concatenate([one.whitened[0] for one in run]),
         np.concatenate([one.seen_variances for one in run]),
-        np.concatenate([one.noise_told_again for one in run]),
+        np.concatenate([one.repeated_noise for one in run]),
         np.concatenate([one.readings.again for one in run]),
     )

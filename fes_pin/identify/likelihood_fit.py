@@ -9,11 +9,11 @@ from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit, ended
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.process_noise import without_memory
-from fes_pin.infer.levels import PARAMETER_PRICE
+from fes_pin.infer.levels import PARAMETER_PENALTY
 from fes_pin.infer.maximise import ROUNDS, alternate, together
 from fes_pin.infer.optimum import Optimum
 from fes_pin.infer.problem import Unknowns
-from fes_pin.models.predictor import Doubt
+from fes_pin.models.predictor import StateSpaceNoise
 
 
 @dataclass(frozen=True, kw_only=True, repr=False, eq=False)
@@ -26,12 +26,12 @@ class LikelihoodFit(Fit):
         Process noise and, by output column, measurement noise. `sse` holds the log-determinant.
     """
 
-    noise: Doubt
+    noise: StateSpaceNoise
 
     @property
-    def price(self) -> float:
+    def criterion(self) -> float:
         """Twice the negative log-likelihood, with a penalty for each degree of freedom and for process noise."""
-        return self.sse + PARAMETER_PRICE * (self.degrees + 2 * len(self.noise.acting))
+        return self.sse + PARAMETER_PENALTY * (self.degrees + 2 * len(self.noise.acting))
 
     def _has_profile(self) -> bool:
         return False
@@ -55,7 +55,7 @@ def maximise(
     return fit_of(problem, alternate(problem, start, unknowns, rounds))
 
 
-def maximum_from(fitted: LikelihoodFit, trials: Sequence[Trial], noise: Doubt | None = None) -> LikelihoodFit:
+def maximum_from(fitted: LikelihoodFit, trials: Sequence[Trial], noise: StateSpaceNoise | None = None) -> LikelihoodFit:
     """The likelihood's maximum of a fit's model on trials much like its own, from where it ended.
 
     Parameters
@@ -67,7 +67,7 @@ def maximum_from(fitted: LikelihoodFit, trials: Sequence[Trial], noise: Doubt | 
     return maximise(problem, fitted.values, fitted.unknowns, near=fitted.together)
 
 
-def beside_fresh_efforts(fitted: LikelihoodFit) -> LikelihoodFit:
+def with_white_process_noise(fitted: LikelihoodFit) -> LikelihoodFit:
     """A fit of the same model to the same trials, with random efforts that are new in every reading.
 
     Their size is fitted before anything moves: too small, parameters would go after every error, and too large,

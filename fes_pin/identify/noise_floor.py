@@ -9,7 +9,7 @@ from scipy.linalg import block_diag
 
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.problem import Problem
-from fes_pin.infer.levels import PARAMETER_PRICE
+from fes_pin.infer.levels import PARAMETER_PENALTY
 from fes_pin.infer.noise import Noise, estimate_noise, thinning
 
 
@@ -66,7 +66,7 @@ def _of_each_trial(left: np.ndarray, shapes: Sequence[np.ndarray], counts: Seque
                 basis = span(columns[rows])
                 explained[rows] = basis @ (basis.T @ left[rows])
                 rank += basis.shape[1]
-        worth = float(explained @ explained) - PARAMETER_PRICE * rank
+        worth = float(explained @ explained) - PARAMETER_PENALTY * rank
         if worth > most:
             best, most = explained, worth
     return best

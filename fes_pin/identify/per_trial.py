@@ -21,7 +21,7 @@ from fes_pin.infer.noise import Noise, NoiseModel
 from fes_pin.infer.problem import Linearized, Unknowns, normal_equations
 from fes_pin.models.least_squares import least_squares
 from fes_pin.models.model import Model
-from fes_pin.models.predictor import Doubt
+from fes_pin.models.predictor import StateSpaceNoise
 from fes_pin.models.simulate import Simulated, Simulator
 from fes_pin.models.stage import Effect
 
@@ -77,8 +77,8 @@ def _estimated(
     white = {n: Noise(max(m.std, 1e-12)) for n, m in noise.items()}
     problem = Problem(model, trials, white, ())
     names, now = problem.unknown_names, start
-    doubts = [spread_of_start(model, t) for t in trials]
-    reaches = [{n: (s[n] - d, s[n] + d) for n, d in doubt.items()} for doubt, s in zip(doubts, start, strict=True)]
+    spreads = [spread_of_start(model, t) for t in trials]
+    reaches = [{n: (s[n] - d, s[n] + d) for n, d in spread.items()} for spread, s in zip(spreads, start, strict=True)]
     for _ in range(STEPS):
         moved = []
         parts = problem.linearize(model.parameters(), now)
@@ -90,7 +90,9 @@ def _estimated(
     return [{n: (new[n] if n in own else old[n]) for n in old} for old, new in zip(start, now, strict=True)]
 
 
-def foretold_unknowns(model: Model, trial: Trial, doubt: Doubt) -> list[tuple[np.ndarray, dict[str, float]]]:
+def cross_fitted_unknowns(
+    model: Model, trial: Trial, noise: StateSpaceNoise
+) -> list[tuple[np.ndarray, dict[str, float]]]:
     """What effects have of a trial's own by the likelihood, and the samples, shape (n,), that it is to foretell.
 
     Of an effect without such amplitudes that is all of the trial.
@@ -99,15 +101,15 @@ def foretold_unknowns(model: Model, trial: Trial, doubt: Doubt) -> list[tuple[np
         return [(np.ones(len(trial), dtype=bool), {})]
     outputs, values = [n for n in model.rig.outputs(trial.kind) if n in trial.columns], model.parameters()
     out = []
-    for told in halves(len(trial)):
-        masked = {n: np.where(told, np.nan, trial[n]) for n in outputs}
+    for half in halves(len(trial)):
+        masked = {n: np.where(half, np.nan, trial[n]) for n in outputs}
         shown = derived_trial(trial, columns={**trial.columns, **masked})
-        problem = LikelihoodProblem(model, [shown], doubt, (), starts=[trial])
+        problem = LikelihoodProblem(model, [shown], noise, (), starts=[trial])
         now = problem.start_unknowns()
         for _ in range(STEPS):
             (part,) = problem.linearize(values, now)
             now = [_moved(part, np.ones(len(part.residual), dtype=bool), problem.unknown_names, now[0])]
-        out.append((told, {n: now[0][n] for n in model.own_unknowns()}))
+        out.append((half, {n: now[0][n] for n in model.own_unknowns()}))
     return out
 
 
@@ -136,7 +138,7 @@ def amplitude(fitted: Fit, effect: Effect) -> tuple[float, float]:
     The mean is over the trials of the kind that comes first among those that feel the effect, as a motion and a force
     have no unit in common; what the uncertainty of the single values adds to their squares is taken off.
     """
-    if isinstance(fitted.noise, Doubt):
+    if isinstance(fitted.noise, StateSpaceNoise):
         names = unknown_names(fitted.model, fitted.noise, fitted.trials)
     else:
         names = (*fitted.model.rig.unknowns(fitted.trials[0].kind), *fitted.model.own_unknowns())

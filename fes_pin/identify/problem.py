@@ -16,7 +16,7 @@ from fes_pin.infer.problem import Linearized, Unknowns
 from fes_pin.models.least_squares import least_squares
 from fes_pin.models.model import Model
 from fes_pin.models.parameters import ParameterInfo
-from fes_pin.models.simulate import Abreast, Simulated, Simulator
+from fes_pin.models.simulate import Simulated, SimulatedBatch, Simulator
 from fes_pin.workers import check_limit
 
 NEXT_TO = 1e-6
@@ -51,7 +51,7 @@ class Problem(infer.Problem):
         initial = dict.fromkeys(n for t in self.trials for n in model.rig.unknowns(t.kind))
         self.unknown_names = (*initial, *model.own_unknowns()) if self.trials else ()
         self.simulator = Simulator(model, self.trials, (*self.free, *self.unknown_names))
-        self._beside: dict[tuple[int, ...], np.ndarray] = {}
+        self._read: dict[tuple[int, ...], np.ndarray] = {}
 
     @cached_property
     def products(self) -> list[tuple[int, int]]:
@@ -91,7 +91,7 @@ class Problem(infer.Problem):
         """Whitened residuals and sensitivities at a parameter value; ends where a limit of time does."""
         check_limit()
         out: list[Linearized | None] = [None] * len(self.trials)
-        for block in self.simulator.run_abreast(values, unknowns):
+        for block in self.simulator.run_batches(values, unknowns):
             for i, part in zip(block.trials, self._whitened(block), strict=True):
                 out[i] = part
         return [p for p in out if p is not None]
@@ -101,7 +101,7 @@ class Problem(infer.Problem):
         weighed = [self.noise[n] for n in self.model.rig.outputs(trial.kind) if n in trial.columns and n in self.noise]
         return sum(one.innovations(len(trial), trial.dt) for one in weighed)
 
-    def _whitened(self, block: Abreast) -> Iterator[Linearized]:
+    def _whitened(self, block: SimulatedBatch) -> Iterator[Linearized]:
         """Trials that were simulated side by side, whitened side by side."""
         trials = [self.trials[i] for i in block.trials]
         pieces: list[list[tuple[np.ndarray, np.ndarray]]] = [[] for _ in trials]
@@ -120,16 +120,16 @@ class Problem(infer.Problem):
                         pieces[lane].append((residuals[:rows, lane], moved[:rows, :, lane]))
         return (self._linearized(own, block.columns) for own in pieces)
 
-    def _measured(self, block: Abreast) -> np.ndarray:
+    def _measured(self, block: SimulatedBatch) -> np.ndarray:
         """What was measured of the trials of a block, as their readings stand in it; zero where nothing was."""
-        if block.trials not in self._beside:
+        if block.trials not in self._read:
             out = np.zeros(block.readings.shape)
             for lane, trial in enumerate(self.trials[i] for i in block.trials):
                 for k, name in enumerate(self.model.rig.outputs(trial.kind)):
                     if name in trial.columns:
                         out[: len(trial), k, lane] = trial[name]
-            self._beside[block.trials] = out
-        return self._beside[block.trials]
+            self._read[block.trials] = out
+        return self._read[block.trials]
 
     def _linearized(self, pieces: Sequence[tuple[np.ndarray, np.ndarray]], columns: Sequence[int]) -> Linearized:
         """One trial from the whitened residuals of its channels and their sensitivities to some of all columns."""

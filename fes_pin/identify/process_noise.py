@@ -22,7 +22,7 @@ from fes_pin.data.trial import Trial, derived_trial
 from fes_pin.identify.fit import rough_noise
 from fes_pin.infer.noise import Noise
 from fes_pin.models.model import Model
-from fes_pin.models.predictor import Doubt
+from fes_pin.models.predictor import StateSpaceNoise
 
 FIRST_SHARE = 0.003
 """Random effort that a fit begins with, as a share of what drives the rig: little, see `infer.maximise`."""
@@ -59,44 +59,46 @@ def driving_size(model: Model, trials: Sequence[Trial]) -> dict[str, float]:
     return {n: value for n, value in model.rig.driving_sizes(trials).items() if value > 0.0}
 
 
-def first_guess(model: Model, trials: Sequence[Trial], lasts_s: float = 0.0) -> Doubt:
+def first_guess(model: Model, trials: Sequence[Trial], correlation_s: float = 0.0) -> StateSpaceNoise:
     """Noise that a fit begins with: of a reading from second differences, and a small random effort."""
-    white = {n: noise.std for n, noise in _rough_noise(model, trials, lasts_s).items()}
+    white = {n: noise.std for n, noise in _rough_noise(model, trials, correlation_s).items()}
     sizes = driving_size(model, trials)
-    return Doubt(white, {n: FIRST_SHARE * v for n, v in sizes.items()}, dict.fromkeys(sizes, FIRST_TIME_S), lasts_s)
+    return StateSpaceNoise(
+        white, {n: FIRST_SHARE * v for n, v in sizes.items()}, dict.fromkeys(sizes, FIRST_TIME_S), correlation_s
+    )
 
 
-def _rough_noise(model: Model, trials: Sequence[Trial], lasts_s: float) -> dict[str, Noise]:
+def _rough_noise(model: Model, trials: Sequence[Trial], correlation_s: float) -> dict[str, Noise]:
     """Of readings so far apart that each has noise of its own."""
-    steps = [slice(None, None, max(1, round(lasts_s / t.dt))) for t in trials]
+    steps = [slice(None, None, max(1, round(correlation_s / t.dt))) for t in trials]
     columns = [{n: v[own] for n, v in t.columns.items()} for t, own in zip(trials, steps, strict=True)]
     apart = [derived_trial(t, columns=c, time=t.time[own]) for t, c, own in zip(trials, columns, steps, strict=True)]
     return rough_noise(model, apart)
 
 
-def stilled(model: Model, trials: Sequence[Trial], noise: Doubt) -> Doubt:
+def stilled(model: Model, trials: Sequence[Trial], noise: StateSpaceNoise) -> StateSpaceNoise:
     """The same with random processes that are too small to do anything, and stay so."""
     sizes = driving_size(model, trials)
     return replace(noise, std={n: SMALLEST * sizes[n] for n in noise.std}, still=noise.processes)
 
 
-def step_s(noise: Doubt, trials: Sequence[Trial]) -> float:
+def step_s(noise: StateSpaceNoise, trials: Sequence[Trial]) -> float:
     """From one reading to the next, s."""
-    return max(noise.lasts_s, *(t.dt for t in trials))
+    return max(noise.correlation_s, *(t.dt for t in trials))
 
 
-def without_memory(noise: Doubt, trials: Sequence[Trial]) -> Doubt:
+def without_memory(noise: StateSpaceNoise, trials: Sequence[Trial]) -> StateSpaceNoise:
     """The same with random efforts that are new in every reading, of the power that they have at rest: 2 std^2 time."""
     step = step_s(noise, trials)
     std = {n: v * (noise.time[n] / step) ** 0.5 for n, v in noise.std.items()}
     return replace(noise, std=std, time=dict.fromkeys(noise.time, step), timed=noise.processes)
 
 
-def noise_limits(model: Model, trials: Sequence[Trial], lasts_s: float = 0.0) -> dict[str, tuple[float, float]]:
+def noise_limits(model: Model, trials: Sequence[Trial], correlation_s: float = 0.0) -> dict[str, tuple[float, float]]:
     """Bounds of every parameter of the noise, by name."""
     step, longest = max(t.dt for t in trials), max(t.duration for t in trials)
     out: dict[str, tuple[float, float]] = {}
-    for name, noise in _rough_noise(model, trials, lasts_s).items():
+    for name, noise in _rough_noise(model, trials, correlation_s).items():
         values = np.concatenate([t[name] for t in trials if name in t.columns])
         spread = max(float(np.nanmax(values) - np.nanmin(values)), 1e-9)
         out[f"white.{name}"] = (min(SMALLEST * spread, noise.std), spread)

@@ -70,10 +70,10 @@ def low_pass_of(model: Model, trials: Sequence[Trial]) -> float | None:
         return None
     near = (grid[best - 1], grid[best + 1])
     found = minimize_scalar(lambda x: _cost(fitted(x)), bounds=near, method="bounded", options={"xatol": 0.01})
-    return float(np.exp(found.x)) if earns(fitted(found.x), begun) else None
+    return float(np.exp(found.x)) if improves(fitted(found.x), begun) else None
 
 
-def earns(passed: Fit, recorded: Fit) -> bool:
+def improves(passed: Fit, recorded: Fit) -> bool:
     """True if a fit of trials that were low-passed leaves a likelier noise than one of the same trials as recorded.
 
     By more than little: the power of what is new in each sample must fall by `SMALL_SHARE` of itself. Of readings that
@@ -90,4 +90,4 @@ def _cost(fitted: Fit) -> float:
     return float(sum(2.0 * count * math.log(noise[n].innovation_std) for n, count in counts.items()))
 
 
-__all__ = ["earns", "low_pass_of"]
+__all__ = ["improves", "low_pass_of"]

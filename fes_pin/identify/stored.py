@@ -6,6 +6,7 @@ noise of each column, autoregressive where it lasts, and first-order random proc
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -16,11 +17,13 @@ from fes_pin.data.toml import Document, read_toml
 from fes_pin.identify.ahead import Random
 from fes_pin.identify.fit import Fit
 from fes_pin.infer.noise import Noise
-from fes_pin.models.predictor import Doubt
+from fes_pin.models.predictor import StateSpaceNoise
 
 KEY = "random"
 LOG_KEY = "log"
 _PARTS = ("white", "std", "time")
+_LAG = ("correlation_s", "lasts_s")
+"""Key of the correlation time of measurement noise, and its name in models that version 0.1 saved."""
 _LOG = {
     "effort_late_s": NumberKey("s", required=False),
     "effort_over_s": NumberKey("s", lower=0.0, required=False),
@@ -54,11 +57,11 @@ def load_log(path: str | Path) -> Log:
 
 
 def _random_table(fitted: Fit) -> dict[str, Any]:
-    if isinstance(fitted.noise, Doubt):
-        lasts_s = float(fitted.noise.lasts_s)
+    if isinstance(fitted.noise, StateSpaceNoise):
         parts = {part: {n: float(v) for n, v in getattr(fitted.noise, part).items()} for part in _PARTS}
         ar = {n: [float(a) for a in own] for n, own in fitted.noise.ar.items() if own}
-        return {**({"lasts_s": lasts_s} if lasts_s else {}), **parts, **({"ar": ar} if ar else {})}
+        lag = float(fitted.noise.correlation_s)
+        return {**({"correlation_s": lag} if lag else {}), **parts, **({"ar": ar} if ar else {})}
     return {"noise": {n: _noise_table(one) for n, one in fitted.noise.items()}}
 
 
@@ -82,9 +85,12 @@ def load_random(path: str | Path) -> Random | None:
         parts = {part: _numbers(document, table, part) for part in _PARTS}
         own = document.table(f"{KEY}.ar", table) if "ar" in table else {}
         ar = {n: _coefficients(document, f"{KEY}.ar.{n}", one) for n, one in own.items()}
-        lasts = {n: v for n, v in table.items() if n not in (*_PARTS, "ar")}
-        numbers = document.numbers(KEY, lasts, {"lasts_s": NumberKey("s", required=False)})
-        return Doubt(parts["white"], parts["std"], parts["time"], numbers.get("lasts_s", 0.0), ar)
+        others = {n: v for n, v in table.items() if n not in (*_PARTS, "ar")}
+        lag = document.numbers(KEY, others, dict.fromkeys(_LAG, NumberKey("s", required=False)))
+        if "lasts_s" in lag:
+            said = f"{path}: lasts_s of [{KEY}] is correlation_s now; it ends with version 0.3"
+            warnings.warn(said, DeprecationWarning, stacklevel=2)
+        return StateSpaceNoise(parts["white"], parts["std"], parts["time"], next(iter(lag.values()), 0.0), ar)
     channels = document.table(f"{KEY}.noise", table)
     return {name: _noise(document, name, channels) for name in channels}
 

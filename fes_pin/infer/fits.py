@@ -163,7 +163,7 @@ class FittedSets(ABC, Generic[F, S]):
     def _add(self, base: F, starts: Mapping[Names, S]) -> None:
         """Begin sets side by side; of several fits of a set that of lowest price stays."""
         for names, best in self.begin(base, starts).items():
-            if names not in self.fits or best.price < self.fits[names].price:
+            if names not in self.fits or best.criterion < self.fits[names].criterion:
                 self.fits[names] = best
                 self._converged.discard(names)
         for size in sorted({len(n) for n in starts}):
@@ -188,7 +188,7 @@ class FittedSets(ABC, Generic[F, S]):
     def _hopeful(self, size: int, without: Sequence[Names]) -> list[Names]:
         """The sets of a size that a further step would make the best, and those that come near the best."""
         near, ranked = self.near(size, without), [n for n in self.ranked(size) if n not in without]
-        first = sorted(ranked, key=lambda n: self.fits[n].price - self._step_gain(n))[: self.converged_sets]
+        first = sorted(ranked, key=lambda n: self.fits[n].criterion - self._step_gain(n))[: self.converged_sets]
         return [n for n in ranked if n in first or n in near]
 
     def _step_gain(self, names: Names) -> float:
@@ -199,14 +199,14 @@ class FittedSets(ABC, Generic[F, S]):
         ranked = [n for n in self.ranked(size) if n not in without]
         if not ranked:
             return []
-        smaller = self.fits[self.ranked(size - 1)[0]].price if size else math.inf
-        half = 0.5 * (smaller + self.fits[ranked[0]].price)
-        return [n for n in ranked if n == ranked[0] or self.fits[n].price < half]
+        smaller = self.fits[self.ranked(size - 1)[0]].criterion if size else math.inf
+        half = 0.5 * (smaller + self.fits[ranked[0]].criterion)
+        return [n for n in ranked if n == ranked[0] or self.fits[n].criterion < half]
 
     def ranked(self, size: int) -> list[Names]:
         """Sets of a size, lowest price first; those that have converged to what cannot be come last."""
         absurd = {n for n in self._converged if not self.is_possible(self.fits[n])}
-        return sorted((n for n in self.fits if len(n) == size), key=lambda n: (n in absurd, self.fits[n].price, n))
+        return sorted((n for n in self.fits if len(n) == size), key=lambda n: (n in absurd, self.fits[n].criterion, n))
 
 
 def more_degrees(larger: Fitted, smaller: Fitted) -> int:

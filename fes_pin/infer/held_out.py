@@ -95,8 +95,8 @@ def held_out_gain(nominal: Errors, without: Errors, extended: Errors, seed: int)
     The interval is a bootstrap over the units of evidence.
     """
     draws = np.random.default_rng(seed).integers(len(nominal.squares), size=(RESAMPLES, len(nominal.squares)))
-    told = (nominal.squares, without.squares, extended.squares, extended.noise, extended.scatter())
-    many, one = _share(*(e[draws].sum(axis=1) for e in told)), _share(*(e.sum() for e in told))
+    squares = (nominal.squares, without.squares, extended.squares, extended.noise, extended.scatter())
+    many, one = _share(*(e[draws].sum(axis=1) for e in squares)), _share(*(e.sum() for e in squares))
     low, high = np.quantile(many, (0.025, 0.975))
     return Gain(float(one), float(low), float(high))
 

@@ -35,7 +35,7 @@ the first."""
 
 # Penalties and differences of twice the log-likelihood
 
-PARAMETER_PRICE = float(chi2_quantile(1.0 - UNUSUAL_LEVEL, 1))
+PARAMETER_PENALTY = float(chi2_quantile(1.0 - UNUSUAL_LEVEL, 1))
 """Penalty for a parameter, or a coefficient of the noise. Theory: a single test at `UNUSUAL_LEVEL` (Wilks 1938)."""
 SEPARABLE = SURE**2
 """Difference at which a rival is told apart at 95 %. Theory: the square of `SURE`."""
@@ -54,7 +54,7 @@ SMALL_SHARE = 0.1
 FORM_SHARE = 0.0625
 """Share of the gain of all causes that an error of form leaves. Theory: an error of a quarter in a cause's form
 leaves a quarter, squared, of its likelihood to whatever other cause comes near."""
-ABSORBED_BELOW = 0.04
+IDENTIFIABLE_SHARE = 0.04
 """Share of its norm that a sensitivity must keep, once fitted parameters are projected off, to be testable. Theory:
 a share s inflates a standard deviation by 1 / s, here 25 times (variance inflation: Belsley, Kuh and Welsch
 1980)."""

@@ -11,7 +11,7 @@ import numpy as np
 import scipy.linalg
 from numpy.lib.stride_tricks import as_strided
 
-from fes_pin.infer.levels import PARAMETER_PRICE, WHITE_SHARE
+from fes_pin.infer.levels import PARAMETER_PENALTY, WHITE_SHARE
 
 ORDERS = (0, 1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48)
 """Orders tried. Sensor noise is whitened by a few; random torque under white sensor noise is slow and needs 24 to 48:
@@ -117,7 +117,7 @@ def estimate_noise(
     if not gram[0, 0] > 0.0:  # a channel that is met exactly
         orders = [0]
     fits = {p: _autoregression(gram, p) for p in orders}
-    best = min(orders, key=lambda p: count * np.log(fits[p][1] / count) + PARAMETER_PRICE * p)
+    best = min(orders, key=lambda p: count * np.log(fits[p][1] / count) + PARAMETER_PENALTY * p)
     ar, rss = fits[best]
     innovation = float(np.sqrt(rss / max(count - best - used, 1)))
     total = sum(len(r) for r in residuals)
@@ -215,7 +215,7 @@ def likeliest_autoregression(pieces: Sequence[np.ndarray], orders: Sequence[int]
     count, least = sum(map(len, pieces)), math.inf
     best: tuple[float, ...] = ()
     for p, (ar, power) in enumerate(_burg(pieces, max(orders))):
-        cost = count * math.log(power) + PARAMETER_PRICE * p
+        cost = count * math.log(power) + PARAMETER_PENALTY * p
         if p in orders and cost < least:
             best, least = ar, cost
     return best

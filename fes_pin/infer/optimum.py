@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fes_pin.infer.covariance import covariance_of, single_gain
-from fes_pin.infer.levels import CONFIDENCE_95, PARAMETER_PRICE, SEPARABLE
+from fes_pin.infer.levels import CONFIDENCE_95, PARAMETER_PENALTY, SEPARABLE
 from fes_pin.infer.optimize import Descent
 from fes_pin.infer.problem import Linearized, Problem, Unknowns, normal_equations
 
@@ -73,9 +73,9 @@ class Optimum:
         return len(self.free)
 
     @property
-    def price(self) -> float:
+    def criterion(self) -> float:
         """Twice the negative log-likelihood, with a penalty for each degree of freedom."""
-        return self.sse + PARAMETER_PRICE * self.degrees
+        return self.sse + PARAMETER_PENALTY * self.degrees
 
     def place(self, name: str) -> int:
         """Where a fitted parameter stands in `free` and `covariance`."""

@@ -290,8 +290,8 @@ class Explained:
         """As JSON files have it."""
         errors = {n: shown(getattr(self, n)) for n in ("constant", "nominal", "extended", "noise")}
         gains = {"constant": self.of(self.constant), "nominal": self.of(self.nominal), "above_noise": self.above_noise}
-        told = {"measure": f"squared error of {self.what}", "on": self.on, "error_percent": errors}
-        return {**told, "gain_percent": {n: shown(value) for n, value in gains.items()}}
+        record = {"measure": f"squared error of {self.what}", "on": self.on, "error_percent": errors}
+        return {**record, "gain_percent": {n: shown(value) for n, value in gains.items()}}
 
 
 @dataclass(frozen=True)

@@ -197,14 +197,14 @@ class _Scoring:
     def __init__(self, scale: _Scale, at_all: Callable[[np.ndarray], list[Evaluation]], batch: int) -> None:
         self.scale, self.at_all, self.batch = scale, at_all, batch
         self.z, self.lengths, self.damping = scale.here, list(STEPS), 1e-3
-        self.now, *self.moved = at_all(np.vstack([self.z, self._beside()]))
+        self.now, *self.moved = at_all(np.vstack([self.z, self._neighbours()]))
         self.held, self.left = np.zeros(len(self.z), dtype=bool), 0.0
 
     def _widths(self) -> np.ndarray:
         """Of differences along each axis: away from a bound."""
         return np.where(self.z + self.lengths[0] > self.scale.high, -self.lengths[0], self.lengths[0])
 
-    def _beside(self) -> np.ndarray:
+    def _neighbours(self) -> np.ndarray:
         """The points of differences, one a row."""
         return np.asarray(self.z + np.diag(self._widths()))
 
@@ -217,7 +217,7 @@ class _Scoring:
             done = self._step()
             steps -= self.now.cost < before
             if not done and steps > 0:
-                self.moved = self.at_all(self._beside())
+                self.moved = self.at_all(self._neighbours())
         held = tuple(n for n, h in zip(scale.units, self.held, strict=False) if h)
         fallen = begin - self.now.cost if math.isfinite(begin) else 0.0
         return Reached(scale.values(self.z), scale.noise(self.z), fallen, held, self.left, done)

@@ -29,7 +29,7 @@ class Fitted(Protocol):
         """Twice the negative log-likelihood, but for a constant."""
 
     @property
-    def price(self) -> float:
+    def criterion(self) -> float:
         """The same with a penalty for each degree of freedom."""
 
     @property
@@ -240,14 +240,14 @@ class Search(Generic[F, M]):
         first, most = len(self._kept) + 1, self._sets.most_candidates
         return itertools.count(first) if most is None else range(first, most + 1)
 
-    def earns(self, larger: F, smaller: F, gain: float, explained: float) -> bool:
+    def improves(self, larger: F, smaller: F, gain: float, explained: float) -> bool:
         """Whether a larger set is worth its degrees of freedom where it gains so much in twice the log-likelihood."""
         significant = self._sets.p_value(larger, smaller, gain) < self._sets.level(larger)
         return significant and not self._sets.is_error_of_form(larger, gain, explained)
 
     def is_accepted(self, larger: F, smaller: F) -> bool:
         """The same of two fits as they are."""
-        return self.earns(larger, smaller, smaller.sse - larger.sse, self.nominal().sse - larger.sse)
+        return self.improves(larger, smaller, smaller.sse - larger.sse, self.nominal().sse - larger.sse)
 
     def possible(self) -> dict[Names, F]:
         """All sets that are fitted, but for those that cannot be, or that were rejected."""
@@ -346,7 +346,7 @@ class Search(Generic[F, M]):
             names = tuple(n for n in names if n != weakest)
         return names
 
-    def settle(self, names: Names, refused: Iterable[str] = ()) -> SearchResult[F]:
+    def settle(self, names: Names, rejected: Iterable[str] = ()) -> SearchResult[F]:
         """The result for a set, with the rivals of each of its candidates.
 
         Where a rival is the better set, and each of its candidates is accepted, it is the answer: sets were extended
@@ -360,11 +360,11 @@ class Search(Generic[F, M]):
             Names that no answer may hold.
         """
         self._reform(names)
-        while self.policy.given is None and (better := self._best_of_rivals(names, refused)) != names:
+        while self.policy.given is None and (better := self._best_of_rivals(names, rejected)) != names:
             names = better
         return self.result(names)
 
-    def _best_of_rivals(self, names: Names, refused: Iterable[str]) -> Names:
+    def _best_of_rivals(self, names: Names, rejected: Iterable[str]) -> Names:
         """The best of a set and its rivals that can be the answer, once the rivals are fitted."""
         self.progress(0.75, "rivals")
         for name in names:
@@ -372,11 +372,11 @@ class Search(Generic[F, M]):
             self._sets.without(names, name)
             self._sets.extend(rest, None if len(names) == 1 else self.policy.fitted)
             self._sets.converge_rivals(rest, name)
-        return next(n for n in self._sets.ranked(len(names)) if n == names or self._may_be(n, refused))
+        return next(n for n in self._sets.ranked(len(names)) if n == names or self._may_be(n, rejected))
 
-    def _may_be(self, names: Names, refused: Iterable[str]) -> bool:
+    def _may_be(self, names: Names, rejected: Iterable[str]) -> bool:
         """Whether a set can be the answer: it holds nothing refused, and each of its candidates is accepted."""
-        if set(names) & set(refused):
+        if set(names) & set(rejected):
             return False
         self._reform(names)
         return self._kept_in_mind(names, self._backward(names) == names)
@@ -391,7 +391,7 @@ class Search(Generic[F, M]):
             without[name] = models.without(names, name)
             others = [k for k in models.fits if len(k) == len(names) and set(rest) <= set(k) and name not in k]
             finite = (f for k in others if math.isfinite((f := models.fits[k]).sse) and models.is_possible(f))
-            rivals[name] = sorted(finite, key=lambda f: f.price)
+            rivals[name] = sorted(finite, key=lambda f: f.criterion)
         best = models.fits[names]
         p_values = {n: models.p_value(best, without[n]) for n in names}
         return SearchResult(models.fits[()], best, p_values, rivals, without)

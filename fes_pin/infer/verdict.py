@@ -29,7 +29,7 @@ class LackOfFit(Protocol):
 
 
 @dataclass(frozen=True)
-class Refused:
+class Rejected:
     """A candidate that was significant in the fit, and is not claimed.
 
     Attributes
@@ -91,7 +91,7 @@ class State(Generic[F, W]):
 
     found: SearchResult[F]
     weighed: W
-    refused: Mapping[str, Refused]
+    rejected: Mapping[str, Rejected]
     settled: frozenset[str]
     formed: frozenset[frozenset[str]] = frozenset()
     steps: tuple[str, ...] = ()
@@ -168,7 +168,7 @@ class Verdict(ABC, Generic[F, M, W]):
         """Search the rivals of a set that candidates were taken from."""
         if state.names == state.settled:
             return None
-        found = self.search.settle(tuple(sorted(state.names)), state.refused)
+        found = self.search.settle(tuple(sorted(state.names)), state.rejected)
         return replace(state, found=found, weighed=self.weigh(found), settled=state.names)
 
     def drop_rarely_chosen(self, state: State[F, W]) -> State[F, W] | None:
@@ -184,21 +184,21 @@ class Verdict(ABC, Generic[F, M, W]):
             return None
         found = self.search.settle(names)
         settled, formed = frozenset(found.without), state.formed | {state.names}
-        return replace(state, found=found, weighed=self.weigh(found), refused={}, settled=settled, formed=formed)
+        return replace(state, found=found, weighed=self.weigh(found), rejected={}, settled=settled, formed=formed)
 
     def _without_weakest(self, state: State[F, W], some: Sequence[str]) -> State[F, W] | None:
         """The set less the weakest of some of its candidates; None if these are none."""
         weakest = next((n for n in state.weak if n in some), None)
         if weakest is None:
             return None
-        refused = {**state.refused, weakest: refused_from(state.found, weakest, state.weighed.gains[weakest])}
+        rejected = {**state.rejected, weakest: rejection_from(state.found, weakest, state.weighed.gains[weakest])}
         found = self.search.result(tuple(sorted(state.names - {weakest})))
-        return replace(state, found=found, weighed=self.weigh(found), refused=refused)
+        return replace(state, found=found, weighed=self.weigh(found), rejected=rejected)
 
 
-def refused_from(found: SearchResult[F], name: str, gain: Gain) -> Refused:
+def rejection_from(found: SearchResult[F], name: str, gain: Gain) -> Rejected:
     """What is kept of a candidate that is taken from a set."""
-    return Refused(found.p_values[name], share_in(found, name), gain)
+    return Rejected(found.p_values[name], share_in(found, name), gain)
 
 
 def share_in(found: SearchResult[F], name: str) -> float:

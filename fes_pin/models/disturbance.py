@@ -2,7 +2,7 @@
 
 Both are first-order processes, e' = -e / time + white noise, of stationary deviation std. They are effects like any
 other, but of no library: noise is never named as a cause. Their deviations and times are no parameters of a model;
-they are constants of a predictor (`models.predictor.Doubt`), as reading noise is.
+they are constants of a predictor (`models.predictor.StateSpaceNoise`), as reading noise is.
 """
 
 from __future__ import annotations

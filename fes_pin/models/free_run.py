@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from fes_pin.data.trial import Trial
-from fes_pin.models.foretold import ForetoldTrial
 from fes_pin.models.model import Model
-from fes_pin.models.predictor import Doubt, measured_outputs, read_columns
+from fes_pin.models.predictions import PredictedTrial
+from fes_pin.models.predictor import StateSpaceNoise, measured_outputs, read_columns
 from fes_pin.models.simulate import Simulator
 
 
@@ -27,36 +27,38 @@ class FreeRun:
         What was measured; a sample that is NaN was not.
     columns
         Parameters, and unknowns of trials and effects, to give sensitivities for.
-    lasts_s
-        How long the noise of a reading lasts; see `Doubt`.
+    correlation_s
+        How long the noise of a reading lasts; see `StateSpaceNoise`.
     """
 
-    def __init__(self, model: Model, trials: Sequence[Trial], columns: tuple[str, ...], lasts_s: float = 0.0) -> None:
+    def __init__(
+        self, model: Model, trials: Sequence[Trial], columns: tuple[str, ...], correlation_s: float = 0.0
+    ) -> None:
         self.trials = tuple(trials)
         self._simulator = Simulator(model, trials, columns)
         outputs = [measured_outputs(model, t) for t in trials]
         self._places = [[model.rig.outputs(t.kind).index(n) for n in o] for t, o in zip(trials, outputs, strict=True)]
-        self._read = [read_columns(model.rig, t, o, lasts_s) for t, o in zip(trials, outputs, strict=True)]
+        self._read = [read_columns(model.rig, t, o, correlation_s) for t, o in zip(trials, outputs, strict=True)]
 
     def run(
         self,
         values: Mapping[str, float] | Sequence[Mapping[str, float]],
-        noise: Doubt | Sequence[Doubt],
+        noise: StateSpaceNoise | Sequence[StateSpaceNoise],
         unknowns: Sequence[Mapping[str, float]],
-    ) -> list[ForetoldTrial]:
+    ) -> list[PredictedTrial]:
         """Simulate every trial; see `Predictor.run`."""
-        each = [noise] * len(self.trials) if isinstance(noise, Doubt) else noise
+        each = [noise] * len(self.trials) if isinstance(noise, StateSpaceNoise) else noise
         run, out = self._simulator.run(values, unknowns), []
         for one, places, read, own in zip(run, self._places, self._read, each, strict=True):
             outputs, seen = read.readings.outputs, read.readings.seen
             white = tuple(own.white[n] for n in outputs)
             missed = np.where(seen, read.measured - one.readings[:, places], 0.0)
             variances, ar = read.repeated * np.square(white), tuple(own.ar.get(n, ()) for n in outputs)
-            out.append(ForetoldTrial(read.readings, missed, variances, -one.sensitivities[:, places], white, ar))
+            out.append(PredictedTrial(read.readings, missed, variances, -one.sensitivities[:, places], white, ar))
         return out
 
 
-def with_noise(one: ForetoldTrial, noise: Doubt) -> ForetoldTrial:
+def with_noise(one: PredictedTrial, noise: StateSpaceNoise) -> PredictedTrial:
     """A trial that was simulated under another noise of its readings."""
     white, ar = tuple(noise.white[n] for n in one.outputs), tuple(noise.ar.get(n, ()) for n in one.outputs)
     return replace(one, variances=one.variances * np.square(np.divide(white, one.white)), white=white, ar=ar)

@@ -39,10 +39,10 @@ def load_module(source: str | Path) -> ModuleType:
         return importlib.import_module(str(source))
     except ModuleNotFoundError as error:
         if error.name is None or not str(source).startswith(error.name):
-            raise InputError(f"the module {source} cannot be run: {_told(error)}") from error
+            raise InputError(f"the module {source} cannot be run: {_text_of(error)}") from error
         raise InputError(f"no module {source}; expected the name of a module, or a file that ends in .py") from None
     except (Exception, SystemExit) as error:
-        raise InputError(f"the module {source} cannot be run: {_told(error)}") from error
+        raise InputError(f"the module {source} cannot be run: {_text_of(error)}") from error
 
 
 def _run_file(path: Path) -> ModuleType:
@@ -63,11 +63,11 @@ def _run_file(path: Path) -> ModuleType:
         del sys.modules[name]
         if before is not None:
             sys.modules[name] = before
-        raise InputError(f"cannot be run: {_told(error)}", file=path, row=_row(error, whole)) from error
+        raise InputError(f"cannot be run: {_text_of(error)}", file=path, row=_row(error, whole)) from error
     return module
 
 
-def _told(error: BaseException) -> str:
+def _text_of(error: BaseException) -> str:
     words = error.msg if isinstance(error, SyntaxError) else str(error)
     return f"{type(error).__name__}: {words}".rstrip(": ")
 
@@ -78,7 +78,7 @@ def at_fault(error: Exception, classes: Iterable[type]) -> InputError | None:
     for frame in reversed(traceback.extract_tb(error.__traceback__)):
         one = theirs.get(Path(frame.filename).resolve())
         if one is not None:
-            return InputError(f"class {one.__name__}: {_told(error)}", file=_where(one.__module__), row=frame.lineno)
+            return InputError(f"class {one.__name__}: {_text_of(error)}", file=_where(one.__module__), row=frame.lineno)
     return None
 
 

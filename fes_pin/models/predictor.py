@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
@@ -15,8 +16,8 @@ from fes_pin.data.trial import Trial, derived_trial
 from fes_pin.infer.noise import Noise
 from fes_pin.models.autoregression import noise_ahead, stationary_variance
 from fes_pin.models.disturbance import disturbed
-from fes_pin.models.foretold import ForetoldOutput, ForetoldTrial, Readings
 from fes_pin.models.model import Model
+from fes_pin.models.predictions import PredictedOutput, PredictedTrial, Readings
 from fes_pin.models.rigs.base import Rig
 from fes_pin.models.simulate import (
     Block,
@@ -29,7 +30,7 @@ from fes_pin.models.simulate import (
 
 
 @dataclass(frozen=True, eq=False)
-class Doubt(ReadOnly, Mapping[str, Noise]):
+class StateSpaceNoise(ReadOnly, Mapping[str, Noise]):
     """Process noise of a rig, and measurement noise of its readings.
 
     By output column it holds the noise of a reading.
@@ -41,9 +42,9 @@ class Doubt(ReadOnly, Mapping[str, Noise]):
     std, time
         Stationary standard deviation and time constant (s) of each first-order random process that acts, by its name:
         "effort" at the joint, "force" of a held muscle, "reading" of the first output.
-    lasts_s
+    correlation_s
         How long the noise of a reading lasts, s: what is read within that time says nothing new, see
-        `identify.lasting`. 0 where the noise of every sample is its own.
+        `identify.correlation_time`. 0 where the noise of every sample is its own.
     ar
         Autoregression of what the filter leaves of each output, by column name; `white` is then the deviation of its
         innovations. See `models.autoregression`.
@@ -56,7 +57,7 @@ class Doubt(ReadOnly, Mapping[str, Noise]):
     white: Mapping[str, float]
     std: Mapping[str, float] = field(default_factory=dict)
     time: Mapping[str, float] = field(default_factory=dict)
-    lasts_s: float = 0.0
+    correlation_s: float = 0.0
     ar: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     still: tuple[str, ...] = ()
     timed: tuple[str, ...] = ()
@@ -71,7 +72,7 @@ class Doubt(ReadOnly, Mapping[str, Noise]):
         """Those that do something: all but `still`."""
         return tuple(n for n in self.std if n not in self.still)
 
-    def with_values(self, values: Mapping[str, float]) -> Doubt:
+    def with_values(self, values: Mapping[str, float]) -> StateSpaceNoise:
         """The same with other values, by name as in `parameters`."""
         parts = {part: dict(getattr(self, part)) for part in ("white", "std", "time")}
         for name, value in values.items():
@@ -88,6 +89,13 @@ class Doubt(ReadOnly, Mapping[str, Noise]):
 
     def __len__(self) -> int:
         return len(self.white)
+
+    @property
+    def lasts_s(self) -> float:
+        """`correlation_s` by its old name. Deprecated."""
+        said = "StateSpaceNoise.lasts_s is StateSpaceNoise.correlation_s now; it ends with version 0.3"
+        warnings.warn(said, DeprecationWarning, stacklevel=2)
+        return self.correlation_s
 
     def parameters(self) -> dict[str, float]:
         """Every value by name: white.position, std.effort, time.effort."""
@@ -106,11 +114,11 @@ class Predictor:
     columns
         Parameters, and unknowns of effects, to give sensitivities for.
     processes
-        Names of the random processes that act; see `Doubt`.
+        Names of the random processes that act; see `StateSpaceNoise`.
     priors
         Of each trial, standard deviation of each unknown of its start about what its first samples say.
-    lasts_s
-        How long the noise of a reading lasts; see `Doubt`.
+    correlation_s
+        How long the noise of a reading lasts; see `StateSpaceNoise`.
     """
 
     def __init__(
@@ -120,13 +128,15 @@ class Predictor:
         columns: tuple[str, ...],
         processes: tuple[str, ...],
         priors: Sequence[Mapping[str, float]],
-        lasts_s: float = 0.0,
+        correlation_s: float = 0.0,
     ) -> None:
         self.model, self.trials, self.columns = model, tuple(trials), columns
-        self.max_step_s = min([max_step(model), *(e.foretold_step_s for e in model.effects)])
+        self.max_step_s = min([max_step(model), *(e.predictor_step_s for e in model.effects)])
         self._delayed = is_delayed(model)
         together, own = side_by_side(self.trials, columns, self._key), (columns, processes, priors)
-        self._blocks = [_Prediction(model, self.trials, lanes, *own, self.max_step_s, lasts_s) for lanes in together]
+        self._blocks = [
+            _Prediction(model, self.trials, lanes, *own, self.max_step_s, correlation_s) for lanes in together
+        ]
 
     def _key(self, trial: Trial) -> tuple[Any, ...]:
         """What trials share that can share a block: kind, inputs, what was measured, integration steps per sample."""
@@ -136,9 +146,9 @@ class Predictor:
     def run(
         self,
         values: Mapping[str, float] | Sequence[Mapping[str, float]],
-        doubt: Doubt | Sequence[Doubt],
+        noise: StateSpaceNoise | Sequence[StateSpaceNoise],
         unknowns: Sequence[Mapping[str, float]],
-    ) -> list[ForetoldTrial]:
+    ) -> list[PredictedTrial]:
         """Foretell every trial.
 
         Parameters
@@ -150,24 +160,24 @@ class Predictor:
         unknowns
             For each trial its start, and what effects have of each trial's own.
         """
-        out: dict[int, ForetoldTrial] = {}
-        doubts = [doubt] * len(self.trials) if isinstance(doubt, Doubt) else list(doubt)
+        out: dict[int, PredictedTrial] = {}
+        noises = [noise] * len(self.trials) if isinstance(noise, StateSpaceNoise) else list(noise)
         each = [values] * len(self.trials) if isinstance(values, Mapping) else values
         for block in self._blocks:
-            y, s = block.run(each, [one.parameters() for one in doubts], unknowns, self._delays(each))
-            told = block.innovations(y, s, len(self.columns), [doubts[i] for i in block.lanes])
-            out.update(zip(block.lanes, told, strict=True))
+            y, s = block.run(each, [one.parameters() for one in noises], unknowns, self._delays(each))
+            predicted = block.innovations(y, s, len(self.columns), [noises[i] for i in block.lanes])
+            out.update(zip(block.lanes, predicted, strict=True))
         return [out[i] for i in range(len(self.trials))]
 
-    def foretell(
-        self, values: Mapping[str, float], doubt: Doubt, unknowns: Sequence[Mapping[str, float]]
-    ) -> list[dict[str, ForetoldOutput]]:
+    def predict(
+        self, values: Mapping[str, float], noise: StateSpaceNoise, unknowns: Sequence[Mapping[str, float]]
+    ) -> list[dict[str, PredictedOutput]]:
         """What is foretold of every output of every trial, by name; see `run`."""
-        out: dict[int, dict[str, ForetoldOutput]] = {}
+        out: dict[int, dict[str, PredictedOutput]] = {}
         each = [values] * len(self.trials)
         for block in self._blocks:
-            y, _ = block.run(each, [doubt.parameters()] * len(self.trials), unknowns, self._delays(each))
-            out.update(zip(block.lanes, block.foretold(y, doubt), strict=True))
+            y, _ = block.run(each, [noise.parameters()] * len(self.trials), unknowns, self._delays(each))
+            out.update(zip(block.lanes, block.predicted(y, noise), strict=True))
         return [out[i] for i in range(len(self.trials))]
 
     def _delays(self, values: Sequence[Mapping[str, float]]) -> list[float]:
@@ -200,12 +210,12 @@ class ReadColumns(NamedTuple):
     readings: Readings
 
 
-def read_columns(rig: Rig, trial: Trial, outputs: tuple[str, ...], lasts_s: float) -> ReadColumns:
+def read_columns(rig: Rig, trial: Trial, outputs: tuple[str, ...], correlation_s: float) -> ReadColumns:
     """What was read of the outputs of a trial, where the noise of a reading lasts so long."""
     columns = np.column_stack([trial[name] for name in outputs])
     hunting = np.column_stack([hunts(trial[name]) for name in outputs])
     often = np.column_stack([repeated(c, h) for c, h in zip(columns.T, hunting.T, strict=True)])
-    followed = np.isfinite(columns) & (rig.follows(trial) & are_news(trial, lasts_s))[:, None]
+    followed = np.isfinite(columns) & (rig.follows(trial) & are_news(trial, correlation_s))[:, None]
     in_counts = np.array([count_of(c) > 0.0 for c in columns.T])
     readings = Readings(outputs, followed & ~hunting, np.where(in_counts, often, 1.0))
     return ReadColumns(followed, np.where(followed, columns, 0.0), often, readings)
@@ -228,19 +238,19 @@ class _Prediction(Block):
         processes: tuple[str, ...],
         priors: Sequence[Mapping[str, float]],
         max_step_s: float,
-        lasts_s: float,
+        correlation_s: float,
     ) -> None:
         kind, self.outputs = trials[lanes[0]].kind, measured_outputs(model, trials[lanes[0]])
         super().__init__(disturbed(model, kind, processes), trials, lanes, columns, max_step_s, self.outputs)
         for name in self.rig.unknowns(kind):
             self._set(self.constants, f"prior.{name}", [priors[i][name] for i in lanes])
-        self.doubtful = [n for n in self.layout.constants if n.startswith(("white.", "std.", "time."))]
+        self.noise_names = [n for n in self.layout.constants if n.startswith(("white.", "std.", "time."))]
         self.seen = np.zeros((self.count, len(self.outputs), self.width), dtype=bool)
         self.measured = np.zeros((self.count, len(self.outputs), self.width))
         self.repeated = np.ones((self.count, len(self.outputs), self.width))
         self.readings: list[Readings] = []
         for lane, trial in enumerate(self.trials):
-            read, n = read_columns(self.rig, trial, self.outputs, lasts_s), len(trial)
+            read, n = read_columns(self.rig, trial, self.outputs, correlation_s), len(trial)
             self.seen[:n, :, lane], self.measured[:n, :, lane], self.repeated[:n, :, lane] = read[:3]
             self.readings.append(read.readings)
 
@@ -251,17 +261,19 @@ class _Prediction(Block):
     def run(
         self,
         values: Sequence[Mapping[str, float]],
-        doubts: Sequence[Mapping[str, float]],
+        noises: Sequence[Mapping[str, float]],
         unknowns: Sequence[Mapping[str, float]],
         delays: Sequence[float],
     ) -> tuple[np.ndarray, np.ndarray]:
         """What the program gives of all lanes; see `Program`. Everything is that of all trials."""
-        known = {n: [doubts[i][n] for i in self.lanes] for n in self.doubtful}
+        known = {n: [noises[i][n] for i in self.lanes] for n in self.noise_names}
         return self._run(values, unknowns, delays, **known)
 
-    def innovations(self, y: np.ndarray, s: np.ndarray, width: int, doubts: Sequence[Doubt]) -> Iterator[ForetoldTrial]:
-        """The innovations of each lane and under its doubt, with sensitivities to `width` columns."""
-        k, told, by_lane = len(self.outputs), _lanes_first(y), _lanes_first(s)
+    def innovations(
+        self, y: np.ndarray, s: np.ndarray, width: int, noises: Sequence[StateSpaceNoise]
+    ) -> Iterator[PredictedTrial]:
+        """The innovations of each lane at its noise, with sensitivities to `width` columns."""
+        k, rows, by_lane = len(self.outputs), _lanes_first(y), _lanes_first(s)
         for lane, readings in enumerate(self.readings):
             n = len(readings.seen)
             own = by_lane[lane, :n]
@@ -270,12 +282,12 @@ class _Prediction(Block):
             else:
                 sensitivities = np.zeros((n, k, width))
                 sensitivities[..., list(self.places)] = own
-            values = told[lane, :n, :k] if readings.all_seen else np.where(readings.seen, told[lane, :n, :k], 0.0)
-            white = tuple(doubts[lane].white[o] for o in self.outputs)
-            ar = tuple(doubts[lane].ar.get(o, ()) for o in self.outputs)
-            yield ForetoldTrial(readings, values, told[lane, :n, k:], sensitivities, white, ar)
+            values = rows[lane, :n, :k] if readings.all_seen else np.where(readings.seen, rows[lane, :n, :k], 0.0)
+            white = tuple(noises[lane].white[o] for o in self.outputs)
+            ar = tuple(noises[lane].ar.get(o, ()) for o in self.outputs)
+            yield PredictedTrial(readings, values, rows[lane, :n, k:], sensitivities, white, ar)
 
-    def foretold(self, y: np.ndarray, doubt: Doubt) -> Iterator[dict[str, ForetoldOutput]]:
+    def predicted(self, y: np.ndarray, noise: StateSpaceNoise) -> Iterator[dict[str, PredictedOutput]]:
         """What is foretold in each lane, by output: what was given as measured less the innovation.
 
         What noise that was seen foretells of itself is part of it.
@@ -283,28 +295,28 @@ class _Prediction(Block):
         count = len(self.outputs)
         for lane, trial in enumerate(self.trials):
             n = len(trial)
-            told, variances = self.measured[:n, :, lane] - y[:n, :count, lane], y[:n, count:, lane]
-            each = {o: ForetoldOutput(told[:, k], variances[:, k]) for k, o in enumerate(self.outputs)}
+            predicted, variances = self.measured[:n, :, lane] - y[:n, :count, lane], y[:n, count:, lane]
+            each = {o: PredictedOutput(predicted[:, k], variances[:, k]) for k, o in enumerate(self.outputs)}
             for k, o in enumerate(self.outputs):
-                if ar := doubt.ar.get(o):
+                if ar := noise.ar.get(o):
                     each[o] = _with_noise_ahead(each[o], y[:n, k, lane], self.seen[:n, k, lane], ar)
             yield each
 
 
 def _with_noise_ahead(
-    told: ForetoldOutput, missed: np.ndarray, seen: np.ndarray, ar: tuple[float, ...]
-) -> ForetoldOutput:
-    size = np.sqrt(told.variances)
-    beside, growth = noise_ahead(missed / size, seen, ar)
-    return ForetoldOutput(told.values + size * beside, told.variances * growth)
+    predicted: PredictedOutput, missed: np.ndarray, seen: np.ndarray, ar: tuple[float, ...]
+) -> PredictedOutput:
+    size = np.sqrt(predicted.variances)
+    ahead, growth = noise_ahead(missed / size, seen, ar)
+    return PredictedOutput(predicted.values + size * ahead, predicted.variances * growth)
 
 
-def are_news(trial: Trial, lasts_s: float) -> np.ndarray:
+def are_news(trial: Trial, correlation_s: float) -> np.ndarray:
     """Samples so far apart that the noise of each is its own, shape (n,).
 
     Where noise lasts, those within twice its time of an end are left out: what made it last had less to average there.
     """
-    step, k = max(1, round(lasts_s / trial.dt)), np.arange(len(trial))
+    step, k = max(1, round(correlation_s / trial.dt)), np.arange(len(trial))
     inner = 2 * (step - 1)
     return np.asarray((k % step == 0) & (k >= inner) & (k < len(trial) - inner))
 

@@ -49,7 +49,7 @@ class Simulated:
 
 
 @dataclass(frozen=True)
-class Abreast:
+class SimulatedBatch:
     """Trials of one kind as they were simulated: side by side, each in its lane.
 
     Attributes
@@ -126,15 +126,15 @@ class Simulator:
         out: list[Simulated | None] = [None] * len(self.trials)
         if unknowns is None:
             unknowns = self.start(values if isinstance(values, Mapping) else values[0])
-        for block in self.run_abreast(values, unknowns):
+        for block in self.run_batches(values, unknowns):
             for lane, i in enumerate(block.trials):
                 n = len(self.trials[i])
                 out[i] = Simulated(block.readings[:n, :, lane], self._spread(block, block.sensitivities[:n, ..., lane]))
         return [s for s in out if s is not None]
 
-    def run_abreast(
+    def run_batches(
         self, values: Mapping[str, float] | Sequence[Mapping[str, float]], unknowns: Sequence[Mapping[str, float]]
-    ) -> Iterator[Abreast]:
+    ) -> Iterator[SimulatedBatch]:
         """Simulate every trial, as `run` does; what comes side by side is given as it comes."""
         each = [values] * len(self.trials) if isinstance(values, Mapping) else values
         for own in [values] if isinstance(values, Mapping) else each:
@@ -145,7 +145,7 @@ class Simulator:
         for block in self._blocks:
             yield block.run(values, unknowns, delays)
 
-    def _spread(self, block: Abreast, s: np.ndarray) -> np.ndarray:
+    def _spread(self, block: SimulatedBatch, s: np.ndarray) -> np.ndarray:
         """Sensitivities in the order asked for, zero where this kind of trial has no such unknown."""
         if len(block.columns) == len(self.columns):
             return s
@@ -176,8 +176,8 @@ def _read_through(
     model: Model, trials: Sequence[Trial], values: Mapping[str, float], unknowns: Sequence[dict[str, float]]
 ) -> None:
     """Move what a first sample tells until the model, its sensor included, reads that sample: Newton's steps."""
-    told = [model.rig.read_first(t) for t in trials]
-    names = dict.fromkeys(n for columns in told for n in columns)
+    read = [model.rig.read_first(t) for t in trials]
+    names = dict.fromkeys(n for columns in read for n in columns)
     if not names:
         return
     simulator = Simulator(model, [_first_samples(t) for t in trials])
@@ -185,11 +185,11 @@ def _read_through(
         base = simulator.run(values, unknowns)
         moved = simulator.run(values, [{**u, name: u[name] + NUDGE} for u in unknowns])
         for i, trial in enumerate(trials):
-            if name not in told[i]:
+            if name not in read[i]:
                 continue
-            k = model.rig.outputs(trial.kind).index(told[i][name])
+            k = model.rig.outputs(trial.kind).index(read[i][name])
             slope = float(moved[i].readings[0, k] - base[i].readings[0, k]) / NUDGE
-            step = float(trial[told[i][name]][0] - base[i].readings[0, k]) / slope if slope else 0.0
+            step = float(trial[read[i][name]][0] - base[i].readings[0, k]) / slope if slope else 0.0
             unknowns[i][name] += step if math.isfinite(step) else 0.0
 
 
@@ -299,13 +299,13 @@ class _Simulation(Block):
         values: Mapping[str, float] | Sequence[Mapping[str, float]],
         unknowns: Sequence[Mapping[str, float]],
         delays: Sequence[float],
-    ) -> Abreast:
+    ) -> SimulatedBatch:
         y, s = self._run(values, unknowns, delays)
         for lane, trial in enumerate(self.trials):
             if len(trial) < self.count:
                 y[len(trial) :, :, lane] = s[len(trial) :, ..., lane] = 0.0
         pass_as_stored(self.trials, (y, s))
-        return Abreast(tuple(self.lanes), self.places, y, s)
+        return SimulatedBatch(tuple(self.lanes), self.places, y, s)
 
 
 class LatestInputs:

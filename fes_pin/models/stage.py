@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from enum import StrEnum
 from importlib import import_module
@@ -31,6 +32,10 @@ Bounds = dict[str, tuple[float, float]]
 """The least and the largest value of parameters, by name."""
 Grids = dict[str, tuple[float, ...]]
 """Values of parameters that are tried, by name."""
+
+
+_RENAMED = {"beside": "screened_with", "foretold_step_s": "predictor_step_s"}
+"""Attributes of an effect that an earlier version named otherwise; a file of one's own may still set these."""
 
 
 class Stage(StrEnum):
@@ -72,11 +77,11 @@ class Effect:
         True if it can only take energy from the joint.
     max_step_s
         Longest integration step that resolves it, s.
-    foretold_step_s
+    predictor_step_s
         The same for a one-step predictor, where the step depends on how well the rig's velocity is known.
     varies
         True if its amplitudes can be other in each trial: those of what does not begin with the trial.
-    beside
+    screened_with
         Names of effects without which it shows little or nothing: it is screened in models that also contain them.
     remembers
         True if earlier trials of the session are in its states at the start: `rest` reads them by `session`.
@@ -103,13 +108,20 @@ class Effect:
     inputs: ClassVar[tuple[str, ...]] = ()
     dissipative: ClassVar[bool] = False
     max_step_s: ClassVar[float] = math.inf
-    foretold_step_s: ClassVar[float] = math.inf
+    predictor_step_s: ClassVar[float] = math.inf
     varies: ClassVar[bool] = False
-    beside: ClassVar[tuple[str, ...]] = ()
+    screened_with: ClassVar[tuple[str, ...]] = ()
     remembers: ClassVar[bool] = False
     scales: ClassVar[bool] = False
 
     each_trial: bool = dataclasses.field(default=False, kw_only=True)
+
+    def __init_subclass__(cls) -> None:
+        for old, new in _RENAMED.items():
+            if old in vars(cls):
+                said = f"Effect.{old} is Effect.{new} now; it ends with version 0.3"
+                warnings.warn(said, DeprecationWarning, stacklevel=2)
+                setattr(cls, new, vars(cls)[old])
 
     def __post_init__(self) -> None:
         check_parameters(self)

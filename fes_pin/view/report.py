@@ -89,7 +89,7 @@ def _answer(result: Result, one: Named) -> Content:
     kind = result.effect(one.name)
     what = one.words or (sentence(kind) if kind else one.name)
     where = f" At {one.site}." if one.site else ""
-    return f"{_upper(what).removesuffix('.')}.{where} Size: {', '.join(_sizes(one))}. {told_apart(one)}"
+    return f"{_upper(what).removesuffix('.')}.{where} Size: {', '.join(_sizes(one))}. {distinguished(one)}"
 
 
 def _sizes(one: Named) -> list[str]:
@@ -106,7 +106,7 @@ def _upper(words: str) -> str:
     return words[:1].upper() + words[1:]
 
 
-def told_apart(one: Named) -> str:
+def distinguished(one: Named) -> str:
     """The family-wise error of a cause or change, and the candidates that are equivalent to it."""
     kind = type(one).__name__.lower()
     found = f"{kind} from {', '.join(one.equivalents) or f'every other {kind} in the library'}"

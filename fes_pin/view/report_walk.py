@@ -24,7 +24,7 @@ PYTHON = f'import fes_pin as fp\n\nbody = fp.Body.from_urdf("{BODY_FILE}")\nline
 
 def _counts(diagnosis: WalkDiagnosis) -> str:
     """How many strides there are."""
-    return f"{diagnosis.models.banks.strides.count} strides"
+    return f"{diagnosis.models.designs.strides.count} strides"
 
 
 def _sections(diagnosis: WalkDiagnosis) -> list[Markup]:
@@ -38,19 +38,19 @@ def _sections(diagnosis: WalkDiagnosis) -> list[Markup]:
 
 
 def _trials(diagnosis: WalkDiagnosis) -> list[Markup]:
-    banks, best = diagnosis.models.banks, diagnosis.best
+    designs, best = diagnosis.models.designs, diagnosis.best
     extended = [("extended", "required by the extended model")] if best.names else []
     out = [key(("measured", "measured"), ("nominal", "required"), *extended)]
-    for number, scene in enumerate(banks.as_read.scenes):
-        curves = {"nominal": scene.needed, "measured": scene.measured}
+    for number, trial in enumerate(designs.as_read.trials):
+        curves = {"nominal": trial.needed, "measured": trial.measured}
         if best.names:
-            with_it = banks.bank(best.names).scenes[number]
-            made = scene.measured - (with_it.residual - banks.signals(best.names, with_it) @ best.fitted.values)
+            with_it = designs.design(best.names).trials[number]
+            made = trial.measured - (with_it.residual - designs.signals(best.names, with_it) @ best.fitted.values)
             curves = {"extended": made, **curves}
-        single = scene.plates.loaded["left"] ^ scene.plates.loaded["right"]
-        drawn = _drawing(scene.name, scene.motion.time, curves, single)
-        words = f"Trial {scene.name}, at most {SHOWN_S:g} s of it; single supports are shaded."
-        out.append(figure(drawn, words, file=scene.name))
+        single = trial.plates.loaded["left"] ^ trial.plates.loaded["right"]
+        drawn = _drawing(trial.name, trial.motion.time, curves, single)
+        words = f"Trial {trial.name}, at most {SHOWN_S:g} s of it; single supports are shaded."
+        out.append(figure(drawn, words, file=trial.name))
     return out
 
 

@@ -14,7 +14,7 @@ from fes_pin.data.study import Study
 from fes_pin.infer.result import STOPPED
 from fes_pin.infer.search import SearchResult
 from fes_pin.infer.verdict import word_of
-from fes_pin.walk.banks import Banks
+from fes_pin.walk.designs import Designs
 from fes_pin.walk.experiment import next_walk
 from fes_pin.walk.judge import not_testable
 from fes_pin.walk.models import POLICY, WalkFit, WalkModels, WalkSearch
@@ -61,7 +61,7 @@ def diagnose_walk(
     with one_thread_each(), noting_stops() as stops:
         tell(0.02, "inverse dynamics")
         _, recordings = recordings_of(replace(study, trials=trials), cutoff_hz=cutoff_hz)
-        models = WalkModels(Banks(recordings, cutoff_hz, seed), seed)
+        models = WalkModels(Designs(recordings, cutoff_hz, seed), seed)
         with time_limit(math.inf if limit is None else limit - (time.perf_counter() - began)):
             search, found = _searched(models, tell)
         tell(0.85, "strides held out")
@@ -92,7 +92,7 @@ def _judged(study: Study, search: WalkSearch, found: SearchResult[WalkFit], seed
     state = verdict.of(found)
     found, left, errors = state.found, verdict.lack_of_fit(state), verdict.errors
     causes = [verdict.cause(state, n) for n in found.best.names]
-    noise = marker_noise(models.banks)
+    noise = marker_noise(models.designs)
     causes += [noise] if noise is not None and noise.name not in {c.name for c in causes} else []
     causes.sort(key=lambda c: (c.gain_held_out.is_none, -c.gain_held_out.percent))
     in_a_set = {n for c in causes for n in (c.name, *c.equivalents)}  # these may be what is there
@@ -101,7 +101,7 @@ def _judged(study: Study, search: WalkSearch, found: SearchResult[WalkFit], seed
         verdict=word_of(bool(causes), left),
         causes=tuple(causes),
         remainder=left,
-        absorbed=tuple(n for n in not_testable(models.banks, found.best) if n not in in_a_set),
+        absorbed=tuple(n for n in not_testable(models.designs, found.best) if n not in in_a_set),
         nominal_error=errors.error_percent(found.nominal),
         extended_error=errors.error_percent(found.best),
         ceiling_percent=errors.errors(found.nominal, False).ceiling_percent(),

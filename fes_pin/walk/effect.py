@@ -9,13 +9,13 @@ from typing import ClassVar
 import numpy as np
 
 from fes_pin.body.joints import SIDES
-from fes_pin.walk.scene import Scene
+from fes_pin.walk.walk_trial import WalkTrial
 
 STAGE = "body"
 """Where the contract files these causes."""
 AXES = ("forward", "left", "up")
 
-EffectColumns = Callable[[Scene], np.ndarray]
+EffectColumns = Callable[[WalkTrial], np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,9 @@ class Form:
     shifts: bool = False
     positive: bool = False
     ordinary: float = 0.0
-    reading: Callable[[Scene], tuple[np.ndarray, float] | None] | None = field(default=None, repr=False, compare=False)
+    reading: Callable[[WalkTrial], tuple[np.ndarray, float] | None] | None = field(
+        default=None, repr=False, compare=False
+    )
     segments: Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]] | None = field(
         default=None, repr=False, compare=False
     )
@@ -112,8 +114,8 @@ def segment_form(
 ) -> Form:
     """A form that changes segments' mass parameters: its columns are Pinocchio's regressors times that change."""
 
-    def columns(scene: Scene) -> np.ndarray:
-        return np.sum([scene.regressors[s] @ d for s, d in change(scene.parameters).items()], axis=0)
+    def columns(trial: WalkTrial) -> np.ndarray:
+        return np.sum([trial.regressors[s] @ d for s, d in change(trial.parameters).items()], axis=0)
 
     return Form(cause, site, parameters, units, plausible, columns, segments=change)
 

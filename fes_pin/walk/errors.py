@@ -7,7 +7,7 @@ import numpy as np
 from fes_pin.infer.held_out import Errors, added_likelihood, held_out_gain
 from fes_pin.infer.result import Evidence, Gain
 from fes_pin.infer.search import Names
-from fes_pin.walk.banks import Banks
+from fes_pin.walk.designs import Designs
 from fes_pin.walk.likelihood import fit_walk
 from fes_pin.walk.models import WalkFit, WalkModels
 
@@ -28,13 +28,13 @@ class StrideErrors:
 
     def __init__(self, models: WalkModels, seed: int) -> None:
         self.models, self.seed = models, seed
-        banks = models.banks
-        height = banks.recordings[0].motion.body.height_m or 1.8
+        designs = models.designs
+        height = designs.recordings[0].motion.body.height_m or 1.8
         self._scale = np.r_[np.ones(3), np.full(3, 1.0 / (ARM * height))][:, None]
         self._residuals: dict[tuple[Names, bool], np.ndarray] = {}
-        about_mean = banks.measured * (banks.strides.harmonics > 0)
+        about_mean = designs.measured * (designs.strides.harmonics > 0)
         self._spread = np.sum((self._scale * about_mean) ** 2, axis=(1, 2))
-        y, _ = banks.by_stride(())
+        y, _ = designs.by_stride(())
         self._differs = np.sum((self._scale * (y - y.mean(axis=0))) ** 2, axis=0) / max(len(y) - 1, 1)
 
     def errors(self, one: WalkFit, held_out: bool) -> Errors:
@@ -46,7 +46,7 @@ class StrideErrors:
 
     def error_percent(self, one: WalkFit) -> tuple[float, float | None]:
         """E on all strides, and on strides held out; None for one stride."""
-        held_out = self.errors(one, True).error_percent() if self.models.banks.strides.count > 1 else None
+        held_out = self.errors(one, True).error_percent() if self.models.designs.strides.count > 1 else None
         return self.errors(one, False).error_percent(), held_out
 
     def gain(self, without: WalkFit, best: WalkFit, held_out: bool) -> Gain:
@@ -61,36 +61,36 @@ class StrideErrors:
         What landmarks and plates may make in a session counts for neither. The mean over strides: soft tissue moves
         alike in each, so that more strides are no more evidence.
         """
-        before, after = (_whitened(self._residual(one, True), self.models.banks, best) for one in (without, best))
+        before, after = (_whitened(self._residual(one, True), self.models.designs, best) for one in (without, best))
         every = [added_likelihood(*pair) for pair in zip(before, after, strict=True)]
         return Evidence(*np.mean([(e.added, e.squares) for e in every], axis=0).tolist())
 
     def _residual(self, one: WalkFit, held_out: bool) -> np.ndarray:
         if (one.names, held_out) not in self._residuals:
-            self._residuals[one.names, held_out] = _residual_by_stride(self.models.banks, one, held_out)
+            self._residuals[one.names, held_out] = _residual_by_stride(self.models.designs, one, held_out)
         return self._residuals[one.names, held_out]
 
 
-def _residual_by_stride(banks: Banks, one: WalkFit, held_out: bool) -> np.ndarray:
+def _residual_by_stride(designs: Designs, one: WalkFit, held_out: bool) -> np.ndarray:
     """Residual of a set in every stride, its sizes fitted to all strides or to the others: (n, 6, k)."""
-    y, x = banks.by_stride(one.names)
+    y, x = designs.by_stride(one.names)
     if not (one.names and held_out):
         return y - x @ one.fitted.values
     out = []
     for k in range(len(y)):
         others = np.arange(len(y)) != k
-        mean_y, mean_x = (banks.noise.rotated(v[others].mean(axis=0, keepdims=True)) for v in (y, x))
-        out.append(y[k] - x[k] @ fit_walk(mean_y, mean_x, banks.plausible(one.names), banks.noise).values)
+        mean_y, mean_x = (designs.noise.rotated(v[others].mean(axis=0, keepdims=True)) for v in (y, x))
+        out.append(y[k] - x[k] @ fit_walk(mean_y, mean_x, designs.plausible(one.names), designs.noise).values)
     return np.array(out)
 
 
-def _whitened(residual: np.ndarray, banks: Banks, best: WalkFit) -> np.ndarray:
+def _whitened(residual: np.ndarray, designs: Designs, best: WalkFit) -> np.ndarray:
     """Residuals (n, 6, k) in units of the noise of a set and of what its nuisance parameters may take: (n, 6 k).
 
     With F the nuisance's columns in units of the noise, u s v' its singular values: (1 + F F')^(-1/2) is
     1 - u (1 - (1 + s^2)^(-1/2)) u'.
     """
     root = np.sqrt(best.fitted.variance[0])
-    u, s, _ = np.linalg.svd((banks.noise.nuisance[0] / root[..., None]).reshape(root.size, -1), full_matrices=False)
-    white = (banks.noise.rotated(residual) / root).reshape(len(residual), -1)
+    u, s, _ = np.linalg.svd((designs.noise.nuisance[0] / root[..., None]).reshape(root.size, -1), full_matrices=False)
+    white = (designs.noise.rotated(residual) / root).reshape(len(residual), -1)
     return np.asarray(white - (white @ u) * (1.0 - 1.0 / np.sqrt(1.0 + s**2)) @ u.T)

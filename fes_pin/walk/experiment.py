@@ -11,12 +11,12 @@ import numpy as np
 from fes_pin.data.read_only import ReadOnly
 from fes_pin.infer.levels import STRONG_EVIDENCE
 from fes_pin.infer.search import SearchResult
-from fes_pin.walk.banks import Banks
+from fes_pin.walk.designs import Designs
 from fes_pin.walk.dynamics import about, centre_of_mass, required
 from fes_pin.walk.models import WalkFit, WalkModels
 from fes_pin.walk.motion import Motion
 from fes_pin.walk.plates import Plates
-from fes_pin.walk.scene import Scene
+from fes_pin.walk.walk_trial import WalkTrial
 
 NEXT_FILE = "next_trial.csv"
 CARRIED_KG = 10.0
@@ -56,20 +56,20 @@ class NextWalk(ReadOnly):
 
 def next_walk(models: WalkModels, found: SearchResult[WalkFit], cause: str) -> NextWalk | None:
     """The trial that separates a cause from its nearest rival of another name; None if it has none."""
-    banks, best = models.banks, found.best
-    own = {n for n in best.names if banks.forms[n].cause == cause}
-    near = [(r.price, set(r.names) - set(best.names), n) for n in own for r in models.near_rivals(found, n)]
-    rivals = [(price, new, gone) for price, (new,), gone in near if banks.forms[new].cause != cause]
+    designs, best = models.designs, found.best
+    own = {n for n in best.names if designs.forms[n].cause == cause}
+    near = [(r.criterion, set(r.names) - set(best.names), n) for n in own for r in models.near_rivals(found, n)]
+    rivals = [(criterion, new, gone) for criterion, (new,), gone in near if designs.forms[new].cause != cause]
     if not rivals:
         return None
     _, new, gone = min(rivals)
-    pair = (cause, banks.forms[new].cause)
+    pair = (cause, designs.forms[new].cause)
     signal = models.sizes(best)[gone]
     scores = {}
     for name, make in _TRIALS.items():
-        scene = make(banks.as_read.scenes[0])
-        mine, its = (banks.forms[n].columns(scene) for n in (gone, new))
-        scores[name] = _separation(banks, mine @ signal, its, banks.plausible((new,)), best)
+        trial = make(designs.as_read.trials[0])
+        mine, its = (designs.forms[n].columns(trial) for n in (gone, new))
+        scores[name] = _separation(designs, mine @ signal, its, designs.plausible((new,)), best)
     name = max(scores, key=lambda n: scores[n])
     if scores[name] < STRONG_EVIDENCE:
         why = (
@@ -77,7 +77,7 @@ def next_walk(models: WalkModels, found: SearchResult[WalkFit], cause: str) -> N
             "weigh the plates with known masses, or measure the body by other means"
         )
         return NextWalk(why, pair, None, None)
-    first = banks.recordings[0]
+    first = designs.recordings[0]
     time, columns = first.coordinates_time, {n: c for n, c in first.coordinates.items() if n.startswith("q_")}
     time, columns, conditions = _program(name, time - time[0], columns, first.belt_speed_mps)
     why = f"{_WORDS[name]} (it separates {pair[0]} from {pair[1]} by {np.sqrt(scores[name]):.1f} standard deviations)"
@@ -97,7 +97,7 @@ def _program(
     return time, columns, {"belt_speed_mps": belt_speed_mps}
 
 
-def _scene(old: Scene, motion: Motion, load: dict[str, np.ndarray], extra: np.ndarray | None = None) -> Scene:
+def _trial(old: WalkTrial, motion: Motion, load: dict[str, np.ndarray], extra: np.ndarray | None = None) -> WalkTrial:
     """A trial that measures just what its motion requires, shared out between the feet; `extra` (n, 6) is added."""
     needed = required(motion)
     if extra is not None:
@@ -105,35 +105,35 @@ def _scene(old: Scene, motion: Motion, load: dict[str, np.ndarray], extra: np.nd
     feet = {side: share[:, None] * needed for side, share in load.items()}
     loaded = {side: share > 0.0 for side, share in load.items()}
     plates = Plates(old.motion.time, feet, old.plates.pressure, loaded)
-    return Scene(old.name, motion, plates, centre_of_mass(motion))
+    return WalkTrial(old.name, motion, plates, centre_of_mass(motion))
 
 
-def _shares(old: Scene) -> dict[str, np.ndarray]:
+def _shares(old: WalkTrial) -> dict[str, np.ndarray]:
     up = {side: np.clip(w[:, 2], 0.0, None) for side, w in old.plates.feet.items()}
     total = np.maximum(up["left"] + up["right"], 1.0)
     return {side: v / total for side, v in up.items()}
 
 
-def _stand(old: Scene) -> Scene:
+def _stand(old: WalkTrial) -> WalkTrial:
     motion = old.motion
     still = Motion(motion.body, motion.model, motion.time, motion.q[:1].repeat(len(motion.time), axis=0),
                    0.0 * motion.v, 0.0 * motion.a)  # fmt: skip
     one = np.ones(len(motion.time))
-    return _scene(old, still, {"left": 0.0 * one, "right": one})
+    return _trial(old, still, {"left": 0.0 * one, "right": one})
 
 
-def _slower(old: Scene) -> Scene:
+def _slower(old: WalkTrial) -> WalkTrial:
     motion = old.motion
     slow = Motion(motion.body, motion.model, motion.time, motion.q, SLOWER * motion.v, SLOWER**2 * motion.a)
-    return _scene(old, slow, _shares(old))
+    return _trial(old, slow, _shares(old))
 
 
-def _carry(old: Scene) -> Scene:
+def _carry(old: WalkTrial) -> WalkTrial:
     trunk = old.regressors["trunk"] @ (CARRIED_KG * old.parameters["trunk"] / old.parameters["trunk"][0])
-    return _scene(old, old.motion, _shares(old), about(trunk, -old.centre))
+    return _trial(old, old.motion, _shares(old), about(trunk, -old.centre))
 
 
-_TRIALS: dict[str, Callable[[Scene], Scene]] = {"stand": _stand, "slower": _slower, "carry": _carry}
+_TRIALS: dict[str, Callable[[WalkTrial], WalkTrial]] = {"stand": _stand, "slower": _slower, "carry": _carry}
 _WORDS = {
     "stand": "stand still on one plate",
     "slower": f"walk at {100 * SLOWER:.0f} % of the speed",
@@ -141,11 +141,11 @@ _WORDS = {
 }
 
 
-def _separation(banks: Banks, signal: np.ndarray, rival: np.ndarray, prior: np.ndarray, best: WalkFit) -> float:
+def _separation(designs: Designs, signal: np.ndarray, rival: np.ndarray, prior: np.ndarray, best: WalkFit) -> float:
     """Squared distance of a signal (n, 6) from what a rival (n, 6, p) can make of it, in the noise that was found."""
     columns = np.concatenate([signal[:, :, None], rival], axis=2)
-    _, rows, _ = banks.strides.windows[0]
-    white = banks.noise.rotated(banks.strides.first(columns[rows])) / np.sqrt(best.fitted.variance)
+    _, rows, _ = designs.strides.windows[0]
+    white = designs.noise.rotated(designs.strides.first(columns[rows])) / np.sqrt(best.fitted.variance)
     y, x = white[0].ravel(), white[1:].reshape(len(prior), -1).T * prior
     values = np.linalg.solve(x.T @ x + np.eye(x.shape[1]), x.T @ y)
     return float(np.sum((y - x @ values) ** 2))

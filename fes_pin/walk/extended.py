@@ -26,12 +26,12 @@ def extended_body(models: WalkModels, best: WalkFit) -> Body:
     InputError
         The figures are no body's: a mass that is not positive, say.
     """
-    banks = models.banks
-    body = banks.recordings[0].motion.body
-    believed = banks.as_read.scenes[0].parameters
+    designs = models.designs
+    body = designs.recordings[0].motion.body
+    believed = designs.as_read.trials[0].parameters
     found = {s: p.copy() for s, p in believed.items()}
     for name, sizes in models.sizes(best).items():
-        change = banks.forms[name].segments
+        change = designs.forms[name].segments
         if change is not None:
             for segment, columns in change(believed).items():
                 found[segment] += columns @ sizes

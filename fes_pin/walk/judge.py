@@ -6,7 +6,7 @@ import numpy as np
 
 from fes_pin.infer.distributions import f_tail
 from fes_pin.infer.levels import SEEN_DEVIATIONS
-from fes_pin.walk.banks import Banks
+from fes_pin.walk.designs import Designs
 from fes_pin.walk.likelihood import FLOOR_N, by_frequency
 from fes_pin.walk.models import WalkFit
 
@@ -15,22 +15,22 @@ CHANNELS = ("forward force", "leftward force", "vertical force", "moment about f
             "moment about vertical")  # fmt: skip
 
 
-def other_leg(banks: Banks, one: WalkFit) -> float | None:
+def other_leg(designs: Designs, one: WalkFit) -> float | None:
     """Gain in percent on one leg's single supports of sizes fitted to the other's; None where a leg has none.
 
     Channels count in units of the set's residual in them.
     """
-    along = [(scene, banks.signals(one.names, scene)) for scene in banks.bank(one.names).scenes]
-    left = np.concatenate([scene.residual - x @ one.fitted.values for scene, x in along])
+    along = [(trial, designs.signals(one.names, trial)) for trial in designs.design(one.names).trials]
+    left = np.concatenate([trial.residual - x @ one.fitted.values for trial, x in along])
     scale = 1.0 / np.maximum(np.sqrt(np.mean(left**2, axis=0)), FLOOR_N)
     data: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {"left": [], "right": []}
-    for scene, x in along:
-        for side, rows in scene.plates.single_supports():
-            data[side].append((scene.residual[rows] * scale, x[rows] * scale[:, None]))
+    for trial, x in along:
+        for side, rows in trial.plates.single_supports():
+            data[side].append((trial.residual[rows] * scale, x[rows] * scale[:, None]))
     if not all(data.values()):
         return None
     legs = {side: [np.concatenate([part[k] for part in parts]) for k in (0, 1)] for side, parts in data.items()}
-    prior = banks.plausible(one.names)
+    prior = designs.plausible(one.names)
     before, after = 0.0, 0.0
     for fitted, tested in (("left", "right"), ("right", "left")):
         y, x = legs[fitted]
@@ -40,17 +40,17 @@ def other_leg(banks: Banks, one: WalkFit) -> float | None:
     return 100.0 * (before - after) / before
 
 
-def lack_of_fit(banks: Banks, one: WalkFit) -> tuple[float, str]:
+def lack_of_fit(designs: Designs, one: WalkFit) -> tuple[float, str]:
     """Whether the residual of a set comes again in every stride: p-value, and the channel and wave where it is largest.
 
     For one stride there is nothing to compare with; what a millimetre of marker noise and the plates make is taken.
     """
-    y, x = banks.by_stride(one.names)
-    read, _ = banks.by_stride(())
-    n, waves = len(y), banks.strides.harmonics
+    y, x = designs.by_stride(one.names)
+    read, _ = designs.by_stride(())
+    n, waves = len(y), designs.strides.harmonics
     mean = (y - x @ one.fitted.values).mean(axis=0)
     apart = np.sum((read - read.mean(axis=0)) ** 2, axis=0) / max(n - 1, 1) / n
-    spread = apart if n > 1 else by_frequency(np.mean(banks.shaken**2, axis=0), waves)
+    spread = apart if n > 1 else by_frequency(np.mean(designs.shaken**2, axis=0), waves)
     smooth = spread.copy()
     for h in np.unique(waves):
         near = np.abs(waves - h) <= 1
@@ -64,19 +64,19 @@ def lack_of_fit(banks: Banks, one: WalkFit) -> tuple[float, str]:
     return p_value, f"{CHANNELS[channel]}, {word}"
 
 
-def not_testable(banks: Banks, one: WalkFit) -> list[str]:
+def not_testable(designs: Designs, one: WalkFit) -> list[str]:
     """Causes whose every form, at its plausible size, stands out by less than `SEEN_DEVIATIONS`."""
-    noise, variance = banks.noise, one.fitted.variance
+    noise, variance = designs.noise, one.fitted.variance
     root = 1.0 / np.sqrt(variance).ravel()
-    taken = np.concatenate([noise.nuisance, banks.columns(one.names)], axis=3).reshape(variance.size, -1)
+    taken = np.concatenate([noise.nuisance, designs.columns(one.names)], axis=3).reshape(variance.size, -1)
     taken = taken * root[:, None]
     ridge = np.diag(np.r_[np.ones(noise.nuisance.shape[3]), np.zeros(one.degrees)]) + 1e-12 * np.eye(taken.shape[1])
     best: dict[str, float] = {}
-    for name, form in banks.forms.items():
-        x = noise.rotated(banks.as_read.x[name]).reshape(variance.size, -1) * root[:, None] * np.array(form.plausible)
+    for name, form in designs.forms.items():
+        x = noise.rotated(designs.as_read.x[name]).reshape(variance.size, -1) * root[:, None] * np.array(form.plausible)
         kept = x - taken @ np.linalg.solve(taken.T @ taken + ridge, taken.T @ x)
         best[form.cause] = max(best.get(form.cause, 0.0), float(np.sqrt(max(np.sum(kept * x, axis=0).max(), 0.0))))
-    found = {banks.forms[n].cause for n in one.names}
-    if banks.strides.count > 1:  # what differs from stride to stride shows noise
+    found = {designs.forms[n].cause for n in one.names}
+    if designs.strides.count > 1:  # what differs from stride to stride shows noise
         found.add("marker_noise")
     return sorted(name for name, size in best.items() if size < SEEN_DEVIATIONS and name not in found)

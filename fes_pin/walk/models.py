@@ -13,7 +13,7 @@ import numpy as np
 from fes_pin.infer.fits import Candidate, FittedSets
 from fes_pin.infer.levels import POSSIBLE_SIZES, STRONG_EVIDENCE, WALK_LEVEL
 from fes_pin.infer.search import Names, Policy, Search, SearchResult
-from fes_pin.walk.banks import Banks
+from fes_pin.walk.designs import Designs
 from fes_pin.walk.likelihood import Fitted, fit_many
 from fes_pin.walk.nulls import Nulls, simulated_nulls
 from fes_pin.workers import check_limit
@@ -45,12 +45,12 @@ class WalkFit:
 
     names: Names
     fitted: Fitted = field(repr=False)
-    price: float
+    criterion: float
 
     @property
     def sse(self) -> float:
         """The same: evidence has its penalty in it."""
-        return self.price
+        return self.criterion
 
     @property
     def degrees(self) -> int:
@@ -76,19 +76,19 @@ class WalkModels(FittedSets[WalkFit, None]):
         By form whose parameter a trial shows directly, its value and standard deviation.
     """
 
-    def __init__(self, banks: Banks, seed: int) -> None:
+    def __init__(self, designs: Designs, seed: int) -> None:
         super().__init__()
-        self.banks, self.seed = banks, seed
+        self.designs, self.seed = designs, seed
         self.null: Nulls | None = None
         self.most_candidates = MOST_FOR_NOISE
-        self.readings = dict(_read_off(banks))
+        self.readings = dict(_read_off(designs))
 
     def with_noise_of(self, best: WalkFit) -> WalkModels:
         """The same sets with channels rotated for the residual of one of them, and the null simulated in its noise."""
         other = copy.copy(self)
         FittedSets.__init__(other)
-        other.banks = self.banks.turned(self.banks.residual(best.names, best.fitted.values))
-        other.null = simulated_nulls(other.banks, other.fit(best.names).fitted.variance, self.seed)
+        other.designs = self.designs.turned(self.designs.residual(best.names, best.fitted.values))
+        other.null = simulated_nulls(other.designs, other.fit(best.names).fitted.variance, self.seed)
         other.most_candidates = type(self).most_candidates
         return other
 
@@ -98,7 +98,7 @@ class WalkModels(FittedSets[WalkFit, None]):
 
     def candidates(self, base: WalkFit) -> dict[str, Candidate[None]]:
         """Forms of causes and sites that a set has not: no two forms of one cause at one site."""
-        forms = self.banks.forms
+        forms = self.designs.forms
         taken = {forms[n].place for n in base.names}
         return {n: Candidate(0.0, None) for n, form in forms.items() if form.place not in taken}
 
@@ -106,8 +106,8 @@ class WalkModels(FittedSets[WalkFit, None]):
         """Fit sets, those of as many parameters and one clock together, as long as the limit of time lets it."""
         groups: dict[tuple[int, bool], list[Names]] = {}
         for names in starts:
-            count = sum(len(self.banks.forms[n].parameters) for n in names)
-            groups.setdefault((count, self.banks.shift in names), []).append(names)
+            count = sum(len(self.designs.forms[n].parameters) for n in names)
+            groups.setdefault((count, self.designs.shift in names), []).append(names)
         out: dict[Names, WalkFit] = {}
         for group in groups.values():
             for at in range(0, len(group), TOGETHER):
@@ -127,14 +127,14 @@ class WalkModels(FittedSets[WalkFit, None]):
 
     def is_possible(self, fitted: WalkFit) -> bool:
         """Whether every size of a fit is possible."""
-        return math.isfinite(fitted.price)
+        return math.isfinite(fitted.criterion)
 
     def near(self, size: int, without: Sequence[Names] = ()) -> list[Names]:
         """The best sets of a size, best first, but for some: at most `ALIKE` of the same causes."""
         count: Counter[tuple[str, ...]] = Counter()
         kept = []
         for names in self.ranked(size):
-            causes = tuple(sorted(self.banks.forms[n].cause for n in names))
+            causes = tuple(sorted(self.designs.forms[n].cause for n in names))
             if names not in without and self.is_possible(self.fits[names]) and count[causes] < ALIKE:
                 count[causes] += 1
                 kept.append(names)
@@ -150,11 +150,11 @@ class WalkModels(FittedSets[WalkFit, None]):
 
     def near_rivals(self, found: SearchResult[WalkFit], name: str) -> list[WalkFit]:
         """Sets with another form in the place of one whose odds against the best set are not strong, best first."""
-        return [r for r in found.rivals[name] if r.price - found.best.price < STRONG_EVIDENCE]
+        return [r for r in found.rivals[name] if r.criterion - found.best.criterion < STRONG_EVIDENCE]
 
     def sizes(self, one: WalkFit) -> dict[str, np.ndarray]:
         """Values of a set's parameters by form; a shift counts from the clock as it was read."""
-        forms, later_s = self.banks.forms, self.banks.shifted.later_s
+        forms, later_s = self.designs.forms, self.designs.shifted.later_s
         return {n: v + later_s * forms[n].shifts for n, v in self._by_form(one, one.fitted.values)}
 
     def deviations(self, one: WalkFit) -> dict[str, np.ndarray]:
@@ -164,19 +164,19 @@ class WalkModels(FittedSets[WalkFit, None]):
         return {n: v * np.maximum(spread.get(n, 1.0), 1.0) for n, v in self._by_form(one, stds)}
 
     def _by_form(self, one: WalkFit, values: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
-        ends = np.cumsum([len(self.banks.forms[n].parameters) for n in one.names])
+        ends = np.cumsum([len(self.designs.forms[n].parameters) for n in one.names])
         return zip(one.names, np.split(values, ends), strict=False)
 
     def _fit_alike(self, group: Sequence[Names]) -> list[WalkFit]:
         """Fits of sets of as many parameters and one clock."""
-        noise, forms = self.banks.noise, self.banks.forms
-        y = noise.rotated(self.banks.bank(group[0]).y)
-        x = np.stack([self.banks.columns(names) for names in group])
-        prior = np.array([self.banks.plausible(names) for names in group]).reshape(len(group), -1)
+        noise, forms = self.designs.noise, self.designs.forms
+        y = noise.rotated(self.designs.design(group[0]).y)
+        x = np.stack([self.designs.columns(names) for names in group])
+        prior = np.array([self.designs.plausible(names) for names in group]).reshape(len(group), -1)
         found = fit_many(np.broadcast_to(y, (len(group), *y.shape)), x, prior, noise)
         out = []
         for names, fitted in zip(group, found, strict=True):
-            possible = bool((np.abs(fitted.believed) <= POSSIBLE_SIZES * self.banks.plausible(names)).all())
+            possible = bool((np.abs(fitted.believed) <= POSSIBLE_SIZES * self.designs.plausible(names)).all())
             owners = [n for n in names for _ in forms[n].parameters]
             possible &= all(self._may_be(n, v) for n, v in zip(owners, fitted.believed.tolist(), strict=True))
             out.append(WalkFit(names, fitted, fitted.deviance if possible else math.inf))
@@ -184,7 +184,7 @@ class WalkModels(FittedSets[WalkFit, None]):
 
     def _may_be(self, name: str, value: float) -> bool:
         """Whether a value has a meaning, and is what can be read off where it can."""
-        if self.banks.forms[name].positive and value < 0.0:
+        if self.designs.forms[name].positive and value < 0.0:
             return False
         known = self.readings.get(name)
         return known is None or abs(value - known[0]) <= POSSIBLE_SIZES * known[1]
@@ -194,10 +194,10 @@ WalkSearch = Search[WalkFit, WalkModels]
 """A search over sets of forms of one study."""
 
 
-def _read_off(banks: Banks) -> Iterator[tuple[str, tuple[float, float]]]:
+def _read_off(designs: Designs) -> Iterator[tuple[str, tuple[float, float]]]:
     """Forms whose parameter a trial shows directly: the mean over trials, and its standard deviation."""
-    for name, form in banks.forms.items():
-        found = [form.reading(scene) for scene in banks.as_read.scenes] if form.reading else []
+    for name, form in designs.forms.items():
+        found = [form.reading(trial) for trial in designs.as_read.trials] if form.reading else []
         known = [one for one in found if one is not None]
         if known:
             yield name, (float(np.mean([value for value, _ in known])), known[0][1])

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fes_pin.infer.family import SimulatedFamily
-from fes_pin.walk.banks import Banks
+from fes_pin.walk.designs import Designs
 from fes_pin.walk.likelihood import fit_many
 
 SIMULATED = 100
@@ -34,22 +34,22 @@ class Nulls:
     spread: dict[str, np.ndarray] = field(repr=False)
 
 
-def simulated_nulls(banks: Banks, variance: np.ndarray, seed: int) -> Nulls:
+def simulated_nulls(designs: Designs, variance: np.ndarray, seed: int) -> Nulls:
     """What the library makes of residuals where there is no cause, in noise of this variance, (1, 6, k)."""
-    drawn = _without_a_cause(banks, variance, seed)
+    drawn = _without_a_cause(designs, variance, seed)
     none = np.zeros((*variance.shape, 0))
-    alone = [f.deviance for f in fit_many(drawn, none, np.zeros(0), banks.noise, SIMULATED_ROUNDS)]
+    alone = [f.deviance for f in fit_many(drawn, none, np.zeros(0), designs.noise, SIMULATED_ROUNDS)]
     best, spread = np.full(SIMULATED, -np.inf), {}
-    for name in banks.forms:
-        x = banks.noise.rotated(banks.as_read.x[name])
-        fitted = fit_many(drawn, x, banks.plausible((name,)), banks.noise, SIMULATED_ROUNDS)
+    for name in designs.forms:
+        x = designs.noise.rotated(designs.as_read.x[name])
+        fitted = fit_many(drawn, x, designs.plausible((name,)), designs.noise, SIMULATED_ROUNDS)
         best = np.maximum(best, np.subtract(alone, [f.deviance for f in fitted]))
         z = [f.values / np.sqrt(np.diag(f.covariance)) for f in fitted]
         spread[name] = np.sqrt(np.mean(np.square(z), axis=0))
     return Nulls(SimulatedFamily(best), spread)
 
 
-def _without_a_cause(banks: Banks, variance: np.ndarray, seed: int) -> np.ndarray:
+def _without_a_cause(designs: Designs, variance: np.ndarray, seed: int) -> np.ndarray:
     """Residuals in rotated channels: (draws, 1, 6, k).
 
     Noise is soft tissue's, errors in the coordinates carried through the body, in each wave as large as what was found
@@ -57,12 +57,12 @@ def _without_a_cause(banks: Banks, variance: np.ndarray, seed: int) -> np.ndarra
     """
     random = np.random.default_rng(seed)
     drawn = random.normal(size=(SIMULATED, *variance.shape)) * np.sqrt(variance)
-    always = random.normal(size=(SIMULATED, banks.ordinary.shape[3])) @ banks.ordinary.reshape(variance.size, -1).T
-    mixed = random.normal(size=(SIMULATED, len(banks.tissue))) / np.sqrt(len(banks.tissue))
-    shared = banks.noise.rotated(np.einsum("sd,djk->sjk", mixed, banks.tissue))
-    waves = banks.noise.harmonics > 0
+    always = random.normal(size=(SIMULATED, designs.ordinary.shape[3])) @ designs.ordinary.reshape(variance.size, -1).T
+    mixed = random.normal(size=(SIMULATED, len(designs.tissue))) / np.sqrt(len(designs.tissue))
+    shared = designs.noise.rotated(np.einsum("sd,djk->sjk", mixed, designs.tissue))
+    waves = designs.noise.harmonics > 0
     power = np.mean(shared[..., waves] ** 2, axis=0)
-    h = banks.noise.harmonics[waves]
+    h = designs.noise.harmonics[waves]
     size = np.array([np.sqrt(variance[0][:, waves][:, h == w].sum() / power[:, h == w].sum()) for w in h])
     drawn[:, 0][..., waves] = size * shared[..., waves] + FLOOR_SHARE * drawn[:, 0][..., waves]
     return drawn + always.reshape(drawn.shape)

@@ -105,7 +105,7 @@ class WalkDiagnosis(Result):
 
     def _noise(self) -> dict[str, Any]:
         """Root mean square of what the extended model leaves in the mean stride, by channel: N and N m."""
-        residual = self.models.banks.residual(self.best.names, self.best.fitted.values)
+        residual = self.models.designs.residual(self.best.names, self.best.fitted.values)
         size = np.sqrt(np.sum(residual[0] ** 2, axis=1))
         return {
             name.replace(" ", "_"): {"std": shown(float(s)), "ar": []} for name, s in zip(CHANNELS, size, strict=True)

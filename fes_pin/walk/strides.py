@@ -10,7 +10,7 @@ import numpy as np
 
 from fes_pin.body.joints import SIDES
 from fes_pin.walk.plates import Plates
-from fes_pin.walk.scene import Scene
+from fes_pin.walk.walk_trial import WalkTrial
 
 STILL_S = 1.2
 """Length of a window where nobody steps, s: about a stride."""
@@ -50,8 +50,8 @@ class Strides:
     def coefficients(self, signals: Sequence[np.ndarray]) -> np.ndarray:
         """Coefficients of signals (n, 6, p), one a scene: (strides, 6, k, p); their squares sum to the mean square."""
         out = []
-        for (scene, rows, _), inverse in zip(self.windows, self._inverses, strict=True):
-            values = signals[scene][rows]
+        for (trial, rows, _), inverse in zip(self.windows, self._inverses, strict=True):
+            values = signals[trial][rows]
             flat = inverse @ values.reshape(len(values), int(np.prod(values.shape[1:])))
             out.append(np.moveaxis(flat.reshape(len(self.harmonics), *values.shape[1:]), 0, 1))
         return np.array(out)
@@ -75,18 +75,18 @@ def _waves(phase: np.ndarray, harmonics: np.ndarray) -> np.ndarray:
     return out
 
 
-def strides_of(scenes: Sequence[Scene], cutoff_hz: float) -> Strides:
+def strides_of(trials: Sequence[WalkTrial], cutoff_hz: float) -> Strides:
     """Cut walks into whole strides; phase 0 is a contact of the right foot (else of the left, half a stride later).
 
     A record without two contacts, as of one standing still, is cut into windows of 1.2 s.
     """
     windows, longest, whole = [], [], True
-    for number, scene in enumerate(scenes):
-        time = scene.motion.time
-        phase = _phase(time, scene.plates)
+    for number, trial in enumerate(trials):
+        time = trial.motion.time
+        phase = _phase(time, trial.plates)
         first, last = phase[0], phase[-1] + (phase[-1] - phase[-2])
         count = int(np.floor(last - first + 1e-6))
-        whole &= count > 0 and (_steps(time, scene.plates) or _stands(scene))
+        whole &= count > 0 and (_steps(time, trial.plates) or _stands(trial))
         for k in range(count):
             inside = np.flatnonzero((phase >= first + k) & (phase < first + k + 1 - 1e-9))
             rows = slice(int(inside[0]), int(inside[-1]) + 1)
@@ -106,8 +106,8 @@ def _steps(time: np.ndarray, plates: Plates) -> bool:
     return max(counts) > 1 or min(counts) > 0
 
 
-def _stands(scene: Scene) -> bool:
-    return bool(np.std(np.gradient(scene.centre, scene.dt, axis=0), axis=0).max() < STILL_MPS)
+def _stands(trial: WalkTrial) -> bool:
+    return bool(np.std(np.gradient(trial.centre, trial.dt, axis=0), axis=0).max() < STILL_MPS)
 
 
 def _phase(time: np.ndarray, plates: Plates) -> np.ndarray:

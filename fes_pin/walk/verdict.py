@@ -11,7 +11,7 @@ from fes_pin.infer.levels import CERTAIN_LEVEL, CLAIM_LEVEL, WALK_LEVEL
 from fes_pin.infer.result import FITTED, NO_GAIN, Cause, Evidence, ParameterEstimate, Remainder
 from fes_pin.infer.search import SearchResult
 from fes_pin.infer.verdict import State, Verdict, Weighed
-from fes_pin.walk.banks import Banks
+from fes_pin.walk.designs import Designs
 from fes_pin.walk.effect import STAGE
 from fes_pin.walk.errors import StrideErrors
 from fes_pin.walk.judge import lack_of_fit, other_leg
@@ -57,14 +57,14 @@ class WalkVerdict(Verdict[WalkFit, WalkModels, WalkWeighed]):
 
     def weigh(self, found: SearchResult[WalkFit]) -> WalkWeighed:
         """What strides held out, the other leg and the test of lack of fit say of a set."""
-        banks, best, less = self.models.banks, found.best, found.without
-        many = banks.strides.count > 1
-        p_value, where = lack_of_fit(banks, best)
+        designs, best, less = self.models.designs, found.best, found.without
+        many = designs.strides.count > 1
+        p_value, where = lack_of_fit(designs, best)
         return WalkWeighed(
             gains={n: self.errors.gain(without, best, many) for n, without in less.items()},
             evidence={n: self.errors.evidence(without, best) for n, without in less.items()} if many else {},
             lack_of_fit=Remainder(p_value < CLAIM_LEVEL, p_value, where),
-            other_leg={n: other_leg(banks, self.models.fit((n,))) if self._is_of_either(n) else None for n in less},
+            other_leg={n: other_leg(designs, self.models.fit((n,))) if self._is_of_either(n) else None for n in less},
         )
 
     def unsupported(self, state: Judgement) -> list[str]:
@@ -80,18 +80,18 @@ class WalkVerdict(Verdict[WalkFit, WalkModels, WalkWeighed]):
 
     def _is_of_either(self, name: str) -> bool:
         """Whether a form is of neither leg alone; a clock is of no leg."""
-        form = self.models.banks.forms[name]
+        form = self.models.designs.forms[name]
         return not form.site.startswith(("left", "right")) and not form.shifts
 
     def lack_of_fit(self, state: Judgement) -> Remainder:
         """Lack of fit: the residual comes again in every stride, or held-out strides rejected a cause."""
         remainder = state.weighed.lack_of_fit
-        left = remainder.unexplained or bool(state.refused)
+        left = remainder.unexplained or bool(state.rejected)
         return replace(remainder, unexplained=left, where=remainder.where if left else None)
 
     def cause(self, state: Judgement, name: str) -> Cause:
         """What is reported of one form of the set."""
-        found, weighed, forms = state.found, state.weighed, self.models.banks.forms
+        found, weighed, forms = state.found, state.weighed, self.models.designs.forms
         best, form = found.best, forms[name]
         near = self.models.near_rivals(found, name)
         instead = [forms[n] for r in near for n in r.names if n not in best.names]
@@ -113,12 +113,12 @@ class WalkVerdict(Verdict[WalkFit, WalkModels, WalkWeighed]):
         )
 
 
-def marker_noise(banks: Banks) -> Cause | None:
+def marker_noise(designs: Designs) -> Cause | None:
     """White noise on the coordinates that is more than cameras' own, from what differs from stride to stride.
 
     It is judged by its size, and by the likelihood of what differs: no model of the mean stride predicts it.
     """
-    level, std, saved = white_noise(banks) or (0.0, 0.0, 0.0)
+    level, std, saved = white_noise(designs) or (0.0, 0.0, 0.0)
     evidence = Evidence(saved, saved, FITTED)
     if level - SURELY * std < ORDINARY_MM or evidence.low < 0.0:
         return None

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fes_pin.walk.banks import Banks
+from fes_pin.walk.designs import Designs
 from fes_pin.walk.likelihood import ROUNDS, Spectra, WalkNoise, by_frequency
 
 WHITE_TRIED = 0.2, 40.0, 200
@@ -79,16 +79,16 @@ def _spread_of_white(spectra: Spectra, share: np.ndarray, squares: np.ndarray) -
     return float(np.sqrt(scatter / alone / (alone - cross @ np.linalg.solve(curve, cross))))
 
 
-def white_noise(banks: Banks) -> tuple[float, float, float] | None:
+def white_noise(designs: Designs) -> tuple[float, float, float] | None:
     """White noise of markers, mm, its standard deviation, and the deviance that it saves; None for a single stride."""
-    if banks.strides.count < 2:
+    if designs.strides.count < 2:
         return None
-    y, _ = banks.by_stride(())
-    waves = banks.noise.harmonics > 0
-    shaken = banks.shaken[..., waves]
+    y, _ = designs.by_stride(())
+    waves = designs.noise.harmonics > 0
+    shaken = designs.shaken[..., waves]
     values, vectors = np.linalg.eigh(np.einsum("dik,djk->ij", shaken, shaken) / (len(shaken) * waves.sum()))
     turn = (vectors / np.sqrt(values)).T  # channels in which white noise of the coordinates is independent
-    noise = replace(banks.noise, turn=turn)
+    noise = replace(designs.noise, turn=turn)
     degrees = np.sqrt(len(y) / (len(y) - 1.0))
-    level, std, saved = white_level(noise.rotated((y - y.mean(axis=0)) * degrees), noise, noise.rotated(banks.shaken))
+    level, std, saved = white_level(noise.rotated((y - y.mean(axis=0)) * degrees), noise, noise.rotated(designs.shaken))
     return level, std * degrees, saved

@@ -10,7 +10,7 @@ import numpy as np
 
 from fes_pin.data.smooth import CUTOFF_HZ
 from fes_pin.data.study import Study, read_study
-from fes_pin.walk.banks import Banks
+from fes_pin.walk.designs import Designs
 from fes_pin.walk.models import WalkModels
 from fes_pin.walk.recording import recordings_of
 from fes_pin.walk.white_noise import white_noise
@@ -23,14 +23,14 @@ def strength(gait: Gait, wrong: Wrong, seed: int, study: Study) -> float:
     What the cause changes in the mean stride is the difference of two walks of the same errors, with and without it; it
     is weighed by the noise and the nuisance of the walk without it. Of marker noise the deviance that it saves.
     """
-    banks = _banks(study)
+    designs = _designs(study)
     if wrong.cause == "marker_noise":
-        return float((white_noise(banks) or (0.0, 0.0, 0.0))[2])
+        return float((white_noise(designs) or (0.0, 0.0, 0.0))[2])
     with tempfile.TemporaryDirectory() as folder:
         make(gait, Path(folder), replace(wrong, cause="none"), seed)
-        twin = _banks(read_study(folder))
-    waves = min(len(twin.strides.harmonics), len(banks.strides.harmonics))
-    y = [b.as_read.y[:, :, :waves] for b in (banks, twin)]
+        twin = _designs(read_study(folder))
+    waves = min(len(twin.strides.harmonics), len(designs.strides.harmonics))
+    y = [b.as_read.y[:, :, :waves] for b in (designs, twin)]
     noise, variance = twin.noise, WalkModels(twin, 0).nominal().fitted.variance[:, :, :waves]
     means = twin.strides.harmonics[:waves] == 0
     change = np.where(means, y[0] - y[1], np.einsum("ij,njk->nik", noise.turn, y[0] - y[1])).ravel()
@@ -39,5 +39,5 @@ def strength(gait: Gait, wrong: Wrong, seed: int, study: Study) -> float:
     return float(change @ np.linalg.solve(covariance, change))
 
 
-def _banks(study: Study) -> Banks:
-    return Banks(recordings_of(study, cutoff_hz=CUTOFF_HZ)[1], CUTOFF_HZ)
+def _designs(study: Study) -> Designs:
+    return Designs(recordings_of(study, cutoff_hz=CUTOFF_HZ)[1], CUTOFF_HZ)

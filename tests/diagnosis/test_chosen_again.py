@@ -11,15 +11,15 @@ from fes_pin.diagnosis.held_out import folds_of
 from fes_pin.identify.fit import fit, fit_problem
 from fes_pin.identify.problem import Problem
 from fes_pin.infer.distributions import chi2_tail
-from fes_pin.infer.levels import PARAMETER_PRICE
+from fes_pin.infer.levels import PARAMETER_PENALTY
 from fes_pin.models.effects import effect_named
 from fes_pin.models.nominal import nominal_model
-from fes_pin.models.predictor import Doubt
+from fes_pin.models.predictor import StateSpaceNoise
 
 NAMES = ("coulomb_friction", "effort_offset", "quadratic_damping")
 
 
-def earns(larger, smaller, gain, _explained):
+def improves(larger, smaller, gain, _explained):
     return len(NAMES) * float(chi2_tail(max(gain, 0.0), larger.degrees - smaller.degrees)) < 0.01
 
 
@@ -34,16 +34,16 @@ def fits():
 
 @pytest.mark.parametrize("name", [(), *((n,) for n in NAMES)], ids=str)
 def test_a_step_ends_where_a_fit_to_the_other_trials_does(fits, name):
-    whole, again = fits[name], ChosenAgain(fits, earns)
+    whole, again = fits[name], ChosenAgain(fits, improves)
     for held in folds_of(whole.trials):
         others = [t for i, t in enumerate(whole.trials) if i not in held]
         refitted = fit_problem(Problem(whole.model, others, whole.noise), whole.values)
         many = sum(map(len, whole.trials)) / sum(map(len, others))
-        assert again._cost(name, held) == pytest.approx(many * refitted.sse, abs=PARAMETER_PRICE)
+        assert again._cost(name, held) == pytest.approx(many * refitted.sse, abs=PARAMETER_PENALTY)
 
 
 def test_the_true_cause_is_chosen_without_any_of_the_trials(fits):
-    again = ChosenAgain(fits, earns)
+    again = ChosenAgain(fits, improves)
     chosen = [again.without(held) for held in folds_of(fits[()].trials)]
     assert share_of(chosen, ["coulomb_friction"]) == (len(chosen), len(chosen))
     assert share_of(chosen, ["effort_offset"]) == (0, len(chosen))
@@ -62,7 +62,7 @@ def test_what_one_trial_alone_speaks_for_is_not_chosen_without_it(fits):
         parts[odd] = replace(part, residual=part.residual + push * along)
         return replace(fitted, parts=tuple(parts), sse=sum(float(p.residual @ p.residual) for p in parts))
 
-    again = ChosenAgain({(): moved(nominal), ("effort_offset",): moved(offset)}, earns)
+    again = ChosenAgain({(): moved(nominal), ("effort_offset",): moved(offset)}, improves)
     others = [i for i in range(len(nominal.trials)) if i != odd]
     assert again.without([others[0]]).model.effects
     assert not again.without([odd]).model.effects
@@ -78,10 +78,10 @@ def test_what_all_trials_promise_together_and_no_step_has_kept_counts_for_no_fol
     k, push = offset.free.index("effort_offset.offset"), 20.0 * offset.std("effort_offset.offset")
     parts = tuple(replace(p, residual=p.residual + push * p.jacobian[:, k]) for p in offset.parts)
     free = replace(offset, parts=parts)
-    noise = Doubt({"position": 1.0})
+    noise = StateSpaceNoise({"position": 1.0})
 
     def gained(fitted, held):
-        again = ChosenAgain({(): fitted}, earns)
+        again = ChosenAgain({(): fitted}, improves)
         others = [t for i, t in enumerate(again._trials[()]) if i not in held]
         many = sum(t.readings for t in again._trials[()]) / sum(t.readings for t in others)
         return many * sum(t.cost for t in others) - again._cost((), held)

@@ -8,7 +8,7 @@ from identify.rigs import WHITE, measured
 from models.cases import RIGS, trial
 
 from fes_pin.diagnosis.search.refined_forms import is_identified
-from fes_pin.diagnosis.search.starts import forms_beside, refinements
+from fes_pin.diagnosis.search.starts import number_of_forms, refinements
 from fes_pin.identify.fit import fit_problem
 from fes_pin.identify.problem import Problem
 from fes_pin.models.effects import CoulombFriction, SensorNonlinearity
@@ -55,7 +55,7 @@ def test_a_form_shares_its_level_with_all_that_are_tried(rig, effects, count):
     model = Model(RIGS[rig])
     for one in effects:
         model = model + one
-    assert forms_beside(model, model.effects) == count
+    assert number_of_forms(model, model.effects) == count
 
 
 @pytest.mark.parametrize(("way", "tried"), [(0.0, False), (0.3, True)])

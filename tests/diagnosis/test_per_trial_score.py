@@ -6,7 +6,7 @@ import scipy.stats
 
 from fes_pin.diagnosis.search.library import Probe
 from fes_pin.diagnosis.search.score import score_test
-from fes_pin.infer.levels import PARAMETER_PRICE
+from fes_pin.infer.levels import PARAMETER_PENALTY
 from fes_pin.infer.problem import Linearized
 from fes_pin.infer.projection import Projection
 from fes_pin.models.effects.mains_hum import MainsHum
@@ -48,7 +48,7 @@ def test_the_score_is_that_of_least_squares(unknowns):
     base = np.hstack([np.concatenate([p.jacobian for p in parts]), local])
     extra = side_by_side(columns)[:, :-2]  # the last trial feels nothing
     drop = left(base, y) - left(np.hstack([base, extra]), y)
-    assert own.gain == pytest.approx(drop - PARAMETER_PRICE * (extra.shape[1] - 2), rel=1e-9)
+    assert own.gain == pytest.approx(drop - PARAMETER_PENALTY * (extra.shape[1] - 2), rel=1e-9)
 
 
 def test_under_the_null_it_is_chi_square():
@@ -59,9 +59,9 @@ def test_under_the_null_it_is_chi_square():
     for _ in range(500):
         noisy = [Linearized(rng.standard_normal(ROWS), p.jacobian, p.local) for p in parts]
         gains.append(score_test(noisy, [Probe(MainsHum.absent(), columns)]).scored[1].gain)
-    chi2 = np.array(gains) + PARAMETER_PRICE * (degrees - 2)
+    chi2 = np.array(gains) + PARAMETER_PENALTY * (degrees - 2)
     assert scipy.stats.kstest(chi2, "chi2", args=(degrees,)).pvalue > 1e-3
-    assert np.mean(np.array(gains) > PARAMETER_PRICE * 2) < 0.02
+    assert np.mean(np.array(gains) > PARAMETER_PENALTY * 2) < 0.02
 
 
 def test_an_unknown_that_no_trial_feels_takes_nothing():

@@ -10,10 +10,10 @@ from driven_rigs.arm import CAUSES, draw_arm
 from fes_pin.data.study import read_study
 from fes_pin.diagnosis.diagnosis import diagnose_joint
 from fes_pin.diagnosis.errors_ahead import Ahead, errors_ahead
-from fes_pin.diagnosis.estimators import beside_what_is_new
+from fes_pin.diagnosis.estimators import found_with_white_process_noise
 from fes_pin.diagnosis.search.likelihood_maxima import LikelihoodMaxima
 from fes_pin.diagnosis.verdict import Judged, _predicting_better
-from fes_pin.identify.likelihood_fit import beside_fresh_efforts
+from fes_pin.identify.likelihood_fit import with_white_process_noise
 from fes_pin.identify.process_noise import first_guess, without_memory
 from fes_pin.infer.levels import CONFIDENCE_95
 from fes_pin.infer.result import Remainder
@@ -21,7 +21,7 @@ from fes_pin.infer.scatter import as_wide_as_estimates_differ, with_honest_inter
 from fes_pin.models.effects.coulomb_friction import CoulombFriction
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
-from fes_pin.models.predictor import Doubt
+from fes_pin.models.predictor import StateSpaceNoise
 
 SEEDS = range(8)
 SECONDS = 20.0
@@ -40,7 +40,7 @@ def fitted(tmp_path_factory):
         trials = [t.first(round(SECONDS / t.dt)) for t in study.trials]
         model = Model(nominal_model(study).rig) + CoulombFriction(torque_nm=3.0, softness=1.0, stretch=2e-4)
         likeliest = LikelihoodMaxima(trials).from_start(model, first_guess(model, trials))
-        out.append((drawn.truth, likeliest, beside_fresh_efforts(likeliest)))
+        out.append((drawn.truth, likeliest, with_white_process_noise(likeliest)))
     return out
 
 
@@ -66,12 +66,12 @@ def test_it_foretells_more(fitted):
 
 def test_what_is_new_in_every_sample_has_the_same_power_and_stays_so(fitted):
     _, likeliest, new = fitted[0]
-    doubt, step = likeliest.noise, likeliest.trials[0].dt
-    begun = without_memory(doubt, likeliest.trials)
-    assert begun.std["effort"] ** 2 * step == pytest.approx(doubt.std["effort"] ** 2 * doubt.time["effort"])
+    noise, step = likeliest.noise, likeliest.trials[0].dt
+    begun = without_memory(noise, likeliest.trials)
+    assert begun.std["effort"] ** 2 * step == pytest.approx(noise.std["effort"] ** 2 * noise.time["effort"])
     assert new.noise.time == {"effort": step}
     assert new.noise.timed == ("effort",)
-    apart = Doubt(doubt.white, doubt.std, doubt.time, lasts_s=8.0 * step)
+    apart = StateSpaceNoise(noise.white, noise.std, noise.time, correlation_s=8.0 * step)
     assert without_memory(apart, likeliest.trials).time == {"effort": 8.0 * step}
 
 
@@ -106,7 +106,7 @@ def test_what_errs_less_over_the_horizon_is_taken_and_what_is_left_by_either_sta
 def test_a_search_that_has_no_time_left_is_not_judged_again(left, fitted):
     _, likeliest, _ = fitted[2]
     search = SimpleNamespace(models=SimpleNamespace(answered=True), **left)
-    assert beside_what_is_new(search, SimpleNamespace(best=likeliest)) is None
+    assert found_with_white_process_noise(search, SimpleNamespace(best=likeliest)) is None
 
 
 def test_intervals_hold_the_other_estimate_where_chance_does_not_set_both_apart(fitted):

@@ -8,7 +8,7 @@ from fes_pin.data.counts import count_of
 from fes_pin.data.study import read_study
 from fes_pin.diagnosis.diagnosis import diagnose_joint
 from fes_pin.diagnosis.search.likelihood_models import LikelihoodModels, LikelihoodSearch
-from fes_pin.identify.lasting import words_of_reading
+from fes_pin.identify.correlation_time import words_of_reading
 from fes_pin.models import predictor
 from fes_pin.models.effects import Cogging, CoulombFriction
 from fes_pin.models.nominal import nominal_model

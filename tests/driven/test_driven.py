@@ -8,7 +8,7 @@ from driven_rigs.draw import BASES, draw
 
 from fes_pin.data.study import read_study
 from fes_pin.diagnosis.diagnosis import diagnose_joint
-from fes_pin.diagnosis.refused import UNMOVED
+from fes_pin.diagnosis.rejected import UNMOVED
 
 
 def found_in(causes, seed, folder, size=0.3):

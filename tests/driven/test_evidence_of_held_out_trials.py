@@ -12,10 +12,10 @@ from scipy.signal import lfilter
 from fes_pin.data.study import read_study
 from fes_pin.diagnosis.diagnosis import diagnose_joint
 from fes_pin.diagnosis.errors_ahead import RandomPart
-from fes_pin.diagnosis.refused import with_refused_causes
+from fes_pin.diagnosis.rejected import with_rejected_causes
 from fes_pin.diagnosis.verdict import RigVerdict, RigWeighed
 from fes_pin.infer.result import Evidence, Gain, Remainder
-from fes_pin.infer.verdict import Refused, State
+from fes_pin.infer.verdict import Rejected, State
 
 NOTHING = Remainder(False, 0.5, None)
 LITTLE = (RandomPart("effort", 0.1, 0.1, 0.01),)
@@ -37,14 +37,14 @@ def unsupported(evidence, low, random):
     ids=["certain", "another's error of form", "not certain", "nothing over the horizon"],
 )
 def test_a_refused_cause_is_something_where_it_is_certain_and_no_error_of_form(p_value, share, percent, unexplained):
-    refused = Refused(p_value, share, Gain(percent, percent, percent))
-    left = with_refused_causes(NOTHING, LITTLE, {"sensor_lag": refused}, {"sensor_lag": "sensor"})
+    refused = Rejected(p_value, share, Gain(percent, percent, percent))
+    left = with_rejected_causes(NOTHING, LITTLE, {"sensor_lag": refused}, {"sensor_lag": "sensor"})
     assert left.unexplained == unexplained
     assert left.where == ("sensor" if unexplained else None)
 
 
 def test_a_large_random_effort_is_something_whatever_was_refused():
-    left = with_refused_causes(NOTHING, (RandomPart("effort", 1.0, 0.1, 0.4),), {}, {})
+    left = with_rejected_causes(NOTHING, (RandomPart("effort", 1.0, 0.1, 0.4),), {}, {})
     assert left.unexplained and left.where == "effort"
 
 

@@ -20,7 +20,7 @@ def test_friction_that_grew_with_the_load_is_plain_beside_another_damping(tmp_pa
     problem = LikelihoodProblem(model, study.trials, sets.fits[()].noise)
     sets.fits[PAIR] = stood = maximise(problem, model.parameters())
     simpler = sets.forms.simplified(sets.fits[PAIR])
-    assert simpler.price < stood.price - 100.0
+    assert simpler.criterion < stood.criterion - 100.0
     assert simpler.values["coulomb_friction.load_exponent"] == 0.0
     sets.fits[PAIR] = simpler
     assert sets.forms.simplified(sets.fits[PAIR]) is None
@@ -36,7 +36,7 @@ def test_forms_that_bent_one_to_the_other_are_begun_anew(tmp_path):
     problem = LikelihoodProblem(model, study.trials, sets.fits[()].noise)
     sets.fits[names] = bent = maximise(problem, model.parameters())
     anew = sets.forms.reformed(sets.fits[names])
-    assert anew.price < bent.price - 50.0
+    assert anew.criterion < bent.criterion - 50.0
     damping = drawn.truth["damping"]
     assert abs(anew.values["damping"] - damping) < 0.3 * abs(bent.values["damping"] - damping)
 
@@ -49,11 +49,11 @@ def test_a_form_that_led_nowhere_is_grown_again_without_what_it_began_with(tmp_p
     friction = CoulombFriction(0.0269, stiction=0.962, stribeck_speed=0.3787, creep_speed=0.0008)
     nominal = sets.nominal()
     led = nominal.model.with_parameters({"inertia_scale": 1.0071, "damping": 0.0879, "gravity_scale": 0.9945})
-    doubt = nominal.noise.with_values({"white.position": 2.9e-4, "std.effort": 1.9e-3, "time.effort": 0.084})
+    noise = nominal.noise.with_values({"white.position": 2.9e-4, "std.effort": 1.9e-3, "time.effort": 0.084})
     model = led + friction + QuadraticDamping(0.3269)
-    stuck = maximise(LikelihoodProblem(model, study.trials, doubt), model.parameters())
+    stuck = maximise(LikelihoodProblem(model, study.trials, noise), model.parameters())
     assert stuck.values["coulomb_friction.stiction"] > 0.5
     found, damping = sets.forms.otherwise(stuck), drawn.truth["damping"]
-    assert found.price < stuck.price - 100.0
+    assert found.criterion < stuck.criterion - 100.0
     assert abs(found.values["damping"] - damping) < 0.2 * abs(stuck.values["damping"] - damping)
     assert found.values["coulomb_friction.torque_nm"] == pytest.approx(drawn.truth["coulomb_friction"], rel=0.1)

@@ -14,7 +14,7 @@ from fes_pin.data.study import read_study
 from fes_pin.data.trial import Trial, trial_csv
 from fes_pin.diagnosis.diagnosis import diagnose_joint
 from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
-from fes_pin.identify.ahead import foretell
+from fes_pin.identify.ahead import predict_ahead
 from fes_pin.identify.effort_timing import lateness_of
 from fes_pin.identify.likelihood_fit import maximum_from
 from fes_pin.identify.stored import load_log, log_table
@@ -61,7 +61,7 @@ def check_that_a_prediction_knows(diagnosis, trial, folder):
     table = read_csv(folder / "out.csv")
     found = table.columns["position"]
     near, far = (
-        foretell(diagnosis.model, t, diagnosis.extended.noise, 0.1)["position"]
+        predict_ahead(diagnosis.model, t, diagnosis.extended.noise, 0.1)["position"]
         for t in (diagnosis.log.applied(trial), trial)
     )
     assert np.allclose(found, near, atol=1e-5)

@@ -7,7 +7,7 @@ import pytest
 from identify.test_likelihood import TRUE, believed, held
 
 from fes_pin.diagnosis.errors_ahead import errors_ahead, noise_that_is_small, random_parts, squared_errors
-from fes_pin.diagnosis.refused import is_moved_by_what_is_recorded
+from fes_pin.diagnosis.rejected import is_moved_by_what_is_recorded
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import maximise
 from fes_pin.identify.process_noise import first_guess

@@ -33,8 +33,8 @@ def test_another_unit_is_no_gain(tmp_path):
     sets.extend(())
     gain = sets.fits[GAIN]
     assert gain.model.effects[0].error == -0.5 and not sets.is_possible(gain)
-    assert nominal.price - gain.price > 30.0
-    assert gain.price < sets.fits[FRICTION].price
+    assert nominal.criterion - gain.criterion > 30.0
+    assert gain.criterion < sets.fits[FRICTION].criterion
     assert sets.ranked(1) == [FRICTION, GAIN]
 
 

@@ -10,11 +10,11 @@ from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import fit_of
 from fes_pin.infer.optimum import minimise
 from fes_pin.models.nominal import nominal_model
-from fes_pin.models.predictor import Doubt
+from fes_pin.models.predictor import StateSpaceNoise
 
 END = {"inertia_scale": 1.0014, "damping": 0.018945, "gravity_scale": 1.0007, "backlash.half_width": 0.0064904}
 """Where a fit ended on one computer, 6e-5 rad beside what is hidden; on another it ends elsewhere."""
-THERE = Doubt({"position": 3.0424e-4}, {"effort": 3.9652e-3}, {"effort": 0.023385})
+THERE = StateSpaceNoise({"position": 3.0424e-4}, {"effort": 3.9652e-3}, {"effort": 0.023385})
 BESIDE = (0.99, 1.0, 1.01)
 """Random efforts about that: the likelihood jumps by some 500 between them, and a fit ends where it is high."""
 
@@ -31,8 +31,8 @@ class Promised(lack_of_fit._Featured):
 def beside_a_play(tmp_path_factory):
     """A rig of `scripts/accuracy recorded --seed 1118000`, at `END`: no step is taken from there."""
     study = read_study(draw(("backlash",), 0.3, 1118025, tmp_path_factory.mktemp("play"), recorded=True).study)
-    doubts = [THERE.with_values({"std.effort": k * THERE.std["effort"]}) for k in BESIDE]
-    problems = [LikelihoodProblem(nominal_model(study) + LinearPlay(), study.trials, doubt) for doubt in doubts]
+    noises = [THERE.with_values({"std.effort": k * THERE.std["effort"]}) for k in BESIDE]
+    problems = [LikelihoodProblem(nominal_model(study) + LinearPlay(), study.trials, noise) for noise in noises]
     fits = [fit_of(p, minimise(p, END, max_iterations=0)) for p in problems]
     return min(fits, key=lambda fitted: fitted.sse)
 

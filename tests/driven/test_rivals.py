@@ -26,7 +26,7 @@ def test_a_set_is_fitted_again_beside_a_cause_whose_form_has_changed():
     assert form and not first.model.effects[0].refined()
     sets.extend(FRICTION)
     assert sets.fits[BOTH].model.effects[0].refined() == form
-    assert sets.fits[BOTH].price < first.price - 10.0
+    assert sets.fits[BOTH].criterion < first.criterion - 10.0
 
 
 def test_a_spring_that_gravity_and_a_constant_torque_stand_for_is_among_their_rivals(tmp_path):

@@ -11,7 +11,7 @@ from fes_pin.diagnosis.held_out import as_random_as_in_all, folds_of
 from fes_pin.diagnosis.search.likelihood_models import LikelihoodModels, LikelihoodSearch
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import maximise
-from fes_pin.infer.levels import PARAMETER_PRICE
+from fes_pin.infer.levels import PARAMETER_PENALTY
 from fes_pin.infer.scatter import with_honest_intervals
 from fes_pin.models.effects import CoulombFriction, PeriodicTorque
 from fes_pin.models.nominal import nominal_model
@@ -75,4 +75,4 @@ def test_folds_take_the_end_of_what_moved_together_for_an_end(tmp_path):
         others = as_random_as_in_all(fitted, [t for i, t in enumerate(fitted.trials) if i not in held])
         many = every / sum(len(p.residual) for p in others.parts)
         cost = ChosenAgain({(): fitted}, lambda *_: True)._cost((), held)
-        assert cost == pytest.approx(many * others.sse, abs=PARAMETER_PRICE)
+        assert cost == pytest.approx(many * others.sse, abs=PARAMETER_PENALTY)

@@ -51,7 +51,7 @@ def test_what_is_added_is_the_determinant_of_both_equations(tmp_path):
     )
     found = LikelihoodFits(nominal_model(study), study.trials, []).nominal()
     known = found.model.with_parameters({"inertia_scale": 1.0, "damping": DAMPING})
-    fitted = replace(found, model=known, parameters=known.parameters(), noise=replace(found.noise, lasts_s=0.0))
+    fitted = replace(found, model=known, parameters=known.parameters(), noise=replace(found.noise, correlation_s=0.0))
     for rows in (0.2, 0.4):
         felt = rows * DT**2 / (2.0 * MASS) * (-STIFFNESS - BRAKE / DT)
         expected = -2.0 * len(study.trials[0]) * np.log(1.0 - felt)

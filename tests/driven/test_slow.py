@@ -11,11 +11,11 @@ SHORT, LONG = 0.3, 1.16
 
 
 @pytest.mark.parametrize(
-    ("short", "long", "lasts_s", "ahead_s"),
+    ("short", "long", "correlation_s", "ahead_s"),
     [(-1.0, 17.0, LONG, LONG), (-1.0, 17.0, 0.2, None), (-1.0, -2.0, LONG, None), (5.0, 17.0, LONG, None)],
     ids=["a spring", "a random effort as short as the horizon", "nothing at either", "at once"],
 )
-def test_a_cause_may_show_as_far_ahead_as_what_stands_for_it_lasts(short, long, lasts_s, ahead_s, monkeypatch):
+def test_a_cause_may_show_as_far_ahead_as_what_stands_for_it_lasts(short, long, correlation_s, ahead_s, monkeypatch):
     """Without a spring 0.3 s of a slow slide were foretold as well as with it, and it had been refused."""
 
     def gains_over(_folds, names, horizon_s, _seed):
@@ -23,7 +23,7 @@ def test_a_cause_may_show_as_far_ahead_as_what_stands_for_it_lasts(short, long, 
         return dict.fromkeys(names, Gain(low + 1.0, low, low + 2.0))
 
     monkeypatch.setattr(held_out, "_gains_over", gains_over)
-    without = SimpleNamespace(noise=SimpleNamespace(time={"effort": lasts_s}))
+    without = SimpleNamespace(noise=SimpleNamespace(time={"effort": correlation_s}))
     found = SimpleNamespace(without={"parallel_stiffness": without})
     folds = [SimpleNamespace(test=[SimpleNamespace(duration=11.0)])]
     gain = held_out.gains_of(folds, found.without, SHORT, seed=0)["parallel_stiffness"]

@@ -50,24 +50,24 @@ def test_intervals_hold_the_truth_where_an_effort_acts_after_its_row_has_begun(t
     """An eighth of a row, which no log says, moves mass and damping by several deviations."""
     fits = [fitted_slide(seed, tmp_path) for seed in range(6)]
     truth = {"inertia_scale": 1.0, "damping": DAMPING}
-    plain, doubtful = (
+    plain, timed = (
         [[(f.values[n] - truth[n]) / f.std(n) for n in truth] for f in some]
         for some in ([with_honest_intervals(f) for f in fits], [with_timing_of_readings(f, DT) for f in fits])
     )
     assert np.sqrt(np.mean(np.square(plain), axis=0)).max() > 2.5, plain
-    assert np.sqrt(np.mean(np.square(doubtful), axis=0)).max() < 1.5, doubtful
-    assert np.abs(doubtful).max() < 3.0, doubtful
+    assert np.sqrt(np.mean(np.square(timed), axis=0)).max() < 1.5, timed
+    assert np.abs(timed).max() < 3.0, timed
 
 
 def test_where_time_is_known_nothing_is_doubted(tmp_path):
     study = read_study(draw((), 0.3, 1151005, tmp_path).study)
     fitted = LikelihoodFits(nominal_model(study), study.trials, []).nominal()
-    plain, doubtful, sure = (
+    plain, timed, sure = (
         with_honest_intervals(fitted),
         with_timing_of_readings(fitted, study.trials[0].dt),
         with_timing_of_readings(fitted, 1e-9),
     )
-    ratios = {n: doubtful.std(n) / plain.std(n) for n in fitted.free}
+    ratios = {n: timed.std(n) / plain.std(n) for n in fitted.free}
     assert min(ratios.values()) > 0.999 and max(ratios.values()) > 1.1, ratios
     assert all(sure.std(n) == pytest.approx(plain.std(n), rel=1e-3) for n in fitted.free)
 

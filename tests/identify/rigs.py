@@ -10,7 +10,7 @@ from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.noise import Noise
 from fes_pin.models.model import Model
-from fes_pin.models.predictor import Doubt
+from fes_pin.models.predictor import StateSpaceNoise
 from fes_pin.models.simulate import simulate
 
 SIZE = {"angle_rad": 2e-3, "force_n": 0.2, "position": 2e-3, "velocity": 2e-2}
@@ -68,5 +68,5 @@ def by_scipy(problem, start):
 
 def as_likely(fitted, noise=None):
     """A fit as if the likelihood had judged it, with such noise; by default with the white noise that it has."""
-    noise = noise or Doubt({n: one.std for n, one in fitted.noise.items()})
+    noise = noise or StateSpaceNoise({n: one.std for n, one in fitted.noise.items()})
     return LikelihoodFit(**{f.name: getattr(fitted, f.name) for f in fields(Fit)} | {"noise": noise})

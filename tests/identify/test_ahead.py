@@ -44,9 +44,9 @@ def test_white_noise_foretells_nothing():
 def test_noise_that_is_known_at_a_longer_step_foretells_by_it():
     """Averages of three samples are foretold from averages that were over before."""
     e = np.repeat(noise(300), 3)
-    foretold = forecast(np.append(e, 0.5), Noise(1.0, AR, 1.0, 3 * DT), DT, 0.0)
-    assert foretold[:-1:3] == pytest.approx(forecast(noise(300), Noise(1.0, AR), 3 * DT, 0.0))
-    assert len(foretold) == 901
+    predicted = forecast(np.append(e, 0.5), Noise(1.0, AR, 1.0, 3 * DT), DT, 0.0)
+    assert predicted[:-1:3] == pytest.approx(forecast(noise(300), Noise(1.0, AR), 3 * DT, 0.0))
+    assert len(predicted) == 901
 
 
 def test_a_trial_shorter_than_a_step_is_foretold_by_nothing():

@@ -38,8 +38,8 @@ def test_a_filter_beside_nothing_random_leaves_what_free_simulation_leaves(study
     """Both take the same noise out; simulation drops as many samples of each trial as the noise has coefficients."""
     model, trials = nominal_model(study), moved(study)
     guess = stilled(model, trials, first_guess(model, trials))
-    doubt = replace(guess, white={"angle_rad": STD}, ar={"angle_rad": AR})
-    problem = LikelihoodProblem(model, trials, doubt)
+    noise = replace(guess, white={"angle_rad": STD}, ar={"angle_rad": AR})
+    problem = LikelihoodProblem(model, trials, noise)
     assert not set(problem.noise_parameters) & {"std.effort", "time.effort"}
     freely = Problem(model, trials, {"angle_rad": Noise(STD, AR, STD)}, problem.free)
     values, unknowns = model.parameters(), problem.start_unknowns()
@@ -84,11 +84,11 @@ def test_noise_of_much_power_at_low_frequencies_is_white_beside_what_is_found(st
 
 def test_what_noise_foretells_of_itself_is_stored_and_read_back(study, tmp_path):
     model, trials = nominal_model(study), moved(study)
-    doubt = replace(first_guess(model, trials), ar={"angle_rad": AR})
-    fitted = SimpleNamespace(model=model, noise=doubt)
+    noise = replace(first_guess(model, trials), ar={"angle_rad": AR})
+    fitted = SimpleNamespace(model=model, noise=noise)
     path = tmp_path / "model.toml"
     path.write_text(model_toml(model, stored_tables(fitted, Log())), encoding="utf-8")
-    assert load_random(path) == doubt
+    assert load_random(path) == noise
     path.write_text(path.read_text(encoding="utf-8").replace("    1.1,", '    "much",'), encoding="utf-8")
     with pytest.raises(InputError, match=r"random\.ar\.angle_rad.*expected a list of numbers"):
         load_random(path)

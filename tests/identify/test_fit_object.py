@@ -14,7 +14,7 @@ from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import fit
 from fes_pin.models.effects import CoulombFriction, SensorOffset
 from fes_pin.models.model import Model
-from fes_pin.models.predictor import Doubt
+from fes_pin.models.predictor import StateSpaceNoise
 
 RISE, RISE_AT_A_BOUND = 3.8414588, 2.7055435
 COPIES = [lambda x: x, copy.copy, copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x))]
@@ -219,7 +219,7 @@ def test_a_fit_is_saved_and_loaded(at_its_bound, plain, tmp_path):
 
 def test_a_fit_has_its_noise_and_its_old_name_says_that_it_ends(at_its_bound):
     """Of a fit by the likelihood: the process noise, and by column the noise of a reading."""
-    noise = Doubt({"position": 0.2}, {"effort": 1.0}, {"effort": 0.1}, ar={"position": (0.5,)})
+    noise = StateSpaceNoise({"position": 0.2}, {"effort": 1.0}, {"effort": 0.1}, ar={"position": (0.5,)})
     likely = as_likely(at_its_bound, noise)
     assert likely.noise is noise and likely.noise["position"].innovation_std == 0.2
     assert likely.noise["position"].std == pytest.approx(0.2 / 0.75**0.5)

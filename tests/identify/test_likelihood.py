@@ -169,7 +169,7 @@ def test_a_horizon_uses_all_that_is_older():
         older = masked(trial, ["position"], [range(last + 1, len(trial))])
         alone = LikelihoodProblem(found.model, [older], found.noise, ())
         rows = slice(last + 25, last + 31)
-        told = alone.foretold(found.model.parameters())[0]["position"].values[rows]
+        told = alone.predicted(found.model.parameters())[0]["position"].values[rows]
         assert np.abs(shared[rows] - told).max() < 1e-4 * np.ptp(trial["position"])
 
 
@@ -191,12 +191,12 @@ def test_another_scale_of_the_reading_is_another_inertia_and_nothing_more(error)
     trials = [held(k, 0.06, weight=0.0) for k in range(3)]
     slide = Joint(constants={"inertia": TRUE["inertia"], "gravity_cos": 0.0, "gravity_sin": 0.0, "revolute": 0.0})
     plain, scaled = Model(slide), Model(slide) + SensorGain(place=2.0)
-    doubt, own = first_guess(plain, trials), 1.0 + error
+    noise, own = first_guess(plain, trials), 1.0 + error
     values = {**plain.parameters(), "inertia_scale": 1.3, "damping": 0.03}
     same = {**scaled.parameters(), "sensor_gain.error": error, "inertia_scale": 1.3 * own, "damping": 0.03 * own}
     costs = []
     for model, at, begin in ((plain, values, 1.0), (scaled, same, own)):
-        problem = LikelihoodProblem(model, trials, doubt)
+        problem = LikelihoodProblem(model, trials, noise)
         problem.begins = [{n: v / begin for n, v in b.items()} for b in problem.begins]
         costs.append(problem.cost(at, problem.start_unknowns()))
     assert costs[0] == pytest.approx(costs[1], abs=1e-3)

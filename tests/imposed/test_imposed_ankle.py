@@ -100,8 +100,8 @@ def test_a_hidden_cause_is_named_and_predicted(tmp_path, cause):
     save_model(found.model, tmp_path / "model.toml")
     write_trial(study.trials[1].without("torque_nm"), tmp_path / "one.csv")
     again = read_trial(tmp_path / "one.csv", rig="ankle", kind="imposed", inputs_only=True)
-    foretold = predict(load_model(tmp_path / "model.toml"), again)["torque_nm"]
-    assert np.abs(foretold - simulate(found.model, study.trials[1])["torque_nm"]).max() < 1e-9
+    predicted = predict(load_model(tmp_path / "model.toml"), again)["torque_nm"]
+    assert np.abs(predicted - simulate(found.model, study.trials[1])["torque_nm"]).max() < 1e-9
 
 
 @pytest.mark.parametrize("seed", [7, 8])

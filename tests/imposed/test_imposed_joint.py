@@ -64,8 +64,8 @@ def test_a_scale_of_the_effort_has_the_slope_of_its_cost(tmp_path, effect):
     made, model = arm(tmp_path, coulomb_friction=0.3)
     trials, path = made.trials[:2], f"{effect.name}.error"
     guess = first_guess(model, trials)
-    doubt = replace(guess, std={n: 300.0 * v for n, v in guess.std.items()})
-    problem = LikelihoodProblem(model + effect, trials, doubt)
+    noise = replace(guess, std={n: 300.0 * v for n, v in guess.std.items()})
+    problem = LikelihoodProblem(model + effect, trials, noise)
     values, unknowns = (model + effect).parameters(), problem.start_unknowns()
     parts, at = problem.linearize(values, unknowns), problem.free.index(path)
     deviation = sum(float(p.jacobian[:, at] @ p.jacobian[:, at]) for p in parts) ** -0.5
@@ -92,7 +92,7 @@ def test_the_ends_of_an_imposed_motion_are_not_judged(seed, tmp_path):
     noise = 1e-3 * np.random.default_rng(seed).standard_normal(len(trial))
     trial = trial.with_columns(position=trial["position"] + noise)
     judged, found = model.rig.follows(trial), imposed_motion(trial, COLUMNS)
-    wrong = (found.values[2] - motion.at(trial.time, 2)) / found.doubt[2]
+    wrong = (found.values[2] - motion.at(trial.time, 2)) / found.std[2]
     within, ends = (np.sqrt(np.mean(wrong[rows] ** 2)) for rows in (judged, ~judged))
     assert 0.8 < np.mean(judged) < 1.0
     assert within < 2.5 and ends > 3.0 * within
@@ -132,8 +132,8 @@ def test_a_hidden_cause_is_named_and_predicted(tmp_path, cause):
     inputs = study.trials[0].without("effort")
     write_trial(inputs, tmp_path / "one.csv")
     again = read_trial(tmp_path / "one.csv", rig="joint", kind="imposed", inputs_only=True)
-    foretold = predict(load_model(tmp_path / "model.toml"), again)["effort"]
-    assert np.abs(foretold - simulate(found.model, study.trials[0])["effort"]).max() < 1e-9
+    predicted = predict(load_model(tmp_path / "model.toml"), again)["effort"]
+    assert np.abs(predicted - simulate(found.model, study.trials[0])["effort"]).max() < 1e-9
 
 
 def test_nothing_hidden_is_adequate(tmp_path, monkeypatch):

@@ -111,7 +111,7 @@ class Regression(FittedSets[Optimum, None]):
         return self.family.adjusted(min((float(chi2_tail(s, 1)) for s in scores), default=1.0))
 
     def predicts_better(self, larger: Optimum, smaller: Optimum) -> bool:
-        return larger.price < smaller.price
+        return larger.criterion < smaller.criterion
 
     def leaves_noise(self, fitted: Optimum) -> bool:
         """The test of lack of fit against pure error: repeats share their columns (Draper and Smith 1998, 2.1)."""
@@ -145,4 +145,4 @@ class RegressionVerdict(Verdict[Optimum, Regression, Weighed]):
 
 def equivalents(best: Optimum, rivals: list[Optimum], fits: dict[Names, Optimum]) -> list[Names]:
     """Sets that a difference of `SEPARABLE` in price does not tell from the best."""
-    return [n for n, f in fits.items() if any(f is r for r in rivals) and f.price < best.price + SEPARABLE]
+    return [n for n, f in fits.items() if any(f is r for r in rivals) and f.criterion < best.criterion + SEPARABLE]

@@ -12,8 +12,8 @@ LONG, DRAWS = 25, 1000
 """Samples of a piece, and studies."""
 
 
-def fit(read, foretold):
-    left = read - foretold
+def fit(read, predicted):
+    left = read - predicted
     return SimpleNamespace(parts=[SimpleNamespace(residual=part) for part in np.array_split(left, 2)], sse=left @ left)
 
 

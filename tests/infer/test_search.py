@@ -9,7 +9,7 @@ import pytest
 from fes_pin.infer.search import Search
 from fes_pin.workers import check_limit, time_limit
 
-PRICE = {
+COST = {
     (): 0.0,
     ("lag",): -100.0,
     ("tendon",): -1.0,
@@ -36,8 +36,8 @@ class Models:
         return self
 
     def fit(self, names):
-        sse = PRICE[names]
-        return SimpleNamespace(names=names, sse=sse, price=sse + 5.0 * len(names), degrees=len(names))
+        sse = COST[names]
+        return SimpleNamespace(names=names, sse=sse, criterion=sse + 5.0 * len(names), degrees=len(names))
 
     def nominal(self):
         return self.fits[()]
@@ -61,7 +61,7 @@ class Models:
         return self.fits.setdefault(rest, self.fit(rest))
 
     def ranked(self, size):
-        return sorted((n for n in self.fits if len(n) == size), key=lambda n: self.fits[n].price)
+        return sorted((n for n in self.fits if len(n) == size), key=lambda n: self.fits[n].criterion)
 
     def is_possible(self, fitted):
         return True
@@ -107,7 +107,9 @@ def test_an_answer_has_the_lowest_price_of_its_size(search):
         for names in itertools.combinations(("lag", "tendon", "velocity"), size):
             search.models.fits.setdefault(names, search.models.fit(names))
             best = search.settle(names).best
-            assert best.price == min(f.price for n, f in search.models.fits.items() if len(n) == len(best.names))
+            assert best.criterion == min(
+                f.criterion for n, f in search.models.fits.items() if len(n) == len(best.names)
+            )
 
 
 def test_a_set_of_lower_price_with_a_candidate_that_is_not_significant_is_no_answer(search, monkeypatch):
@@ -115,7 +117,7 @@ def test_a_set_of_lower_price_with_a_candidate_that_is_not_significant_is_no_ans
     cheapest = ("tendon", "velocity")
     monkeypatch.setattr(search.models, "p_value", lambda more, less, gain=None: 0.5 if more.names == cheapest else 1e-6)
     found = search.settle(("lag", "velocity"))
-    assert search.models.fits[cheapest].price < found.best.price
+    assert search.models.fits[cheapest].criterion < found.best.criterion
     assert found.best.names == ("lag", "velocity")
     assert cheapest not in search.possible()
     assert ("lag", "velocity") in search.possible()

@@ -13,7 +13,7 @@ from fes_pin.diagnosis.search.likelihood_maxima import LikelihoodMaxima
 from fes_pin.identify.problem import measured_columns
 from fes_pin.models.effects.coulomb_friction import CoulombFriction
 from fes_pin.models.model import Model
-from fes_pin.models.predictor import Doubt
+from fes_pin.models.predictor import StateSpaceNoise
 from fes_pin.models.rigs import Joint
 from fes_pin.models.simulate import simulate
 from fes_pin.models.stage import Signals
@@ -72,7 +72,7 @@ def test_the_load_is_told_from_swings(exponent):
         measured = clean["position"] + 1e-3 * rng.standard_normal(len(TIME))
         trials.append(Trial("swing", "motion", {"position": measured}, TIME, clean.conditions))
     maxima = LikelihoodMaxima(trials)
-    base = maxima.from_start(nominal + CoulombFriction(0.8 * TORQUE), Doubt({"position": 1e-3}))
+    base = maxima.from_start(nominal + CoulombFriction(0.8 * TORQUE), StateSpaceNoise({"position": 1e-3}))
     refined = LikelihoodForms(maxima, measured_columns(nominal, trials)).refined(base)
     if exponent:
         assert refined.values["coulomb_friction.load_exponent"] == exponent

@@ -103,6 +103,20 @@ def test_a_cause_is_one_file(tmp_path, monkeypatch):
     assert [n for n in names if n != "joint_creep"] == [e.name for e in EFFECTS]
 
 
+def test_an_effect_with_attributes_of_an_earlier_version_is_read_and_says_so():
+    with pytest.warns(DeprecationWarning) as said:
+
+        class Earlier(Effect):
+            beside = ("force_velocity",)
+            foretold_step_s = 2e-3
+
+    assert Earlier.screened_with == ("force_velocity",) and Earlier.predictor_step_s == 2e-3
+    assert [str(one.message).split(";")[0] for one in said] == [
+        "Effect.beside is Effect.screened_with now",
+        "Effect.foretold_step_s is Effect.predictor_step_s now",
+    ]
+
+
 def test_effects_are_found_by_name_and_rig():
     assert effect_named("fatigue").name == "fatigue"
     with pytest.raises(InputError, match="tiredness: no such effect: unknown; expected one of"):

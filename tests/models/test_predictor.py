@@ -9,7 +9,7 @@ from fes_pin.data.trial import Trial, derived_trial
 from fes_pin.models import predictor
 from fes_pin.models.effects import CoulombFriction, effect_named
 from fes_pin.models.model import Model
-from fes_pin.models.predictor import Doubt, Predictor, repeated
+from fes_pin.models.predictor import Predictor, StateSpaceNoise, repeated
 from fes_pin.models.rigs import Joint
 from fes_pin.models.simulate import Simulator
 
@@ -21,7 +21,7 @@ SLIDE = Joint(
 )
 PENDULUM = Joint(constants={"inertia": 0.05, "gravity_cos": 0.1, "gravity_sin": 1.0, "revolute": 1.0}, damping=0.05)
 PRIOR = {"initial_position": 0.5, "initial_velocity": 2.0}
-DOUBT = Doubt({"position": 2e-3}, {"effort": 0.8}, {"effort": 0.12})
+NOISE = StateSpaceNoise({"position": 2e-3}, {"effort": 0.8}, {"effort": 0.12})
 
 
 def with_gaps(trial, position):
@@ -37,21 +37,21 @@ def driven(seed: int, n: int = 400, size: float = 1.0) -> Trial:
     return Trial(f"t{seed}", "motion", {"effort": effort, "position": position}, time)
 
 
-def exact(trial: Trial, doubt: Doubt) -> tuple[np.ndarray, np.ndarray]:
+def exact(trial: Trial, noise: StateSpaceNoise) -> tuple[np.ndarray, np.ndarray]:
     """Innovations and variances of the slide by matrix exponentials (Van Loan) and the textbook's filter."""
-    tau, std = doubt.time["effort"], doubt.std["effort"]
+    tau, std = noise.time["effort"], noise.std["effort"]
     a = np.array([[0.0, 1.0, 0.0], [0.0, -DAMPING / MASS, 1.0 / MASS], [0.0, 0.0, -1.0 / tau]])
     b = np.array([[0.0], [1.0 / MASS], [0.0]])
     whole = scipy.linalg.expm(DT * np.block([[a, b], [np.zeros((1, 4))]]))
     phi, gamma = whole[:3, :3], whole[:3, 3]
     spread = np.diag([0.0, 0.0, 2.0 * std**2 / tau])
     loan = scipy.linalg.expm(DT * np.block([[-a, spread], [np.zeros((3, 3)), a.T]]))
-    noise = loan[3:, 3:].T @ loan[:3, 3:]
+    driven = loan[3:, 3:].T @ loan[:3, 3:]
     x = np.array([trial["position"][0], 0.3, 0.0])
     p = np.diag([PRIOR["initial_position"] ** 2, PRIOR["initial_velocity"] ** 2, std**2])
     out, variances = [], []
     for u, y, count in zip(trial["effort"], trial["position"], repeated(trial["position"]), strict=True):
-        variance = p[0, 0] + count * doubt.white["position"] ** 2
+        variance = p[0, 0] + count * noise.white["position"] ** 2
         out.append(y - x[0] if np.isfinite(y) else 0.0)
         variances.append(variance)
         if np.isfinite(y):
@@ -59,21 +59,21 @@ def exact(trial: Trial, doubt: Doubt) -> tuple[np.ndarray, np.ndarray]:
             x = x + gain * out[-1]
             p = p - np.outer(gain, p[0])
         x = phi @ x + gamma * u
-        p = phi @ p @ phi.T + noise
+        p = phi @ p @ phi.T + driven
     return np.array(out), np.array(variances)
 
 
-def foretold(model, trials, doubt=DOUBT, columns=(), velocity=0.3):
-    predictor = Predictor(model, trials, columns, doubt.processes, [PRIOR] * len(trials))
+def predicted(model, trials, noise=NOISE, columns=(), velocity=0.3):
+    predictor = Predictor(model, trials, columns, noise.processes, [PRIOR] * len(trials))
     begin = [{"initial_position": float(t["position"][0]), "initial_velocity": velocity} for t in trials]
-    return predictor.run(model.parameters(), doubt, begin)
+    return predictor.run(model.parameters(), noise, begin)
 
 
 @pytest.mark.parametrize("count", [1, 3, 5])
 def test_on_a_linear_rig_it_is_the_exact_kalman_filter(count):
     trials = [driven(k, 200 + 37 * k) for k in range(count)]
-    for trial, found in zip(trials, foretold(Model(SLIDE), trials), strict=True):
-        innovations, variances = exact(trial, DOUBT)
+    for trial, found in zip(trials, predicted(Model(SLIDE), trials), strict=True):
+        innovations, variances = exact(trial, NOISE)
         assert np.allclose(found.values[:, 0], innovations, rtol=0.0, atol=1e-6)
         assert np.allclose(found.variances[:, 0], variances, rtol=2e-3)
 
@@ -83,8 +83,8 @@ def test_what_was_not_measured_corrects_nothing_and_counts_for_nothing():
     column = np.array(trial["position"])
     column[50:120] = np.nan
     column[200] = np.nan
-    (found,) = foretold(Model(SLIDE), [derived_trial(trial, columns={**trial.columns, "position": column})])
-    innovations, variances = exact(derived_trial(trial, columns={**trial.columns, "position": column}), DOUBT)
+    (found,) = predicted(Model(SLIDE), [derived_trial(trial, columns={**trial.columns, "position": column})])
+    innovations, variances = exact(derived_trial(trial, columns={**trial.columns, "position": column}), NOISE)
     assert np.allclose(found.values[:, 0], innovations, rtol=0.0, atol=1e-6)
     seen = np.isfinite(column)
     cost = np.sum(innovations[seen] ** 2 / variances[seen] + np.log(variances[seen]))
@@ -96,9 +96,9 @@ def test_the_step_of_a_smooth_model_leaves_its_likelihood(name, monkeypatch):
     """Models that are integrated in other steps are compared by their likelihood."""
     trial = driven(3, n=2000)
     model = Model(PENDULUM) + effect_named(name)()
-    (one,) = foretold(model, [trial])
+    (one,) = predicted(model, [trial])
     monkeypatch.setattr(predictor, "max_step", lambda model: DT / 16.0)
-    (finer,) = foretold(model, [trial])
+    (finer,) = predicted(model, [trial])
     assert one.cost() == pytest.approx(finer.cost(), abs=0.05)
 
 
@@ -106,7 +106,7 @@ def test_without_randomness_it_is_the_free_simulation():
     trial, model = driven(1), Model(PENDULUM)
     begin = {"initial_position": float(trial["position"][0]), "initial_velocity": 0.3}
     predictor = Predictor(model, [trial], (), (), [dict.fromkeys(PRIOR, 0.0)])
-    (found,) = predictor.run(model.parameters(), Doubt({"position": 1e-3}), [begin])
+    (found,) = predictor.run(model.parameters(), StateSpaceNoise({"position": 1e-3}), [begin])
     (free,) = Simulator(model, [trial]).run(model.parameters(), [begin])
     assert np.allclose(found.values[:, 0], trial["position"] - free.readings[:, 0], rtol=0.0, atol=1e-12)
 
@@ -117,9 +117,9 @@ def test_machine_code_and_virtual_machine_agree(names, monkeypatch):
     for name in names:
         model = model + effect_named(name)()
     trials, columns = [driven(1, 60), driven(2, 80)], model.fitted_parameters()
-    fast = foretold(model, trials, columns=columns)
+    fast = predicted(model, trials, columns=columns)
     monkeypatch.setenv("FES_PIN_ENGINE", "casadi")
-    slow = foretold(model, trials, columns=columns)
+    slow = predicted(model, trials, columns=columns)
     for one, other in zip(fast, slow, strict=True):
         assert np.allclose(one.values, other.values, rtol=0.0, atol=1e-11)
         assert np.allclose(one.variances, other.variances, rtol=1e-9)
@@ -132,17 +132,17 @@ def test_sensitivities_are_derivatives_where_the_gains_do_not_move():
     model = Model(SLIDE) + effect_named("effort_offset")(offset=0.2) + effect_named("sensor_offset")(offset=0.01)
     columns = ("effort_offset.offset", "sensor_offset.offset")
     trial, values, step = driven(4), model.parameters(), 1e-4
-    (found,) = foretold(model, [trial], columns=columns)
+    (found,) = predicted(model, [trial], columns=columns)
     for k, name in enumerate(columns):
         ends = [model.with_parameters({**values, name: values[name] + s * step}) for s in (1.0, -1.0)]
-        up, down = (foretold(one, [trial])[0].values for one in ends)
+        up, down = (predicted(one, [trial])[0].values for one in ends)
         assert np.allclose(found.sensitivities[:, :, k], (up - down) / (2.0 * step), rtol=0.0, atol=1e-7)
 
 
 def test_lags_shorter_than_a_step_do_not_blow_up():
     model = Model(PENDULUM) + effect_named("sensor_lag")(lag_s=0.0)
-    (found,) = foretold(model, [driven(5, 2000)], columns=model.fitted_parameters())
-    (without,) = foretold(Model(PENDULUM), [driven(5, 2000)])
+    (found,) = predicted(model, [driven(5, 2000)], columns=model.fitted_parameters())
+    (without,) = predicted(Model(PENDULUM), [driven(5, 2000)])
     assert np.isfinite(found.sensitivities).all()
     assert found.cost() == pytest.approx(without.cost(), rel=1e-3)
 
@@ -154,8 +154,8 @@ def test_a_count_that_is_read_again_and_again_is_one_reading(monkeypatch):
     trial = driven(4)
     coarse = trial.with_columns(position=np.round(trial["position"] / 0.02) * 0.02)
     assert repeated(coarse["position"]).mean() > 5.0
-    (one,) = foretold(Model(SLIDE), [coarse])
-    innovations, variances = exact(coarse, DOUBT)
+    (one,) = predicted(Model(SLIDE), [coarse])
+    innovations, variances = exact(coarse, NOISE)
     judged = one.seen[:, 0]
     assert judged.sum() > 100
     assert one.values[judged, 0] == pytest.approx(innovations[judged], abs=1e-6)
@@ -172,11 +172,11 @@ def test_numbers_that_are_the_same_by_chance_are_each_a_reading():
 def test_a_rig_that_stands_is_known_no_better_the_longer_it_is_read():
     """Without a random effort a hundred equal readings of a rig at rest leave its place as doubtful as one."""
     still = driven(5, n=100, size=0.0)
-    doubt, white = Doubt({"position": 2e-3}, {"effort": 1e-9}, {"effort": 0.1}), 2e-3**2
+    noise, white = StateSpaceNoise({"position": 2e-3}, {"effort": 1e-9}, {"effort": 0.1}), 2e-3**2
     known = {}
     for name, column in {"same": np.zeros(100), "noisy": 1e-6 * np.arange(100.0)}.items():
-        (one,) = foretold(
-            Model(SLIDE), [derived_trial(still, columns={**still.columns, "position": column})], doubt, velocity=0.0
+        (one,) = predicted(
+            Model(SLIDE), [derived_trial(still, columns={**still.columns, "position": column})], noise, velocity=0.0
         )
         known[name] = one.variances[-1, 0] - repeated(column)[-1] * white
     assert known["same"] > 0.5 * white
@@ -186,20 +186,20 @@ def test_a_rig_that_stands_is_known_no_better_the_longer_it_is_read():
 def test_what_hunts_between_two_counts_is_known_no_better_the_longer_it_is_read():
     """A rig that stands near the edge of two counts, four samples of each in turn: one reading, which errs by half."""
     still, n = driven(5, n=200, size=0.0), 200
-    doubt, white = Doubt({"position": 2e-3}, {"effort": 1e-9}, {"effort": 0.1}), 2e-3**2
+    noise, white = StateSpaceNoise({"position": 2e-3}, {"effort": 1e-9}, {"effort": 0.1}), 2e-3**2
     column = np.tile(np.repeat([0.0, 7e-3], 4), n // 8)
     hunting = hunts(column)
-    (one,) = foretold(
-        Model(SLIDE), [derived_trial(still, columns={**still.columns, "position": column})], doubt, velocity=0.0
+    (one,) = predicted(
+        Model(SLIDE), [derived_trial(still, columns={**still.columns, "position": column})], noise, velocity=0.0
     )
     assert hunting.mean() > 0.9 and not one.seen[hunting].any()
     last = np.flatnonzero(hunting)[-1]
     assert one.variances[last, 0] - hunting.sum() * white > 0.5 * white
 
 
-def discrete(doubt: Doubt) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def discrete(noise: StateSpaceNoise) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The slide from sample to sample: transition, what an effort does, a root of the covariance of what is random."""
-    tau, std = doubt.time["effort"], doubt.std["effort"]
+    tau, std = noise.time["effort"], noise.std["effort"]
     a = np.array([[0.0, 1.0, 0.0], [0.0, -DAMPING / MASS, 1.0 / MASS], [0.0, 0.0, -1.0 / tau]])
     whole = scipy.linalg.expm(DT * np.block([[a, np.array([[0.0], [1.0 / MASS], [0.0]])], [np.zeros((1, 4))]]))
     spread = np.diag([0.0, 0.0, 2.0 * std**2 / tau])
@@ -208,7 +208,7 @@ def discrete(doubt: Doubt) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return whole[:3, :3], whole[:3, 3], vectors * np.sqrt(np.maximum(values, 0.0))
 
 
-ROUGH = Doubt({"position": 5e-3}, {"effort": 5.0}, {"effort": 0.05})
+ROUGH = StateSpaceNoise({"position": 5e-3}, {"effort": 5.0}, {"effort": 0.05})
 NEAR = {"initial_position": 0.01, "initial_velocity": 0.1}
 
 
@@ -262,8 +262,8 @@ def test_through_a_play_it_is_near_the_exact_likelihood(seed):
 
 def test_a_play_without_width_is_none():
     trial = driven(6)
-    (one,) = foretold(Model(SLIDE) + effect_named("backlash")(half_width=0.0), [trial])
-    (none,) = foretold(Model(SLIDE), [trial])
+    (one,) = predicted(Model(SLIDE) + effect_named("backlash")(half_width=0.0), [trial])
+    (none,) = predicted(Model(SLIDE), [trial])
     assert one.values == pytest.approx(none.values, abs=1e-9)
     assert one.variances == pytest.approx(none.variances, rel=1e-6)
 
@@ -279,8 +279,8 @@ def flown(stretch: float | None) -> tuple[float, float]:
     trial = with_gaps(Trial("a", "motion", {"effort": np.zeros(len(time)), "position": time}, time), read)
     prior = {"initial_position": 1e-4, "initial_velocity": 0.05}
     begun = [{"initial_position": 0.0, "initial_velocity": 0.03}]
-    doubt = Doubt({"position": 1e-4}, {"effort": 1e-9}, {"effort": 0.1})
-    told = Predictor(model, [trial], (), ("effort",), [prior]).foretell(model.parameters(), doubt, begun)[0]["position"]
+    noise = StateSpaceNoise({"position": 1e-4}, {"effort": 1e-9}, {"effort": 0.1})
+    told = Predictor(model, [trial], (), ("effort",), [prior]).predict(model.parameters(), noise, begun)[0]["position"]
     return float(told.values[-1]), float(np.sqrt(told.variances[-1]))
 
 

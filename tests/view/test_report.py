@@ -24,7 +24,7 @@ from fes_pin.infer.result import STOPPED
 from fes_pin.infer.text import rounded
 from fes_pin.models.describe import equation
 from fes_pin.models.effects import effect_named
-from fes_pin.models.predictor import Doubt
+from fes_pin.models.predictor import StateSpaceNoise
 from fes_pin.view.mathml import equations_mathml
 from fes_pin.view.report import report_html
 from fes_pin.view.report_trials import got_worse
@@ -238,7 +238,7 @@ def diagnosis_of(folder, free):
     """A joint whose effort answers the reading, as if judged so; `free` is its free error."""
     made = diagnosed(joint_study(folder), ("coulomb_friction",))
     white = dict.fromkeys(("position", "velocity"), 1e-3)
-    noise = Doubt(white, {"effort": 1e-3}, {"effort": 0.1})
+    noise = StateSpaceNoise(white, {"effort": 1e-3}, {"effort": 0.1})
     before, after = Ahead(2e-4, 9.5, free, 0.3), Ahead(1e-4, 0.4, free, 0.2)
     return replace(
         made,
@@ -304,7 +304,7 @@ def test_the_page_renders_in_chromium_without_asking_for_anything(tmp_path):
         command = [browser, *flags.split(), *where, page.as_uri()]
         done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False, env=os.environ)
     assert (tmp_path / "shot.png").stat().st_size > 20_000, done.stderr[-500:]
-    assert "Refused to" not in done.stderr
+    assert "Rejected to" not in done.stderr
 
 
 @pytest.mark.parametrize(

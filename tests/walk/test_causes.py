@@ -6,7 +6,7 @@ import pytest
 from fes_pin.data.study import read_study
 from fes_pin.walk.effects import EFFECTS, walk_library
 from fes_pin.walk.recording import recordings_of
-from fes_pin.walk.scene import scene_of
+from fes_pin.walk.walk_trial import walk_trial_of
 
 pytestmark = pytest.mark.shared
 HIDDEN = [  # cause, site as it is hidden, size, more of it, form that must take it away, size of its parameter
@@ -25,12 +25,12 @@ HIDDEN = [  # cause, site as it is hidden, size, more of it, form that must take
 ]
 
 
-def scene(gait, folder, wrong, seed=3):
+def trial(gait, folder, wrong, seed=3):
     from walking_matrix.synthetic import make
 
     make(gait, folder, wrong, seed)
     (recording,) = recordings_of(read_study(folder))[1]
-    return scene_of(recording, recording.cutoff_hz)
+    return walk_trial_of(recording, recording.cutoff_hz)
 
 
 def size(residual):
@@ -42,7 +42,7 @@ def size(residual):
 def clean(gait, tmp_path_factory):
     from walking_matrix.synthetic import Wrong
 
-    return scene(gait, tmp_path_factory.mktemp("clean"), Wrong(tissue=0.0, markers_m=0.0, placed=0.0, strides=2))
+    return trial(gait, tmp_path_factory.mktemp("clean"), Wrong(tissue=0.0, markers_m=0.0, placed=0.0, strides=2))
 
 
 def test_where_nothing_is_wrong_the_two_codes_agree(clean):
@@ -56,7 +56,7 @@ def test_the_columns_of_a_cause_take_it_away(gait, clean, tmp_path, cause, site,
     from walking_matrix.synthetic import Wrong
 
     wrong = Wrong(cause, site, amount, tissue=0.0, markers_m=0.0, placed=0.0, strides=2, extra=extra)
-    hidden = scene(gait, tmp_path, wrong)
+    hidden = trial(gait, tmp_path, wrong)
     (one,) = (f for f in walk_library() if f.cause == cause and f.site == form)
     inside = slice(10, -10)
     made = (one.columns(hidden) @ np.array([value]))[inside]

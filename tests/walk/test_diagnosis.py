@@ -96,12 +96,12 @@ def test_the_data_of_the_ground_reaction_stand_behind_its_figure(heavy):
     page = report_html(heavy)
     assert page.count("<svg") == len(heavy.study.trials) + 1  # and one of the gains
     csv = unquote(re.search(r'download="coords.csv" href="data:text/csv,([^"]*)"', page)[1]).splitlines()
-    scene = heavy.models.banks.as_read.scenes[0]
+    trial = heavy.models.designs.as_read.trials[0]
     head = csv[0].split(",")
     assert head[0] == "time_s" and len(head) == 1 + 3 * 6
     rows = np.array([[float(v) for v in line.split(",")] for line in csv[1:]])
-    near = np.searchsorted(scene.motion.time, rows[:, 0] - 1e-6)
-    assert rows[:, head.index("vertical_force_measured")] == pytest.approx(scene.measured[near, 2], rel=1e-4, abs=1e-3)
+    near = np.searchsorted(trial.motion.time, rows[:, 0] - 1e-6)
+    assert rows[:, head.index("vertical_force_measured")] == pytest.approx(trial.measured[near, 2], rel=1e-4, abs=1e-3)
 
 
 def test_one_question_for_every_study_and_its_limit_of_time_holds(heavy, tmp_path):
@@ -181,7 +181,7 @@ def test_the_measured_walk_is_honestly_unexplained(walk, tmp_path):
                          ("reference/subject01_model.json", "segments.json")):  # fmt: skip
         (tmp_path / name).write_bytes((walk / source).read_bytes())
     found = diagnose_walk(read_study(tmp_path))
-    assert found.models.banks.strides.count == 2
+    assert found.models.designs.strides.count == 2
     assert found.verdict == "unexplained" and not found.causes
 
 
@@ -203,7 +203,7 @@ def test_the_extended_body_is_the_diagnosiss(heavy):
     name, site = heavy.causes[0].name, heavy.causes[0].site
     if name == "segment_mass" and site == "trunk":
         share = heavy.causes[0].parameters["share"].value
-        assert body.mass_kg > heavy.models.banks.recordings[0].motion.body.mass_kg * (1 + 0.3 * share)
+        assert body.mass_kg > heavy.models.designs.recordings[0].motion.body.mass_kg * (1 + 0.3 * share)
     assert len(body.joint_names) == 19
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from fes_pin.data.study import read_study
 from fes_pin.infer.levels import POSSIBLE_SIZES, WALK_LEVEL
-from fes_pin.walk.banks import Banks
+from fes_pin.walk.designs import Designs
 from fes_pin.walk.models import ALIKE, WalkModels, WalkSearch
 from fes_pin.walk.recording import recordings_of
 from fes_pin.walk.verdict import WalkVerdict, marker_noise
@@ -21,7 +21,7 @@ def models_of(gait, folder, seed, *args, **more):
 
     make(gait, folder, Wrong(*args, **{"strides": 2, "tissue": 0.4, **more}), seed)
     _, recordings = recordings_of(read_study(folder))
-    return WalkModels(Banks(recordings, recordings[0].cutoff_hz), seed=0)
+    return WalkModels(Designs(recordings, recordings[0].cutoff_hz), seed=0)
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +34,7 @@ def models(gait, tmp_path_factory):
 
 
 def test_a_set_has_no_two_forms_of_one_cause_at_one_site(models):
-    forms = models.banks.forms
+    forms = models.designs.forms
     base = models.fits[("segment_com (trunk, forward)",)]
     further = models.candidates(base)
     assert not any(forms[n].cause == "segment_com" and forms[n].site.startswith("trunk") for n in further)
@@ -43,7 +43,7 @@ def test_a_set_has_no_two_forms_of_one_cause_at_one_site(models):
 
 def test_few_sets_of_the_same_causes_are_extended(models):
     near = models.near(1)
-    causes = [models.banks.forms[name].cause for (name,) in near]
+    causes = [models.designs.forms[name].cause for (name,) in near]
     assert max(map(causes.count, causes)) == ALIKE
     assert near[0] == models.ranked(1)[0]
     assert models.near(1, near[:1])[0] != near[0]
@@ -51,8 +51,8 @@ def test_few_sets_of_the_same_causes_are_extended(models):
 
 def test_sizes_that_cannot_be_are_no_explanation(models):
     for names, fitted in models.fits.items():
-        possible = np.abs(fitted.fitted.believed) <= POSSIBLE_SIZES * models.banks.plausible(names)
-        assert math.isfinite(fitted.price) <= possible.all()
+        possible = np.abs(fitted.fitted.believed) <= POSSIBLE_SIZES * models.designs.plausible(names)
+        assert math.isfinite(fitted.criterion) <= possible.all()
     shown = [n for n, f in models.fits.items() if not models.is_possible(f)]
     assert not set(shown) & set(models.near(1))
 
@@ -60,7 +60,7 @@ def test_sizes_that_cannot_be_are_no_explanation(models):
 def test_fits_at_once_are_the_fits_one_by_one(models):
     names = models.ranked(1)[0]
     (alone,) = models._fit_alike([names])
-    assert alone.price == pytest.approx(models.fits[names].price, rel=1e-12)
+    assert alone.criterion == pytest.approx(models.fits[names].criterion, rel=1e-12)
 
 
 def test_evidence_decides_until_the_noise_is_known(models):
@@ -97,7 +97,7 @@ def test_what_strides_held_out_do_not_bear_out_is_refused(models):
 
 
 def test_marker_noise_has_no_gain_where_none_is_computed(gait, tmp_path):
-    loud = marker_noise(models_of(gait, tmp_path, 5, "marker_noise", "", 0.008, strides=4).banks)
+    loud = marker_noise(models_of(gait, tmp_path, 5, "marker_noise", "", 0.008, strides=4).designs)
     assert loud is not None
     assert loud.gain_held_out.is_none and loud.evidence.low > 0.0
     assert loud.record()["gain_percent"] == {"fit": None, "held_out": None, "ci95": None, "other_leg": None}
@@ -106,4 +106,4 @@ def test_marker_noise_has_no_gain_where_none_is_computed(gait, tmp_path):
 
 
 def test_ordinary_marker_noise_is_no_cause(models):
-    assert marker_noise(models.banks) is None
+    assert marker_noise(models.designs) is None

@@ -24,7 +24,7 @@ from fes_pin.infer.optimum import minimise
 from fes_pin.infer.problem import normal_equations
 from fes_pin.infer.search import Names
 from fes_pin.models.model import Model
-from fes_pin.models.predictor import Doubt
+from fes_pin.models.predictor import StateSpaceNoise
 from fes_pin.workers import in_parallel
 
 POOL = 6
@@ -61,7 +61,7 @@ def best_predicting(search: LikelihoodSearch, names: Names) -> Names:
     return min(good, key=lambda n: (len(n), errors[n], n))
 
 
-def prediction_error(fitted: LikelihoodFit, noise: Doubt) -> float:
+def prediction_error(fitted: LikelihoodFit, noise: StateSpaceNoise) -> float:
     """Logarithm of the mean squared error of simulations of trials left out in turn, averaged over trials.
 
     The logarithm keeps one large motion from deciding alone. Without some trials parameters are where one Gauss-Newton
@@ -93,7 +93,7 @@ def _without(fitted: LikelihoodFit, held: Sequence[int]) -> Model:
     return fitted.model.with_parameters({n: float(np.clip(v, *limits[n])) for n, v in moved.items()})
 
 
-def _error(model: Model, trials: Sequence[Trial], noise: Doubt) -> float:
+def _error(model: Model, trials: Sequence[Trial], noise: StateSpaceNoise) -> float:
     """Mean over trials of the logarithm of the mean squared error of a simulation."""
     if model.own_unknowns():
         residuals = [np.concatenate(_in_deviations(model, t, noise)) for t in trials]
@@ -104,6 +104,6 @@ def _error(model: Model, trials: Sequence[Trial], noise: Doubt) -> float:
     return float(np.mean([math.log(max(m, 1e-12)) if math.isfinite(m) else math.inf for m in means]))
 
 
-def _in_deviations(model: Model, trial: Trial, noise: Doubt) -> list[np.ndarray]:
+def _in_deviations(model: Model, trial: Trial, noise: StateSpaceNoise) -> list[np.ndarray]:
     missed = free_residuals(model, trial, noise)
     return [values[np.isfinite(values)] / noise.white[n] for n, values in missed.items()]

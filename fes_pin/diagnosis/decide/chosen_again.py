@@ -27,7 +27,7 @@ import numpy as np
 from fes_pin.diagnosis.search.cause_sets import Names
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood_fit import LikelihoodFit
-from fes_pin.infer.levels import PARAMETER_PRICE
+from fes_pin.infer.levels import PARAMETER_PENALTY
 from fes_pin.infer.problem import normal_equations
 from fes_pin.infer.scatter import at_rest
 from fes_pin.infer.scoring import LITTLE
@@ -57,9 +57,9 @@ class ChosenAgain(Generic[F]):
         log-likelihood, and all its causes together so much.
     """
 
-    def __init__(self, fits: Mapping[Names, F], earns: Callable[[F, F, float, float], bool]) -> None:
+    def __init__(self, fits: Mapping[Names, F], improves: Callable[[F, F, float, float], bool]) -> None:
         self._fits = {n: f for n, f in fits.items() if math.isfinite(f.sse)}
-        self._earns = earns
+        self._improves = improves
         self._trials = {n: _by_trial(f) for n, f in self._fits.items()}
 
     def without(self, held: Sequence[int]) -> F:
@@ -68,9 +68,9 @@ class ChosenAgain(Generic[F]):
         best: Names = ()
         for size in sorted({len(n) for n in costs} - {0}):
             of_size = [n for n in costs if len(n) == size]
-            first = min(of_size, key=lambda n: (costs[n] + PARAMETER_PRICE * self._fits[n].degrees, n))
+            first = min(of_size, key=lambda n: (costs[n] + PARAMETER_PENALTY * self._fits[n].degrees, n))
             sets = self._fits[first], self._fits[best]
-            if not self._earns(*sets, costs[best] - costs[first], costs[()] - costs[first]):
+            if not self._improves(*sets, costs[best] - costs[first], costs[()] - costs[first]):
                 break
             best = first
         return self._fits[best]

@@ -11,7 +11,7 @@ from fes_pin.diagnosis.search.score import Scored, best_by_effect
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.per_trial import amplitude
-from fes_pin.infer.levels import ABSORBED_BELOW
+from fes_pin.infer.levels import IDENTIFIABLE_SHARE
 from fes_pin.infer.result import Cause, ParameterEstimate, Ranked
 from fes_pin.infer.scatter import least_apart
 
@@ -45,15 +45,15 @@ def alternatives(best: Fit, rivals: Sequence[Fit], name: str) -> tuple[str, ...]
 
 def not_excluded(best: Fit, rivals: Sequence[F]) -> list[F]:
     """The rivals that are as cheap, or as likely, as far as data tell."""
-    return [f for f in rivals if min(f.price - best.price, f.sse - best.sse) < least_apart(best, f)]
+    return [f for f in rivals if min(f.criterion - best.criterion, f.sse - best.sse) < least_apart(best, f)]
 
 
-def absorbed(best: Fit, scored: Sequence[Scored], silent: Sequence[str]) -> tuple[str, ...]:
+def not_identifiable(best: Fit, scored: Sequence[Scored], not_excited: Sequence[str]) -> tuple[str, ...]:
     """Causes that these data could not show: taken up by the nominal parameters, or without effect in any trial."""
     found = {e.name for e in best.model.effects}
     by_effect = best_by_effect(scored)
-    taken = {n for n, many in by_effect.items() if n not in found and max(s.kept for s in many) < ABSORBED_BELOW}
-    return tuple(sorted(taken | set(silent)))
+    taken = {n for n, many in by_effect.items() if n not in found and max(s.kept for s in many) < IDENTIFIABLE_SHARE}
+    return tuple(sorted(taken | set(not_excited)))
 
 
 def ranking(best: Fit, rivals: Mapping[str, Sequence[Fit]]) -> dict[str, tuple[Ranked, ...]]:
@@ -71,7 +71,7 @@ def experiment(
     for cause in causes:
         others = {e.name for e in best.model.effects} - {cause.name}
         confounded: dict[str, LikelihoodFit] = {}
-        for rival in sorted(rivals[cause.name], key=lambda f: f.price):
+        for rival in sorted(rivals[cause.name], key=lambda f: f.criterion):
             (instead,) = {e.name for e in rival.model.effects} - others
             if instead in cause.equivalents:
                 confounded.setdefault(instead, rival)

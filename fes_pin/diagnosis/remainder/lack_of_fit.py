@@ -150,8 +150,8 @@ class _Featured:
         """
         fitted, values = self.fitted, self._model.parameters()
         rows, residual = (np.concatenate([getattr(p, n) for p in fitted.parts]) for n in ("jacobian", "residual"))
-        beside = np.linalg.lstsq(rows, residual - self.columns @ amplitudes, rcond=1e-10)[0]
-        moves = dict(zip((*fitted.free, *self._problem.free), (*beside, *amplitudes), strict=True))
+        others = np.linalg.lstsq(rows, residual - self.columns @ amplitudes, rcond=1e-10)[0]
+        moves = dict(zip((*fitted.free, *self._problem.free), (*others, *amplitudes), strict=True))
         limits = limits_of(self._model, fitted.trials)
         tried = [{n: float(np.clip(values[n] + t * m, *limits[n])) for n, m in moves.items()} for t in (0.0, *TRIED)]
         points = [({**values, **one}, fitted.unknowns) for one in tried]

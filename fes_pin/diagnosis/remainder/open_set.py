@@ -26,7 +26,7 @@ def residual_tests(fitted: Fit, seed: int) -> list[tuple[float, str]]:
     """The p-value of each test of residuals, and what its deviation depends on."""
     own = under_own_noise(fitted)
     full = under_own_noise(fitted, FULL_NOISE, FULL_NOISE)
-    beside = Projection(full.parts)
+    projection = Projection(full.parts)
     short = channels(under_own_noise(fitted, SHORT_NOISE))
     count = len(short)
     bursts = min(burst_p_value([e.values for e in pieces], noise, pieces[0].dt) for noise, pieces in short)
@@ -43,6 +43,6 @@ def residual_tests(fitted: Fit, seed: int) -> list[tuple[float, str]]:
         (detents, "angle"),
         (count * repeated, "time"),
         (count * heteroscedastic, "stimulus"),
-        (slip_p_value(full, beside, seed), "time"),
-        (play_p_value(full, beside), "rate"),
+        (slip_p_value(full, projection, seed), "time"),
+        (play_p_value(full, projection), "rate"),
     ]

@@ -9,7 +9,7 @@ import numpy as np
 from fes_pin.diagnosis.remainder.innovations import Stretch, stretches
 from fes_pin.identify.fit import Fit
 from fes_pin.infer.distributions import f_tail
-from fes_pin.infer.levels import ABSORBED_BELOW, UNFELT
+from fes_pin.infer.levels import IDENTIFIABLE_SHARE, UNFELT
 from fes_pin.infer.projection import Projection
 from fes_pin.models.simulate import Simulator
 
@@ -44,7 +44,7 @@ def play_p_value(fitted: Fit, projection: Projection) -> float:
         for one, deviation in zip(group, _deviations(readings), strict=True):
             columns[one.rows] = one.noise.whiten(deviation, one.trial.dt)
         left = projection(columns)
-        felt = np.linalg.norm(left, axis=0) > ABSORBED_BELOW * np.linalg.norm(columns, axis=0)
+        felt = np.linalg.norm(left, axis=0) > IDENTIFIABLE_SHARE * np.linalg.norm(columns, axis=0)
         found += [_one(c, projection, group) for c in left.T[felt]]
     return min([1.0, *(len(found) * p for p in found)])
 

@@ -10,7 +10,7 @@ import scipy.fft
 from fes_pin.diagnosis.remainder.innovations import CLIP, Stretch, stretches
 from fes_pin.identify.fit import Fit
 from fes_pin.infer.distributions import pearson3_tail
-from fes_pin.infer.levels import ABSORBED_BELOW
+from fes_pin.infer.levels import IDENTIFIABLE_SHARE
 from fes_pin.infer.noise import Noise
 from fes_pin.infer.projection import Projection
 
@@ -78,7 +78,7 @@ class _Scan:
         norms = np.cumsum(step**2)[::-1]
         taken = sum(np.sum(self._along(b) ** 2, axis=1) for b in projection.taken(one.rows))
         left = (norms - taken)[self.inside]
-        self.felt = left > ABSORBED_BELOW**2 * norms[self.inside]
+        self.felt = left > IDENTIFIABLE_SHARE**2 * norms[self.inside]
         self.scale = np.where(self.felt, 1.0 / np.sqrt(np.where(self.felt, left, 1.0)), 0.0)
 
     def largest(self, columns: np.ndarray) -> np.ndarray:

@@ -85,7 +85,7 @@ class Library:
         wanted = [e for e in self.effects if e.name not in exclude and self.felt(e)]
         return [p for group in in_parallel(lambda e: self._probe(e, nominal, fitted, noise), wanted) for p in group]
 
-    def silent(self) -> tuple[str, ...]:
+    def not_excited(self) -> tuple[str, ...]:
         """Names of the effects that act in none of the trials: of a joint, where all are isometric."""
         return tuple(e.name for e in self.effects if not self.felt(e))
 

@@ -18,8 +18,8 @@ from fes_pin.diagnosis.search.likelihood_screen import LikelihoodScreen
 from fes_pin.diagnosis.search.possible import is_possible
 from fes_pin.diagnosis.search.score import Scored, best_by_effect, best_pairs
 from fes_pin.diagnosis.search.starts import STARTS, from_afar, refinements, started
+from fes_pin.identify.correlation_time import with_new_noise
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.lasting import with_new_noise
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.process_noise import first_guess, stilled, without_memory
@@ -29,20 +29,20 @@ from fes_pin.infer.optimize import WORTH
 from fes_pin.infer.problem import normal_equations
 from fes_pin.infer.scoring import LITTLE
 from fes_pin.models.model import Model
-from fes_pin.models.predictor import Doubt
+from fes_pin.models.predictor import StateSpaceNoise
 from fes_pin.models.stage import Effect
 from fes_pin.workers import in_parallel
 
-FIRST_DOUBTS = (1.0, 30.0)
+FIRST_NOISE_SCALES = (1.0, 30.0)
 """Sizes of random effort that the nominal fit begins with, in units of the smallest: a likelihood can have two optima,
 one in which the model explains and one in which randomness does. Beside a fit whose random effort is beyond the larger,
 further causes begin also with the smallest."""
 PROCESS, MEASUREMENT, WHITE = "process noise", "measurement noise", "white measurement noise"
 """What noise fits have: where they have no process noise predictions are free simulations; white measurement noise
 weighs every error alike, as least squares do."""
-AFRESH_ROUNDS = 3
+RESTART_ROUNDS = 3
 """Turns of parameters and randomness of such a fit, before the best sets converge."""
-AFRESH_SETS = 3
+RESTART_SETS = 3
 """Sets that go on from little randomness: the lowest of all that begin there, once what is random has had a turn.
 Before, a muscle's best cause, by 20 000 in twice the log-likelihood, was not among the first eight of twenty."""
 
@@ -91,7 +91,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         self.calm = dict(calm or {})
         self.model, self.trials, self.answered, self.noise = Model(model.rig), tuple(trials), answered, noise
         self.library = Library(self.model, trials, effects, answered)
-        self._calm: Doubt | None = None
+        self._calm: StateSpaceNoise | None = None
         self._compared: dict[tuple[Names, str], LikelihoodFit] = {}
         self._maxima = LikelihoodMaxima(trials)
         self.screen = LikelihoodScreen(self.library)
@@ -122,7 +122,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         calm = self.calm.get(()) or self._maxima.from_afar(self.model, none)
         calm = calm if self.noise == WHITE or () in self.calm else self._with_orders(calm)
         self._calm = calm.noise
-        return min(calm, self.with_process_noise(calm), key=lambda f: f.price) if self.noise == PROCESS else calm
+        return min(calm, self.with_process_noise(calm), key=lambda f: f.criterion) if self.noise == PROCESS else calm
 
     def with_process_noise(self, calm: LikelihoodFit) -> LikelihoodFit:
         """A fit without process noise again, with it: from that of several sizes that is likeliest at once."""
@@ -131,7 +131,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
             return calm
         white = {n: (0.0,) * len(own) for n, own in calm.noise.ar.items()}
         begun = [replace(calm.noise, std=guess.std, time=guess.time, still=())]
-        begun += [replace(guess, std={n: k * v for n, v in guess.std.items()}, ar=white) for k in FIRST_DOUBTS]
+        begun += [replace(guess, std={n: k * v for n, v in guess.std.items()}, ar=white) for k in FIRST_NOISE_SCALES]
         if self.answered:
             found = in_parallel(lambda d: self._maxima.from_start(calm.model, d), begun)
             return self._with_orders(min(found, key=lambda f: f.sse))
@@ -141,7 +141,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         """A fit by simulation again, by the likelihood; with process noise, if that improves the penalised one."""
         white = replace(first_guess(fitted.model, self.trials), std={}, time={})
         calm = self._with_orders(self._maxima.from_start(fitted.model, white, fitted.unknowns))
-        return min(calm, self.with_process_noise(calm), key=lambda f: f.price)
+        return min(calm, self.with_process_noise(calm), key=lambda f: f.criterion)
 
     def _with_orders(self, fitted: LikelihoodFit) -> LikelihoodFit:
         """A fit again, with autoregressions of the orders that what its filter leaves shows."""
@@ -149,18 +149,18 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         noise = problem.with_orders(fitted.values, fitted.unknowns)
         return self._maxima.from_start(fitted.model, noise, fitted.unknowns)
 
-    def _nominal(self, lasts_s: float) -> LikelihoodFit:
+    def _nominal(self, correlation_s: float) -> LikelihoodFit:
         """The nominal fit where the noise of a reading lasts so long."""
-        guess = first_guess(self.model, self.trials, lasts_s)
-        starts = [replace(guess, std={n: k * v for n, v in guess.std.items()}) for k in FIRST_DOUBTS]
+        guess = first_guess(self.model, self.trials, correlation_s)
+        starts = [replace(guess, std={n: k * v for n, v in guess.std.items()}) for k in FIRST_NOISE_SCALES]
         return min(in_parallel(lambda d: self._maxima.from_start(self.model, d), starts), key=lambda f: f.sse)
 
-    def _guess(self) -> Doubt:
+    def _guess(self) -> StateSpaceNoise:
         """Little that is random, or nothing where noise foretells itself, with noise that lasts as it does."""
         if self._calm is not None:
             return self._calm
         known = self.fits[()].noise
-        guess = first_guess(self.model, self.trials, known.lasts_s if known else 0.0)
+        guess = first_guess(self.model, self.trials, known.correlation_s if known else 0.0)
         return without_memory(guess, self.trials) if known and known.timed else guess
 
     def candidates(self, base: LikelihoodFit) -> dict[str, Candidate[Starts]]:
@@ -177,10 +177,10 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         """The best of several first fits of each set: at what is random in the base, with little of that, from afar."""
         begun = {k: [_extended(base.model, one) for one in many] for k, many in starts.items()}
         looks = in_parallel(lambda k: self._first_fits(base, starts[k], begun[k]), list(starts))
-        afresh = {k: [f] for k, f in self.calm.items()}
-        afresh = afresh or self._afresh({names: models[0] for names, models in begun.items()}, base)
+        restarted = {k: [f] for k, f in self.calm.items()}
+        restarted = restarted or self._restarted({names: models[0] for names, models in begun.items()}, base)
         each = zip(begun, looks, strict=True)
-        return {names: min((*fits, *afresh.get(names, ())), key=lambda f: f.price) for names, fits in each}
+        return {names: min((*fits, *restarted.get(names, ())), key=lambda f: f.criterion) for names, fits in each}
 
     def _first_fits(self, base: LikelihoodFit, starts: Starts, models: Sequence[Model]) -> list[LikelihoodFit]:
         alone = not base.model.effects and len(starts[0]) == 1
@@ -196,19 +196,19 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         guess, measured = self._guess(), self.library.measured
         begun = [self.model + one for one in from_afar(effect, measured)]
         begun += refinements(self.model + effect, effect, measured) if self.noise == WHITE else []
-        return in_parallel(lambda one: self._maxima.from_start(one, guess, rounds=AFRESH_ROUNDS), begun)
+        return in_parallel(lambda one: self._maxima.from_start(one, guess, rounds=RESTART_ROUNDS), begun)
 
-    def _afresh(self, starts: Mapping[Names, Model], base: LikelihoodFit) -> dict[Names, list[LikelihoodFit]]:
+    def _restarted(self, starts: Mapping[Names, Model], base: LikelihoodFit) -> dict[Names, list[LikelihoodFit]]:
         """Fits that begin with little that is random, where another's random effort takes what a model should.
 
         All take a turn there; those that explain most then go on.
         """
-        guess, least = self._guess(), first_guess(self.model, self.trials, base.noise.lasts_s).std
-        if all(base.noise.std[n] <= FIRST_DOUBTS[-1] * least[n] for n in base.noise.acting):
+        guess, least = self._guess(), first_guess(self.model, self.trials, base.noise.correlation_s).std
+        if all(base.noise.std[n] <= FIRST_NOISE_SCALES[-1] * least[n] for n in base.noise.acting):
             return {}
         first = in_parallel(lambda start: self._maxima.from_start(start, guess, rounds=1), list(starts.values()))
-        lowest = sorted(zip(starts, first, strict=True), key=lambda one: one[1].price)[:AFRESH_SETS]
-        gone_on = in_parallel(lambda one: self._maxima.go_on(one[1], AFRESH_ROUNDS - 1), lowest)
+        lowest = sorted(zip(starts, first, strict=True), key=lambda one: one[1].criterion)[:RESTART_SETS]
+        gone_on = in_parallel(lambda one: self._maxima.go_on(one[1], RESTART_ROUNDS - 1), lowest)
         return {names: [fitted] for (names, _), fitted in zip(lowest, gone_on, strict=True)}
 
     def converged(self, fits: Sequence[LikelihoodFit]) -> list[LikelihoodFit]:
@@ -234,7 +234,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
             own = self._maxima.from_start(begun, whole.noise, whole.unknowns)
             if any(own.sse > f.sse + WORTH for f in self._parts(rest)):  # it ran away, or a part of it explains more
                 own = self._grown(rest, begun.effects)
-            if rest not in self.fits or own.price < self.fits[rest].price:
+            if rest not in self.fits or own.criterion < self.fits[rest].criterion:
                 self.fits[rest] = own
             self._compared[names, name] = whole
         return self.fits[rest]

@@ -10,7 +10,7 @@ import numpy as np
 from fes_pin.diagnosis.decide.significance import level_of
 from fes_pin.diagnosis.search.likelihood_maxima import LikelihoodMaxima
 from fes_pin.diagnosis.search.refined_forms import is_identified
-from fes_pin.diagnosis.search.starts import STARTS, begun_anew, forms_beside, refinements
+from fes_pin.diagnosis.search.starts import STARTS, number_of_forms, refinements, restarted_forms
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.distributions import chi2_quantile, chi2_tail
 from fes_pin.infer.fits import more_degrees
@@ -46,7 +46,7 @@ class LikelihoodForms:
         """
         models = [refinements(base.model, effect, self._measured, barred) for effect in base.model.effects]
         looks = in_parallel(lambda s: self._maxima.look(s, base), [s for many in models for s in many])
-        level = level_of(base) / forms_beside(base.model, base.model.effects)
+        level = level_of(base) / number_of_forms(base.model, base.model.effects)
 
         def finished(worth: Sequence[LikelihoodFit]) -> list[LikelihoodFit]:
             return [f for f in in_parallel(self._maxima.go_on, worth) if is_identified(f, base)]
@@ -60,8 +60,8 @@ class LikelihoodForms:
         """
         each = [(e, [n for n, *_ in e.refinements() if n in e.refined()]) for e in base.model.effects]
         found = (self._grown(base, e, n) for e, adopted in each if len(adopted) > 1 for n in adopted)
-        best = min(found, key=lambda f: f.price, default=base)
-        return best if best.price < base.price - WORTH else None
+        best = min(found, key=lambda f: f.criterion, default=base)
+        return best if best.criterion < base.criterion - WORTH else None
 
     def _grown(self, base: LikelihoodFit, effect: Effect, barred: str) -> LikelihoodFit:
         """A set with one of its effects in the form that the data demand if one refinement of it is barred."""
@@ -78,15 +78,15 @@ class LikelihoodForms:
         """
         both = ((e, n) for e in base.model.effects for n, *_ in e.refinements() if n in e.refined())
         starts = in_parallel(lambda one: self._maxima.less(base, one[1:], one[0]), list(both))
-        return self._maxima.cheaper(starts, base, base.price)
+        return self._maxima.better(starts, base, base.criterion)
 
     def reformed(self, base: LikelihoodFit) -> LikelihoodFit | None:
         """A set with several refinements of a form, all begun anew at once; None where that is no better.
 
         They were adopted one after another, and the first may have bent to what a later one says.
         """
-        starts = [s for effect in base.model.effects for s in begun_anew(base.model, effect, self._measured)]
-        return self._maxima.cheaper(starts, base, base.price - WORTH)
+        starts = [s for effect in base.model.effects for s in restarted_forms(base.model, effect, self._measured)]
+        return self._maxima.better(starts, base, base.criterion - WORTH)
 
 
 def demanded_form(
@@ -106,10 +106,10 @@ def demanded_form(
     finished
         Lets fits converge; returns those that are possible.
     """
-    looks = sorted(looks, key=lambda f: f.price)
+    looks = sorted(looks, key=lambda f: f.criterion)
     demanded = chi2_quantile(1.0 - level, 1)
     worth = [f for f in looks[:STARTS] if base.sse - f.sse > 0.5 * max(demanded, base.sse - looks[0].sse)]
-    best = min(finished(worth), key=lambda f: f.price, default=None)
+    best = min(finished(worth), key=lambda f: f.criterion, default=None)
     if best is None or not chi2_tail(max(base.sse - best.sse, 0.0), more_degrees(best, base)) < level:
         return None
     return best

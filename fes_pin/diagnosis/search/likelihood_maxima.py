@@ -15,12 +15,12 @@ from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit, fit_of, maximise
 from fes_pin.identify.problem import limits_of
 from fes_pin.infer.covariance import moved_with
-from fes_pin.infer.levels import PARAMETER_PRICE
+from fes_pin.infer.levels import PARAMETER_PENALTY
 from fes_pin.infer.maximise import ROUNDS
 from fes_pin.infer.optimum import MAX_ITERATIONS, minimise
 from fes_pin.infer.problem import completed
 from fes_pin.models.model import Model
-from fes_pin.models.predictor import Doubt
+from fes_pin.models.predictor import StateSpaceNoise
 from fes_pin.models.stage import Effect
 from fes_pin.workers import in_parallel
 
@@ -37,7 +37,7 @@ class LikelihoodMaxima:
     def from_start(
         self,
         model: Model,
-        noise: Doubt,
+        noise: StateSpaceNoise,
         unknowns: list[dict[str, float]] | None = None,
         rounds: int = ROUNDS,
         near: bool = False,
@@ -45,7 +45,7 @@ class LikelihoodMaxima:
         """The maximum from a model's own values and from what is taken for random; see `maximise`."""
         return maximise(LikelihoodProblem(model, self.trials, noise), model.parameters(), unknowns, rounds, near)
 
-    def from_afar(self, model: Model, noise: Doubt) -> LikelihoodFit:
+    def from_afar(self, model: Model, noise: StateSpaceNoise) -> LikelihoodFit:
         """The maximum from a model's own values; where it leaves a gross misfit, also from fits to ever longer trials.
 
         Where there is process noise nothing is gross: a filter follows what a wrong model does to the state.
@@ -59,7 +59,7 @@ class LikelihoodMaxima:
         grown = self.from_start(model.with_parameters(values), noise, unknowns)
         return grown if grown.sse < plain.sse or not math.isfinite(plain.sse) else plain
 
-    def likeliest(self, fitted: LikelihoodFit, begun: Sequence[Doubt]) -> Doubt:
+    def likeliest(self, fitted: LikelihoodFit, begun: Sequence[StateSpaceNoise]) -> StateSpaceNoise:
         """The noise, of several to begin with, that is likeliest with a fit's parameters after a first step."""
         tried = []
         for noise in begun:
@@ -79,15 +79,15 @@ class LikelihoodMaxima:
         found = minimise(problem, start.parameters(), base.unknowns, SCREEN_ITERATIONS)
         return replace(fit_of(problem, found), together=base.together)
 
-    def cheaper(self, starts: Sequence[Model], base: LikelihoodFit, price: float) -> LikelihoodFit | None:
+    def better(self, starts: Sequence[Model], base: LikelihoodFit, criterion: float) -> LikelihoodFit | None:
         """The best fit from some starts; None where none is below a price.
 
         Those that look best go on, if what they cost beside randomness as it was is within a parameter's price.
         """
-        looks = sorted(in_parallel(lambda s: self.look(s, base), starts), key=lambda f: f.price)
-        worth = [f for f in looks[:STARTS] if f.price < base.price + PARAMETER_PRICE]
-        best = min(in_parallel(self.go_on, worth), key=lambda f: f.price, default=None)
-        return best if best is not None and best.price < price else None
+        looks = sorted(in_parallel(lambda s: self.look(s, base), starts), key=lambda f: f.criterion)
+        worth = [f for f in looks[:STARTS] if f.criterion < base.criterion + PARAMETER_PENALTY]
+        best = min(in_parallel(self.go_on, worth), key=lambda f: f.criterion, default=None)
+        return best if best is not None and best.criterion < criterion else None
 
     def less(self, whole: LikelihoodFit, gone: Sequence[str], effect: Effect) -> Model:
         """The model of a fit with some parameters of an effect at their nulls; without the effect if these are all.

@@ -41,7 +41,7 @@ class LikelihoodScreen:
         Causes that the fit has are left out, but those that the effect shows beside: the predictor follows what was
         measured with them or without.
         """
-        nominal = Model(base.model.rig, tuple(e for e in base.model.effects if e.name in effect.beside))
+        nominal = Model(base.model.rig, tuple(e for e in base.model.effects if e.name in effect.screened_with))
         out, simulated = [], is_simulated(base.noise, self._library.trials)
         for one in self._library.grid(effect):
             key = (*(nominal + one).structure(), *(nominal + one).unused_parameters().items(), simulated)

@@ -14,7 +14,7 @@ import numpy as np
 from fes_pin.diagnosis.search.library import Probe
 from fes_pin.infer.covariance import least_squares_step
 from fes_pin.infer.family import Family
-from fes_pin.infer.levels import PARAMETER_PRICE
+from fes_pin.infer.levels import PARAMETER_PENALTY
 from fes_pin.infer.problem import Linearized
 from fes_pin.infer.projection import Projection
 
@@ -86,7 +86,7 @@ def _each(projection: Projection, probe: Probe, partly: Sequence[np.ndarray], be
     if not after > 1e-18 * max(before, 1e-300) or not felt.any():
         return Scored(probe, 0.0, {}, 0.0)
     gram, along = gram[np.ix_(felt, felt)], along[felt]
-    gain = float(along @ least_squares_step(gram, along)) - PARAMETER_PRICE * max(len(along) - count, 0)
+    gain = float(along @ least_squares_step(gram, along)) - PARAMETER_PENALTY * max(len(along) - count, 0)
     return Scored(probe, gain, {}, float(np.sqrt(after / before)))
 
 

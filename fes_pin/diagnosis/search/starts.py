@@ -76,7 +76,7 @@ def refinements(
     return out
 
 
-def forms_beside(model: Model, effects: Sequence[Effect]) -> int:
+def number_of_forms(model: Model, effects: Sequence[Effect]) -> int:
     """How many other forms of a model's effects are tried: the refinements that they have not adopted; at least 1."""
     each = ((e, n) for e in effects for n, *_ in e.refinements() if n not in e.refined())
     return max(1, sum(fits_rig(model, e.parameters()[n]) for e, n in each))
@@ -87,7 +87,7 @@ def fits_rig(model: Model, refinement: ParameterInfo) -> bool:
     return not refinement.rigs or model.rig.is_one_of(refinement.rigs)
 
 
-def begun_anew(model: Model, effect: Effect, measured: Mapping[str, np.ndarray]) -> list[Model]:
+def restarted_forms(model: Model, effect: Effect, measured: Mapping[str, np.ndarray]) -> list[Model]:
     """The start of an effect with several refinements from their most likely values; none of others."""
     adopted = [names for names in effect.refinements() if names[0] in effect.refined()]
     if len(adopted) < 2:

@@ -106,7 +106,7 @@ class CoulombFriction(Effect):
     name, stage, signal, rigs = "coulomb_friction", Stage.JOINT, "friction", ("ankle", "joint")
     states, memories, of_form = ("share",), ("anchor",), {"share": "presliding", "anchor": "stretch"}
     dissipative = True
-    foretold_step_s = 4e-3 / 3.0
+    predictor_step_s = 4e-3 / 3.0
 
     @classmethod
     def grids(cls, measured: Measured) -> Grids:

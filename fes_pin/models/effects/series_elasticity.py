@@ -35,7 +35,7 @@ class SeriesElasticity(Effect):
 
     name, stage, signal, rigs = "series_elasticity", Stage.MUSCLE, "fibre", ("muscle",)
     states = ("tension",)
-    beside = ("force_velocity",)
+    screened_with = ("force_velocity",)
 
     @classmethod
     def grids(cls, measured: Measured) -> Grids:

@@ -9,7 +9,7 @@ import numpy as np
 
 from fes_pin.body.build import GRAVITY
 from fes_pin.walk.effect import Form, WalkEffect
-from fes_pin.walk.scene import Scene
+from fes_pin.walk.walk_trial import WalkTrial
 
 ORDINARY_RAD = 0.004
 """Standard deviation where nothing is wrong: frames of cameras and plates are level to a quarter of a degree each way,
@@ -40,9 +40,9 @@ class LaboratoryTilt(WalkEffect):
             )  # fmt: skip
 
 
-def _tilted(scene: Scene, axes: tuple[int, ...]) -> np.ndarray:
-    mass = sum(p[0] for p in scene.parameters.values())
-    out = np.zeros((len(scene.centre), 6, len(axes)))
+def _tilted(trial: WalkTrial, axes: tuple[int, ...]) -> np.ndarray:
+    mass = sum(p[0] for p in trial.parameters.values())
+    out = np.zeros((len(trial.centre), 6, len(axes)))
     for k, axis in enumerate(axes):
         out[:, axis, k] = -mass * GRAVITY
     return out

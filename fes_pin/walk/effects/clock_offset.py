@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from fes_pin.walk.effect import Form, WalkEffect
-from fes_pin.walk.scene import Scene
+from fes_pin.walk.walk_trial import WalkTrial
 
 
 class ClockOffset(WalkEffect):
@@ -26,5 +26,5 @@ class ClockOffset(WalkEffect):
         yield Form(cls.name, "both plates", ("late_s",), ("s",), (0.03,), _rate, shifts=True)
 
 
-def _rate(scene: Scene) -> np.ndarray:
-    return -scene.rate[:, :, None]
+def _rate(trial: WalkTrial) -> np.ndarray:
+    return -trial.rate[:, :, None]

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from fes_pin.walk.effect import AXES, Form, WalkEffect
-from fes_pin.walk.scene import Scene
+from fes_pin.walk.walk_trial import WalkTrial
 
 PLACES = {
     "pelvis": ("pelvis", (0.0, 0.0, 0.0)),
@@ -41,16 +41,16 @@ class ExternalForce(WalkEffect):
                 yield Form(cls.name, f"{place}, {words}", names, ("N",) * len(axes), (50.0,) * len(axes), columns)
 
 
-def place_of(scene: Scene, place: str) -> np.ndarray:
+def place_of(trial: WalkTrial, place: str) -> np.ndarray:
     """Where a force acts that is named by a place of `PLACES`: (n, 3) m."""
     segment, offset = PLACES[place]
-    turn, origin = scene.poses[segment]
+    turn, origin = trial.poses[segment]
     if segment == "pelvis":  # links begin at the joint towards the ground: the pelvis's at the stance hip
-        other = "left" if scene.motion.body.stance == "right" else "right"
-        origin = 0.5 * (origin + scene.poses[f"{other}_thigh"][1])
+        other = "left" if trial.motion.body.stance == "right" else "right"
+        origin = 0.5 * (origin + trial.poses[f"{other}_thigh"][1])
     return origin + turn @ np.array(offset)
 
 
-def _pushed(scene: Scene, place: str, axes: tuple[int, ...]) -> np.ndarray:
-    point = place_of(scene, place)
-    return np.stack([-scene.force_at(point, np.eye(3)[a]) for a in axes], axis=2)
+def _pushed(trial: WalkTrial, place: str, axes: tuple[int, ...]) -> np.ndarray:
+    point = place_of(trial, place)
+    return np.stack([-trial.force_at(point, np.eye(3)[a]) for a in axes], axis=2)

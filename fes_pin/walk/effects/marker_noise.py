@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from fes_pin.walk.effect import Form, WalkEffect
-from fes_pin.walk.scene import Scene
+from fes_pin.walk.walk_trial import WalkTrial
 
 
 class MarkerNoise(WalkEffect):
@@ -28,5 +28,5 @@ class MarkerNoise(WalkEffect):
         yield Form(cls.name, "smoothed", ("smoothing_s2",), ("s2",), (4e-4,), _smoothed, positive=True)
 
 
-def _smoothed(scene: Scene) -> np.ndarray:
-    return -np.gradient(np.gradient(scene.needed, scene.dt, axis=0), scene.dt, axis=0)[:, :, None]
+def _smoothed(trial: WalkTrial) -> np.ndarray:
+    return -np.gradient(np.gradient(trial.needed, trial.dt, axis=0), trial.dt, axis=0)[:, :, None]

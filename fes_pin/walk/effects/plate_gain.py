@@ -9,7 +9,7 @@ import numpy as np
 
 from fes_pin.body.joints import SIDES
 from fes_pin.walk.effect import Form, WalkEffect
-from fes_pin.walk.scene import Scene
+from fes_pin.walk.walk_trial import WalkTrial
 
 
 class PlateGain(WalkEffect):
@@ -37,14 +37,14 @@ AXES = (0, 1, 2)
 """Forward, left and vertical."""
 
 
-def _scaled(scene: Scene, sides: tuple[str, ...], axes: tuple[int, ...]) -> np.ndarray:
-    total = np.zeros((len(scene.centre), 6, 1))
+def _scaled(trial: WalkTrial, sides: tuple[str, ...], axes: tuple[int, ...]) -> np.ndarray:
+    total = np.zeros((len(trial.centre), 6, 1))
     for side in sides:
         if axes == AXES:
-            total[:, :, 0] += scene.true_feet[side]
+            total[:, :, 0] += trial.true_feet[side]
             continue
-        force = np.zeros((len(scene.centre), 3))
-        force[:, axes] = scene.true_feet[side][:, axes]
-        arm = scene.plates.pressure[side] - scene.centre
+        force = np.zeros((len(trial.centre), 3))
+        force[:, axes] = trial.true_feet[side][:, axes]
+        arm = trial.plates.pressure[side] - trial.centre
         total[:, :, 0] += np.hstack([force, np.cross(arm, force)])
     return total

@@ -9,7 +9,7 @@ import numpy as np
 
 from fes_pin.body.joints import SIDES
 from fes_pin.walk.effect import AXES, Form, WalkEffect
-from fes_pin.walk.scene import Scene
+from fes_pin.walk.walk_trial import WalkTrial
 
 ORDINARY_N, ORDINARY_M = 1.5, 0.004
 """Standard deviations of calibrated plates while loaded: mean errors of force were 2.5 to 5 N, of the centre of
@@ -52,22 +52,22 @@ class PlateOffset(WalkEffect):
                 )  # fmt: skip
 
 
-def _constant(scene: Scene, sides: tuple[str, ...], axis: int, loaded: bool) -> np.ndarray:
-    total = np.zeros((len(scene.centre), 6, 1))
+def _constant(trial: WalkTrial, sides: tuple[str, ...], axis: int, loaded: bool) -> np.ndarray:
+    total = np.zeros((len(trial.centre), 6, 1))
     for side in sides:
-        share = scene.plates.loaded[side].astype(float) if loaded else np.ones(len(scene.centre))
-        total[:, :, 0] += share[:, None] * scene.force_at(scene.plates.pressure[side], np.eye(3)[axis])
+        share = trial.plates.loaded[side].astype(float) if loaded else np.ones(len(trial.centre))
+        total[:, :, 0] += share[:, None] * trial.force_at(trial.plates.pressure[side], np.eye(3)[axis])
     return total
 
 
-def _unloaded(scene: Scene, sides: tuple[str, ...], axis: int) -> tuple[np.ndarray, float] | None:
+def _unloaded(trial: WalkTrial, sides: tuple[str, ...], axis: int) -> tuple[np.ndarray, float] | None:
     """What the plates read while nobody stands on them, which is what they always read: the least of both."""
     values = []
     for side in sides:
-        free = ~near(scene.plates.loaded[side], int(np.ceil(SETTLED_S / scene.dt)))
+        free = ~near(trial.plates.loaded[side], int(np.ceil(SETTLED_S / trial.dt)))
         if not free.any():
             return None
-        values.append(float(np.mean(scene.feet[side][free, axis])))
+        values.append(float(np.mean(trial.feet[side][free, axis])))
     return np.array([min(values, key=abs)]), ORDINARY_N
 
 
@@ -76,8 +76,8 @@ def near(loaded: np.ndarray, reach: int) -> np.ndarray:
     return np.convolve(loaded, np.ones(2 * reach + 1), mode="same") > 0.0
 
 
-def _displaced(scene: Scene, sides: tuple[str, ...], axis: int) -> np.ndarray:
-    total = np.zeros((len(scene.centre), 6, 1))
+def _displaced(trial: WalkTrial, sides: tuple[str, ...], axis: int) -> np.ndarray:
+    total = np.zeros((len(trial.centre), 6, 1))
     for side in sides:
-        total[:, 3:, 0] += np.cross(np.eye(3)[axis], scene.feet[side][:, :3])
+        total[:, 3:, 0] += np.cross(np.eye(3)[axis], trial.feet[side][:, :3])
     return total

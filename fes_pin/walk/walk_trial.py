@@ -21,7 +21,7 @@ from fes_pin.walk.recording import WalkRecording
 
 
 @dataclass(frozen=True)
-class Scene:
+class WalkTrial:
     """One trial. Forces in N, moments in N m about the believed centre of mass; x forward, y left, z up.
 
     Attributes
@@ -106,7 +106,7 @@ class Scene:
         return np.hstack([along, np.cross(point - self.centre, along)])
 
 
-def scene_of(recording: WalkRecording, cutoff_hz: float, later_s: float = 0.0) -> Scene:
+def walk_trial_of(recording: WalkRecording, cutoff_hz: float, later_s: float = 0.0) -> WalkTrial:
     """A trial as a scene; `later_s` reads the plates that much later than their clock says."""
     plates = recording.plates
     if later_s:
@@ -118,4 +118,4 @@ def scene_of(recording: WalkRecording, cutoff_hz: float, later_s: float = 0.0) -
         )  # fmt: skip
     way = np.zeros((len(recording.motion.time), 3))
     way[:, 0] = recording.belt_speed_mps * (recording.motion.time - recording.start_s)
-    return Scene(recording.name, recording.motion, plates, centre_of_mass(recording.motion), way)
+    return WalkTrial(recording.name, recording.motion, plates, centre_of_mass(recording.motion), way)

@@ -14,11 +14,13 @@ from fes_pin.data.smooth import low_pass
 from fes_pin.data.study import read_study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
-from fes_pin.identify.lasting import FEWEST, with_new_noise
+from fes_pin.identify.correlation_time import FEWEST, with_new_noise
 from fes_pin.identify.process_noise import first_guess
 from fes_pin.identify.stored import load_random, stored_tables
+from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
-from fes_pin.models.predictor import are_news
+from fes_pin.models.predictor import StateSpaceNoise, are_news
+from fes_pin.models.rigs.joint import Joint
 from fes_pin.models.store import model_toml
 
 
@@ -33,7 +35,7 @@ CAUSES = ["coulomb_friction", "backlash", "cogging", "sensor_lag", "quadratic_da
 @pytest.mark.parametrize("causes", [(), *((c,) for c in CAUSES)], ids=str)
 def test_noise_of_every_sample_is_its_own_whatever_the_model_misses(causes, tmp_path):
     study = read_study(draw(causes, 0.3, 21, tmp_path, recorded=True).study)
-    assert nominal(study).noise.lasts_s == 0.0
+    assert nominal(study).noise.correlation_s == 0.0
 
 
 @pytest.mark.parametrize(
@@ -51,7 +53,7 @@ def test_noise_that_was_averaged_lasts_and_is_no_motion(made, least, most, tmp_p
     drawn = draw((), 0.3, 22, tmp_path)
     study = read_study(drawn.study)
     recorded, found = nominal(study), nominal(study, made)
-    assert least <= found.noise.lasts_s / study.trials[0].dt <= most
+    assert least <= found.noise.correlation_s / study.trials[0].dt <= most
     assert found.values["inertia_scale"] == pytest.approx(1.0, abs=0.02)
     size, now = (f.noise.std["effort"] * np.sqrt(f.noise.time["effort"]) for f in (recorded, found))
     assert now == pytest.approx(size, rel=0.35)
@@ -67,19 +69,30 @@ def test_it_is_kept_with_a_model(tmp_path):
     study = read_study(draw((), 0.3, 22, tmp_path).study)
     found = nominal(study, lambda x: uniform_filter1d(x, 5))
     (tmp_path / "model.toml").write_text(model_toml(found.model, stored_tables(found, Log())))
-    assert load_random(tmp_path / "model.toml").lasts_s == pytest.approx(found.noise.lasts_s, rel=1e-5)
+    assert load_random(tmp_path / "model.toml").correlation_s == pytest.approx(found.noise.correlation_s, rel=1e-5)
 
 
-@pytest.mark.parametrize("lasts_s", [0.0, 0.008])
-def test_what_is_random_is_kept_with_a_model(lasts_s, tmp_path):
+@pytest.mark.parametrize("correlation_s", [0.0, 0.008])
+def test_what_is_random_is_kept_with_a_model(correlation_s, tmp_path):
     """Noise that is new in every sample is written in no key."""
     study = read_study(draw((), 0.3, 22, tmp_path).study)
     model = nominal_model(study)
-    doubt = replace(first_guess(model, study.trials), lasts_s=lasts_s)
+    noise = replace(first_guess(model, study.trials), correlation_s=correlation_s)
     path = tmp_path / "model.toml"
-    path.write_text(model_toml(model, stored_tables(SimpleNamespace(noise=doubt), Log())))
-    assert load_random(path) == doubt
-    assert ("lasts_s" in path.read_text()) == bool(lasts_s)
+    path.write_text(model_toml(model, stored_tables(SimpleNamespace(noise=noise), Log())))
+    assert load_random(path) == noise
+    assert ("correlation_s" in path.read_text()) == bool(correlation_s)
+
+
+def test_a_model_with_the_old_name_of_the_correlation_time_is_read_and_says_so(tmp_path):
+    noise = StateSpaceNoise({"position": 2e-3}, {"effort": 0.8}, {"effort": 0.12}, 0.008)
+    path = tmp_path / "model.toml"
+    written = model_toml(Model(Joint(constants={"inertia": 0.05})), stored_tables(SimpleNamespace(noise=noise), Log()))
+    path.write_text(written.replace("correlation_s = ", "lasts_s = "))
+    with pytest.warns(DeprecationWarning, match="lasts_s"):
+        assert load_random(path) == noise
+    with pytest.warns(DeprecationWarning, match="correlation_s now"):
+        assert noise.lasts_s == 0.008
 
 
 def test_where_noise_is_nowhere_new_innovations_have_least_in_common():
@@ -87,8 +100,8 @@ def test_where_noise_is_nowhere_new_innovations_have_least_in_common():
     rng, dt, n = np.random.default_rng(5), 0.01, 60_000
     shared = {0: 0.25, 2: 0.4, 4: 0.15, 8: 0.3}
 
-    def fitted(lasts_s):
-        rows = round(lasts_s / dt)
+    def fitted(correlation_s):
+        rows = round(correlation_s / dt)
         residual = lfilter([1.0], [1.0, -shared[rows]], rng.standard_normal(n))
         model = SimpleNamespace(rig=SimpleNamespace(unknowns=lambda kind: ("initial_position",)))
         return SimpleNamespace(rows=rows, model=model, parts=[SimpleNamespace(residual=residual)])

@@ -17,8 +17,8 @@ from fes_pin.walk.effect import Form
 from fes_pin.walk.effects import walk_library
 from fes_pin.walk.likelihood import MEAN_ARM_M, MEAN_FORCE, MEAN_TWIST_NM, WalkNoise, fit_walk, rotation
 from fes_pin.walk.recording import WalkRecording
-from fes_pin.walk.scene import Scene, scene_of
 from fes_pin.walk.strides import Strides, strides_of
+from fes_pin.walk.walk_trial import WalkTrial, walk_trial_of
 
 TISSUE_DRAWS, WHITE_DRAWS = 40, 64
 TAKEN = 0.3
@@ -31,16 +31,16 @@ SHIFT_ROUNDS = 4
 
 
 @dataclass(frozen=True)
-class Bank:
+class Design:
     """Residual and columns of every form by name, (1, 6, k, ...) in the mean stride, for plates read `later_s` late."""
 
-    scenes: list[Scene] = field(repr=False)
+    trials: list[WalkTrial] = field(repr=False)
     y: np.ndarray = field(repr=False)
     x: dict[str, np.ndarray] = field(repr=False)
     later_s: float = 0.0
 
 
-class Banks:
+class Designs:
     """One diagnosis's recordings on the plates' clock as it was read and as it fits best, and the noise of both.
 
     Attributes
@@ -65,10 +65,10 @@ class Banks:
         self.recordings, self.cutoff_hz, self.seed = list(recordings), cutoff_hz, seed
         self.forms = _by_name()
         self.shift = next(n for n, f in self.forms.items() if f.shifts)
-        scenes = [scene_of(r, cutoff_hz) for r in self.recordings]
-        self.strides: Strides = strides_of(scenes, cutoff_hz)
+        trials = [walk_trial_of(r, cutoff_hz) for r in self.recordings]
+        self.strides: Strides = strides_of(trials, cutoff_hz)
         self._first = self.recordings[self.strides.windows[0][0]]
-        self.as_read = self._bank(scenes, 0.0)
+        self.as_read = self._design(trials, 0.0)
         self._turn(self.as_read.y)
         self.shifted = self._shifted()
 
@@ -78,17 +78,17 @@ class Banks:
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state, forms=_by_name())  # forms hold functions, which are the library's own
 
-    def _bank(self, scenes: list[Scene], later_s: float) -> Bank:
-        x = {n: self.strides.mean([form.columns(s) for s in scenes]) for n, form in self.forms.items()}
-        return Bank(scenes, self._residual(scenes), x, later_s)
+    def _design(self, trials: list[WalkTrial], later_s: float) -> Design:
+        x = {n: self.strides.mean([form.columns(s) for s in trials]) for n, form in self.forms.items()}
+        return Design(trials, self._residual(trials), x, later_s)
 
-    def _residual(self, scenes: list[Scene]) -> np.ndarray:
-        return self.strides.mean([s.residual[:, :, None] for s in scenes])[..., 0]
+    def _residual(self, trials: list[WalkTrial]) -> np.ndarray:
+        return self.strides.mean([s.residual[:, :, None] for s in trials])[..., 0]
 
     @cached_property
     def measured(self) -> np.ndarray:
         """The measured reaction in every stride: (n, 6, k)."""
-        return self.strides.coefficients([s.measured[:, :, None] for s in self.as_read.scenes])[..., 0]
+        return self.strides.coefficients([s.measured[:, :, None] for s in self.as_read.trials])[..., 0]
 
     @cached_property
     def landmarks(self) -> np.ndarray:
@@ -105,7 +105,7 @@ class Banks:
         """Residuals that white noise of one unit leaves in a stride: (draws, 6, k)."""
         return disturbed_waves(self._first, self.strides, white, WHITE_DRAWS, self.seed)
 
-    def turned(self, residual: np.ndarray) -> Banks:
+    def turned(self, residual: np.ndarray) -> Designs:
         """The same with channels rotated for the residual of a set, (1, 6, k)."""
         other = copy.copy(self)
         other._turn(residual)
@@ -113,13 +113,13 @@ class Banks:
 
     def _turn(self, left: np.ndarray) -> None:
         turn = rotation(left, self.strides.harmonics)
-        weight = GRAVITY * sum(p[0] for p in self.as_read.scenes[0].parameters.values())
+        weight = GRAVITY * sum(p[0] for p in self.as_read.trials[0].parameters.values())
         means = np.r_[np.full(3, MEAN_FORCE * weight), np.full(2, MEAN_ARM_M * weight), MEAN_TWIST_NM] ** 2
         if not self.strides.whole:  # soft tissue does not come back to what it was
             means = means + np.mean(self.tissue[..., 0] ** 2, axis=0)
         bare = WalkNoise(self.strides.harmonics, turn, means, self._none())
         self.ordinary = bare.rotated(compressed(self._in_every_session()))
-        taken = bare.rotated(_taken(self.as_read.scenes, self.strides))
+        taken = bare.rotated(_taken(self.as_read.trials, self.strides))
         self.noise = replace(bare, nuisance=np.concatenate([taken, self.ordinary], axis=3))
 
     def _in_every_session(self) -> np.ndarray:
@@ -128,21 +128,21 @@ class Banks:
         landmarks = np.moveaxis(self.landmarks, 0, 2)[None]
         return np.concatenate([landmarks, *(size * columns for columns, size in forms)], axis=3)
 
-    def _shifted(self) -> Bank:
+    def _shifted(self) -> Design:
         """The plates read as late as fits best, followed beyond the linear."""
         form, later = self.forms[self.shift], 0.0
-        scenes, y, rate = self.as_read.scenes, self.as_read.y, self.as_read.x[self.shift]
+        trials, y, rate = self.as_read.trials, self.as_read.y, self.as_read.x[self.shift]
         for _ in range(SHIFT_ROUNDS):
             found = fit_walk(self.noise.rotated(y), self.noise.rotated(rate), np.array(form.plausible), self.noise)
             step = float(np.clip(found.values[0], -0.05, 0.05))
             later = float(np.clip(later + step, -0.2, 0.2))
-            scenes = [scene_of(r, self.cutoff_hz, later) for r in self.recordings]
-            y, rate = self._residual(scenes), self.strides.mean([form.columns(s) for s in scenes])
+            trials = [walk_trial_of(r, self.cutoff_hz, later) for r in self.recordings]
+            y, rate = self._residual(trials), self.strides.mean([form.columns(s) for s in trials])
             if abs(step) < SHIFT_ENDS_S:
                 break
-        return self._bank(scenes, later)
+        return self._design(trials, later)
 
-    def bank(self, names: Names) -> Bank:
+    def design(self, names: Names) -> Design:
         """The bank in which a set is fitted: with the clock moved if it holds a shift."""
         return self.shifted if self.shift in names else self.as_read
 
@@ -152,25 +152,25 @@ class Banks:
 
     def residual(self, names: Names, values: np.ndarray) -> np.ndarray:
         """Residual of a set in the mean stride, (1, 6, k)."""
-        return self.bank(names).y - self._columns(names) @ values
+        return self.design(names).y - self._columns(names) @ values
 
     def by_stride(self, names: Names) -> tuple[np.ndarray, np.ndarray]:
         """Residual (n, 6, k) and columns (n, 6, k, p) of a set, stride by stride."""
-        scenes = self.bank(names).scenes
-        y = self.strides.coefficients([s.residual[:, :, None] for s in scenes])[..., 0]
-        return y, self.strides.coefficients([self.signals(names, s) for s in scenes])
+        trials = self.design(names).trials
+        y = self.strides.coefficients([s.residual[:, :, None] for s in trials])[..., 0]
+        return y, self.strides.coefficients([self.signals(names, s) for s in trials])
 
-    def signals(self, names: Names, scene: Scene) -> np.ndarray:
+    def signals(self, names: Names, trial: WalkTrial) -> np.ndarray:
         """Columns of a set along a trial: (n, 6, p)."""
-        empty = np.zeros((len(scene.centre), 6, 0))
-        return np.concatenate([empty, *(self.forms[n].columns(scene) for n in names)], axis=2)
+        empty = np.zeros((len(trial.centre), 6, 0))
+        return np.concatenate([empty, *(self.forms[n].columns(trial) for n in names)], axis=2)
 
     def plausible(self, names: Names) -> np.ndarray:
         """Plausible size of every parameter of a set, (p,)."""
         return np.array([size for n in names for size in self.forms[n].plausible])
 
     def _columns(self, names: Names) -> np.ndarray:
-        return np.concatenate([self._none(), *(self.bank(names).x[n] for n in names)], axis=3)
+        return np.concatenate([self._none(), *(self.design(names).x[n] for n in names)], axis=3)
 
     def _none(self) -> np.ndarray:
         return np.zeros((*self.as_read.y.shape, 0))
@@ -180,13 +180,13 @@ def _by_name() -> dict[str, Form]:
     return {form.label: form for form in walk_library()}
 
 
-def _taken(scenes: list[Scene], strides: Strides) -> np.ndarray:
+def _taken(trials: list[WalkTrial], strides: Strides) -> np.ndarray:
     """What errors in the motion take from every wave of the required reaction, in units of `TAKEN`: (n, 6, k, 7).
 
     A share of each channel, and one that grows with the square of the frequency, as of accelerations.
     """
     h = strides.harmonics
-    needed = strides.mean([s.needed[:, :, None] for s in scenes])[..., 0]
+    needed = strides.mean([s.needed[:, :, None] for s in trials])[..., 0]
     waves = needed * (h > 0)
     out = np.zeros((*waves.shape, 7))
     for channel in range(6):

@@ -7,7 +7,7 @@ from diagnosis.hidden import study_of
 
 from fes_pin.data.study import read_study
 from fes_pin.diagnosis.diagnosis import diagnose_joint
-from fes_pin.diagnosis.refused import no_noise
+from fes_pin.diagnosis.rejected import no_noise
 from fes_pin.diagnosis.search.likelihood_fits import MEASUREMENT
 from fes_pin.diagnosis.search.likelihood_models import LikelihoodModels
 from fes_pin.models.least_squares import least_squares

@@ -15,7 +15,7 @@ from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.levels import CERTAIN_LEVEL, FORM_SHARE, NOTHING_PERCENT, SMALL_PERCENT, SMALL_SHARE
 from fes_pin.infer.optimize import WORTH
 from fes_pin.infer.result import Remainder
-from fes_pin.infer.verdict import Refused
+from fes_pin.infer.verdict import Rejected
 
 UNMOVED = "the motion is as likely without the recorded input, so something else moves the rig"
 """Why no cause is named where `is_moved_by_what_is_recorded` is False."""
@@ -35,8 +35,8 @@ def is_moved_by_what_is_recorded(fitted: LikelihoodFit) -> bool:
     return without > fitted.sse + WORTH
 
 
-def with_refused_causes(
-    left: Remainder, random: Sequence[RandomPart], refused: Mapping[str, Refused], stages: Mapping[str, str]
+def with_rejected_causes(
+    left: Remainder, random: Sequence[RandomPart], rejected: Mapping[str, Rejected], stages: Mapping[str, str]
 ) -> Remainder:
     """What is left: by the features, or a random effort that is too large, or a cause that was refused.
 
@@ -49,11 +49,11 @@ def with_refused_causes(
         return left
     if are_large(random):
         return replace(left, unexplained=True, where="effort")
-    certain = [n for n, r in refused.items() if r.p_value < CERTAIN_LEVEL and r.share >= FORM_SHARE]
-    certain = [n for n in certain if refused[n].gain.percent > NOTHING_PERCENT]
+    certain = [n for n, r in rejected.items() if r.p_value < CERTAIN_LEVEL and r.share >= FORM_SHARE]
+    certain = [n for n in certain if rejected[n].gain.percent > NOTHING_PERCENT]
     if certain:
-        surest = min(certain, key=lambda n: refused[n].p_value)
-        return replace(left, unexplained=True, p_value=refused[surest].p_value, where=stages[surest])
+        surest = min(certain, key=lambda n: rejected[n].p_value)
+        return replace(left, unexplained=True, p_value=rejected[surest].p_value, where=stages[surest])
     return left
 
 

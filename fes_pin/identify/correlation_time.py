@@ -5,9 +5,11 @@ that nothing exerts, and inertia is what that effort makes of it. Readings as fa
 innovations that are white; and every second of them tells of the same noise, the same random effort and the same rig as
 all do. Where they do not, readings are taken twice as far apart.
 
-New is what shares little with the next two: a model that misses a cause brings a correlation of 0.02 at the steps of a
-recording, noise that was averaged over ten samples 0.5 (`tests/driven/test_lasting.py`). A correlation of `SMALL_SHARE`
-is worth its square in twice the log-likelihood of a reading: by no more may every second of them fit better by itself.
+Innovations are white if they correlate little with the next two. A model that misses a cause brings a correlation of
+0.02 at the steps of a recording; noise that was averaged over ten samples brings 0.5
+(`tests/driven/test_correlation_time.py`).
+A correlation of `SMALL_SHARE` is worth its square in twice the log-likelihood of a reading: by no more may every second
+reading fit better by itself.
 """
 
 from __future__ import annotations
@@ -22,7 +24,7 @@ from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.levels import SMALL_SHARE
 from fes_pin.infer.noise import NoiseModel
-from fes_pin.models.predictor import Doubt
+from fes_pin.models.predictor import StateSpaceNoise
 from fes_pin.models.rigs.base import Rig
 
 FEWEST = 30
@@ -40,8 +42,8 @@ def with_new_noise(trials: Sequence[Trial], nominal: Callable[[float], Likelihoo
     Returns
     -------
     Fit
-        Its `noise.lasts_s` says how long; 0 where noise is new in every sample. Where it is nowhere new, the fit whose
-        innovations have least in common with the next.
+        Its `noise.correlation_s` is the correlation time; 0 where the noise of every sample is new. Where it is new at
+        no spacing, the fit whose innovations correlate least with the next.
     """
     now = nominal(0.0)
     if not all(now.model.rig.unknowns(t.kind) for t in trials):  # a force may be as smooth as its reading
@@ -68,7 +70,7 @@ def _shared(fitted: LikelihoodFit) -> float:
 def _other(fitted: LikelihoodFit, sparser: LikelihoodFit) -> float:
     """By how much less likely sparser readings are, each, under a fit than under their own."""
     problem = LikelihoodProblem(sparser.model, sparser.trials, sparser.noise)
-    as_it_was = replace(fitted.noise, lasts_s=sparser.noise.lasts_s)
+    as_it_was = replace(fitted.noise, correlation_s=sparser.noise.correlation_s)
     lost = problem.cost(fitted.values, fitted.unknowns, as_it_was) - sparser.sse
     return lost / max(sum(len(p.residual) for p in sparser.parts), 1)
 
@@ -90,9 +92,9 @@ def words_of_reading(noise: NoiseModel, rig: Rig, trials: Sequence[Trial]) -> tu
     if hunting > SMALL_SHARE:
         share = f"{100 * hunting:.0f} % of its samples"
         said.append(f"{name} goes to and fro between two counts in {share}: these are followed, and judge nothing")
-    if isinstance(noise, Doubt) and noise.lasts_s:
-        step = round(noise.lasts_s / trials[0].dt)
+    if isinstance(noise, StateSpaceNoise) and noise.correlation_s:
+        step = round(noise.correlation_s / trials[0].dt)
         read = f"is read in counts of {count:.2g}" if count else "was smoothed or interpolated before it was stored"
-        lasts = f"its noise lasts {noise.lasts_s:.2g} s, and one sample in {step} counts as a reading"
-        said.append(f"{name} {read}: {lasts}")
+        words = f"its noise lasts {noise.correlation_s:.2g} s, and one sample in {step} counts as a reading"
+        said.append(f"{name} {read}: {words}")
     return tuple(said)

@@ -12,7 +12,7 @@ import numpy as np
 from fes_pin.models.autoregression import beginning, innovations_of
 
 
-class ForetoldOutput(NamedTuple):
+class PredictedOutput(NamedTuple):
     """Prediction of an output, measured or not, and the variance of its error if the model is right.
 
     Both have shape (n,).
@@ -63,7 +63,7 @@ class Readings:
 
 
 @dataclass(frozen=True)
-class ForetoldTrial:
+class PredictedTrial:
     """One-step predictions of one trial, sample by sample.
 
     Attributes
@@ -100,7 +100,7 @@ class ForetoldTrial:
         return self.readings.seen
 
     @property
-    def noise_told_again(self) -> np.ndarray:
+    def repeated_noise(self) -> np.ndarray:
         """Variances of repeated noise as `variances` holds them, by reading: the variance of one reading times n."""
         at = self.readings.repeated
         return np.asarray(self.of_seen(self.readings.repeats * np.square(self.white))[at]) if len(at) else np.zeros(0)
@@ -136,7 +136,7 @@ class ForetoldTrial:
         if any(self.ar):
             logs += self.of_seen(self._growth())
         at = self.readings.repeated
-        logs[at] -= self.readings.again[at] * np.log(self.noise_told_again)
+        logs[at] -= self.readings.again[at] * np.log(self.repeated_noise)
         return self.over_deviations(self.values), logs
 
     def _growth(self) -> np.ndarray:
