@@ -87,7 +87,8 @@ def test_what_is_random_is_kept_with_a_model(correlation_s, tmp_path):
 def test_a_model_with_the_old_name_of_the_correlation_time_is_read_and_says_so(tmp_path):
     noise = StateSpaceNoise({"position": 2e-3}, {"effort": 0.8}, {"effort": 0.12}, 0.008)
     path = tmp_path / "model.toml"
-    written = model_toml(Model(Joint(constants={"inertia": 0.05})), stored_tables(SimpleNamespace(noise=noise), Log()))
+    rig = Joint(constants={"inertia": 0.05, "gravity_cos": 0.0, "gravity_sin": 1.0, "revolute": 1.0})
+    written = model_toml(Model(rig), stored_tables(SimpleNamespace(noise=noise), Log()))
     path.write_text(written.replace("correlation_s = ", "lasts_s = "))
     with pytest.warns(DeprecationWarning, match="lasts_s"):
         assert load_random(path) == noise

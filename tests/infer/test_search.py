@@ -98,7 +98,7 @@ def test_a_rival_that_is_better_together_with_the_others_is_the_answer(search):
 
 
 def test_what_was_refused_comes_back_in_no_exchange(search):
-    found = search.settle(("lag", "velocity"), refused=("tendon",))
+    found = search.settle(("lag", "velocity"), rejected=("tendon",))
     assert found.best.names == ("lag", "velocity")
 
 

@@ -102,4 +102,4 @@ def test_what_one_run_alone_shows_is_refused_and_said_to_be_refused(judged):
     runs[1] += 1.6 * x["x07"]
     found = judged(runs, x)
     assert found.names == frozenset() and "drop_unsupported" in found.steps
-    assert "x07" in found.refused and found.refused["x07"].p_value < 1e-3
+    assert "x07" in found.rejected and found.rejected["x07"].p_value < 1e-3

@@ -87,12 +87,12 @@ def test_what_strides_held_out_do_not_bear_out_is_refused(models):
     found = search.run()
     verdict = WalkVerdict(search, seed=0)
     state = verdict.of(found)
-    assert state.found.best.names == found.best.names and not state.refused
+    assert state.found.best.names == found.best.names and not state.rejected
     assert all(e.low > 0.0 for e in state.weighed.evidence.values())
     further = tuple(sorted((*found.best.names, "plate_gain (left plate, sideways)")))
     known.fit(further)
     state = verdict.of(search.result(further))
-    assert set(state.refused) == {"plate_gain (left plate, sideways)"}
+    assert set(state.rejected) == {"plate_gain (left plate, sideways)"}
     assert verdict.lack_of_fit(state).unexplained
 
 
