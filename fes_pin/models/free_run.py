@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +11,7 @@ from fes_pin.data.trial import Trial
 from fes_pin.models.model import Model
 from fes_pin.models.predictions import PredictedTrial
 from fes_pin.models.predictor import StateSpaceNoise, measured_outputs, read_columns
-from fes_pin.models.simulate import Simulator
+from fes_pin.models.simulate import EachTrial, Simulator, Values
 
 
 class FreeRun:
@@ -41,10 +41,7 @@ class FreeRun:
         self._read = [read_columns(model.rig, t, o, correlation_s) for t, o in zip(trials, outputs, strict=True)]
 
     def run(
-        self,
-        values: Mapping[str, float] | Sequence[Mapping[str, float]],
-        noise: StateSpaceNoise | Sequence[StateSpaceNoise],
-        unknowns: Sequence[Mapping[str, float]],
+        self, values: Values, noise: StateSpaceNoise | Sequence[StateSpaceNoise], unknowns: EachTrial
     ) -> list[PredictedTrial]:
         """Simulate every trial; see `Predictor.run`."""
         each = [noise] * len(self.trials) if isinstance(noise, StateSpaceNoise) else noise

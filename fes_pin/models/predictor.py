@@ -19,14 +19,7 @@ from fes_pin.models.disturbance import disturbed
 from fes_pin.models.model import Model
 from fes_pin.models.predictions import PredictedOutput, PredictedTrial, Readings
 from fes_pin.models.rigs.base import Rig
-from fes_pin.models.simulate import (
-    Block,
-    is_delayed,
-    max_step,
-    side_by_side,
-    substeps,
-    total_delay,
-)
+from fes_pin.models.simulate import Block, EachTrial, Values, max_step, side_by_side, spread, substeps
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +125,6 @@ class Predictor:
     ) -> None:
         self.model, self.trials, self.columns = model, tuple(trials), columns
         self.max_step_s = min([max_step(model), *(e.predictor_step_s for e in model.effects)])
-        self._delayed = is_delayed(model)
         together, own = side_by_side(self.trials, columns, self._key), (columns, processes, priors)
         self._blocks = [
             _Prediction(model, self.trials, lanes, *own, self.max_step_s, correlation_s) for lanes in together
@@ -144,10 +136,7 @@ class Predictor:
         return trial.kind, self.model.driven_by(trial), measured_outputs(self.model, trial), steps
 
     def run(
-        self,
-        values: Mapping[str, float] | Sequence[Mapping[str, float]],
-        noise: StateSpaceNoise | Sequence[StateSpaceNoise],
-        unknowns: Sequence[Mapping[str, float]],
+        self, values: Values, noise: StateSpaceNoise | Sequence[StateSpaceNoise], unknowns: EachTrial
     ) -> list[PredictedTrial]:
         """Foretell every trial.
 
@@ -155,33 +144,26 @@ class Predictor:
         ----------
         values
             Every parameter of the model, by name; one for all trials, or one for each.
-        doubt
+        noise
             Of every output that a trial has; one for all trials, or one for each.
         unknowns
             For each trial its start, and what effects have of each trial's own.
         """
         out: dict[int, PredictedTrial] = {}
         noises = [noise] * len(self.trials) if isinstance(noise, StateSpaceNoise) else list(noise)
-        each = [values] * len(self.trials) if isinstance(values, Mapping) else values
         for block in self._blocks:
-            y, s = block.run(each, [one.parameters() for one in noises], unknowns, self._delays(each))
+            y, s = block.run(values, [one.parameters() for one in noises], unknowns)
             predicted = block.innovations(y, s, len(self.columns), [noises[i] for i in block.lanes])
             out.update(zip(block.lanes, predicted, strict=True))
         return [out[i] for i in range(len(self.trials))]
 
-    def predict(
-        self, values: Mapping[str, float], noise: StateSpaceNoise, unknowns: Sequence[Mapping[str, float]]
-    ) -> list[dict[str, PredictedOutput]]:
+    def predict(self, values: Values, noise: StateSpaceNoise, unknowns: EachTrial) -> list[dict[str, PredictedOutput]]:
         """What is foretold of every output of every trial, by name; see `run`."""
         out: dict[int, dict[str, PredictedOutput]] = {}
-        each = [values] * len(self.trials)
         for block in self._blocks:
-            y, _ = block.run(each, [noise.parameters()] * len(self.trials), unknowns, self._delays(each))
+            y, _ = block.run(values, [noise.parameters()] * len(self.trials), unknowns)
             out.update(zip(block.lanes, block.predicted(y, noise), strict=True))
         return [out[i] for i in range(len(self.trials))]
-
-    def _delays(self, values: Sequence[Mapping[str, float]]) -> list[float]:
-        return [total_delay(self.model, v) if self._delayed else 0.0 for v in values]
 
 
 def _lanes_first(array: np.ndarray) -> np.ndarray:
@@ -258,16 +240,10 @@ class _Prediction(Block):
         """Inputs of all lanes, later by whole samples, beside what was measured and whether it was."""
         return np.concatenate([super()._inputs(shift), self.measured, self.seen.astype(float), self.repeated], axis=1)
 
-    def run(
-        self,
-        values: Sequence[Mapping[str, float]],
-        noises: Sequence[Mapping[str, float]],
-        unknowns: Sequence[Mapping[str, float]],
-        delays: Sequence[float],
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def run(self, values: Values, noises: EachTrial, unknowns: EachTrial) -> tuple[np.ndarray, np.ndarray]:
         """What the program gives of all lanes; see `Program`. Everything is that of all trials."""
         known = {n: [noises[i][n] for i in self.lanes] for n in self.noise_names}
-        return self._run(values, unknowns, delays, **known)
+        return self._run(values, unknowns, **known)
 
     def innovations(
         self, y: np.ndarray, s: np.ndarray, width: int, noises: Sequence[StateSpaceNoise]
@@ -276,12 +252,7 @@ class _Prediction(Block):
         k, rows, by_lane = len(self.outputs), _lanes_first(y), _lanes_first(s)
         for lane, readings in enumerate(self.readings):
             n = len(readings.seen)
-            own = by_lane[lane, :n]
-            if self.places == tuple(range(width)):
-                sensitivities = own
-            else:
-                sensitivities = np.zeros((n, k, width))
-                sensitivities[..., list(self.places)] = own
+            sensitivities = spread(by_lane[lane, :n], self.places, width)
             values = rows[lane, :n, :k] if readings.all_seen else np.where(readings.seen, rows[lane, :n, :k], 0.0)
             white = tuple(noises[lane].white[o] for o in self.outputs)
             ar = tuple(noises[lane].ar.get(o, ()) for o in self.outputs)

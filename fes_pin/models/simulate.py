@@ -6,6 +6,7 @@ import itertools
 import math
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,10 @@ from fes_pin.models.model import Model
 from fes_pin.models.rigs.base import Rig
 from fes_pin.models.storage import pass_as_stored
 
+EachTrial = Sequence[Mapping[str, float]]
+"""Of each trial numbers by name."""
+Values = Mapping[str, float] | EachTrial
+"""Every parameter of a model by name: one for all trials, or one for each."""
 MAX_STEP_S = 2.5e-3
 """Longest integration step, s: 1/20 of a muscle's time constant; at 1/17 s of damping RK4 errs by 1e-6 rad a swing."""
 FIRST_S = 0.2
@@ -86,15 +91,10 @@ class Simulator:
     """
 
     def __init__(
-        self,
-        model: Model,
-        trials: Sequence[Trial],
-        columns: tuple[str, ...] = (),
-        max_step_s: float | None = None,
+        self, model: Model, trials: Sequence[Trial], columns: tuple[str, ...] = (), max_step_s: float | None = None
     ) -> None:
         self.model, self.trials, self.columns = model, tuple(trials), columns
         self.max_step_s = max_step(model) if max_step_s is None else max_step_s
-        self._delayed = is_delayed(model)
         steps, together = self.max_step_s, side_by_side(self.trials, columns, self._key)
         self._blocks = [_Simulation(model, self.trials, lanes, columns, steps) for lanes in together]
         self._fixed = {n: value for block in self._blocks for n, value in block.layout.fixed}
@@ -103,11 +103,7 @@ class Simulator:
         """What trials share that can share a block: kind, inputs and integration steps per sample."""
         return trial.kind, self.model.driven_by(trial), substeps(self.model, trial.dt, self.max_step_s)
 
-    def run(
-        self,
-        values: Mapping[str, float] | Sequence[Mapping[str, float]],
-        unknowns: Sequence[Mapping[str, float]] | None = None,
-    ) -> list[Simulated]:
+    def run(self, values: Values, unknowns: EachTrial | None = None) -> list[Simulated]:
         """Simulate every trial.
 
         Parameters
@@ -129,29 +125,18 @@ class Simulator:
         for block in self.run_batches(values, unknowns):
             for lane, i in enumerate(block.trials):
                 n = len(self.trials[i])
-                out[i] = Simulated(block.readings[:n, :, lane], self._spread(block, block.sensitivities[:n, ..., lane]))
+                own = spread(block.sensitivities[:n, ..., lane], block.columns, len(self.columns))
+                out[i] = Simulated(block.readings[:n, :, lane], own)
         return [s for s in out if s is not None]
 
-    def run_batches(
-        self, values: Mapping[str, float] | Sequence[Mapping[str, float]], unknowns: Sequence[Mapping[str, float]]
-    ) -> Iterator[SimulatedBatch]:
+    def run_batches(self, values: Values, unknowns: EachTrial) -> Iterator[SimulatedBatch]:
         """Simulate every trial, as `run` does; what comes side by side is given as it comes."""
-        each = [values] * len(self.trials) if isinstance(values, Mapping) else values
-        for own in [values] if isinstance(values, Mapping) else each:
+        for own in [values] if isinstance(values, Mapping) else values:
             for name, value in self._fixed.items():
                 if own[name] != value:
                     raise ValueError(f"{name} is {value:g} in the model that this simulator is for, not {own[name]:g}")
-        delays = [total_delay(self.model, own) if self._delayed else 0.0 for own in each]
         for block in self._blocks:
-            yield block.run(values, unknowns, delays)
-
-    def _spread(self, block: SimulatedBatch, s: np.ndarray) -> np.ndarray:
-        """Sensitivities in the order asked for, zero where this kind of trial has no such unknown."""
-        if len(block.columns) == len(self.columns):
-            return s
-        full = np.zeros((*s.shape[:2], len(self.columns)))
-        full[..., list(block.columns)] = s
-        return full
+            yield block.run(values, unknowns)
 
     def start(self, values: Mapping[str, float]) -> list[dict[str, float]]:
         """Each trial's unknowns as its first samples say.
@@ -196,7 +181,7 @@ def _read_through(
 def _first_motion(
     model: Model, trials: Sequence[Trial], values: Mapping[str, float], start: Sequence[Mapping[str, float]]
 ) -> list[dict[str, float]]:
-    """Unknowns of trials with which a model follows their first samples best: Gauss-Newton on differences."""
+    """EachTrial of trials with which a model follows their first samples best: Gauss-Newton on differences."""
     rig, short = model.rig, [_first_samples(t) for t in trials]
     simulator, guess = Simulator(model, short), [dict(u) for u in start]
     names = rig.unknowns(short[0].kind)
@@ -243,7 +228,7 @@ class Block:
         measured: tuple[str, ...] = (),
     ) -> None:
         first, self.lanes, self.trials = trials[lanes[0]], lanes, [trials[i] for i in lanes]
-        self.rig, self.inputs = model.rig, model.driven_by(first)
+        self.model, self.rig, self.inputs = model, model.rig, model.driven_by(first)
         model = model.acting(first.kind, self.rig.input_columns(first))
         available = set(model.parameters()) | set(model.unknowns(first.kind))
         chosen, width = tuple(c for c in columns if c in available), width_of(len(lanes))
@@ -257,7 +242,7 @@ class Block:
         self.constants = np.array([[c.get(n, 0.0) for c in known] for n in self.layout.constants], dtype=float)
         self.constants = self.constants.reshape(-1, width)
         self.guess = np.array([self.rig.guess(t) for t in padded], dtype=float)
-        self._latest = LatestInputs()
+        self._latest = lru_cache(maxsize=1)(self._inputs)  # other threads ask for other ones
 
     def _inputs(self, shift: tuple[int, ...]) -> np.ndarray:
         """Inputs of all lanes, later by whole samples; before the trial begins they are as at rest: zero."""
@@ -267,40 +252,30 @@ class Block:
         """Write a constant of each lane; spare lanes are as the last trial."""
         constants[self.layout.constants.index(name)] = [*values, *[values[-1]] * (self.width - len(values))]
 
-    def _run(
-        self,
-        values: Mapping[str, float] | Sequence[Mapping[str, float]],
-        unknowns: Sequence[Mapping[str, float]],
-        delays: Sequence[float],
-        **known: Sequence[float],
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def _run(self, values: Values, unknowns: EachTrial, **known: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
         """What the program gives of all lanes; see `Program`.
 
         Parameters
         ----------
-        values, unknowns, delays
-            Of all trials: parameters, of each the same or its own; unknowns; delays, s.
+        values, unknowns
+            Of all trials.
         known
             Further constants of each lane.
         """
-        own = values if isinstance(values, Mapping) else [values[i] for i in self.lanes]
+        own = [values] * len(self.lanes) if isinstance(values, Mapping) else [values[i] for i in self.lanes]
         p, constants = lane_values(self.layout, own, [unknowns[i] for i in self.lanes]), self.constants.copy()
-        shift = tuple(math.floor(delays[i] / t.dt + 1e-9) for i, t in zip(self.lanes, self.trials, strict=True))
+        delays = [total_delay(self.model, v) for v in own]
+        shift = tuple(math.floor(late / t.dt + 1e-9) for late, t in zip(delays, self.trials, strict=True))
         for name, each in {**known, "shift": shift}.items():
             self._set(constants, name, each)
-        return self.program.run(self._latest.of(shift, self._inputs), p, constants, self.guess, self.substeps)
+        return self.program.run(self._latest(shift), p, constants, self.guess, self.substeps)
 
 
 class _Simulation(Block):
     """A block without measurements."""
 
-    def run(
-        self,
-        values: Mapping[str, float] | Sequence[Mapping[str, float]],
-        unknowns: Sequence[Mapping[str, float]],
-        delays: Sequence[float],
-    ) -> SimulatedBatch:
-        y, s = self._run(values, unknowns, delays)
+    def run(self, values: Values, unknowns: EachTrial) -> SimulatedBatch:
+        y, s = self._run(values, unknowns)
         for lane, trial in enumerate(self.trials):
             if len(trial) < self.count:
                 y[len(trial) :, :, lane] = s[len(trial) :, ..., lane] = 0.0
@@ -308,19 +283,13 @@ class _Simulation(Block):
         return SimulatedBatch(tuple(self.lanes), self.places, y, s)
 
 
-class LatestInputs:
-    """The inputs of a block that were asked for last: in one piece with what they are for, since other threads ask."""
-
-    def __init__(self) -> None:
-        self._held: tuple[tuple[int, ...] | None, np.ndarray] = None, np.empty(0)
-
-    def of(self, shift: tuple[int, ...], make: Callable[[tuple[int, ...]], np.ndarray]) -> np.ndarray:
-        """Those for a shift, made if others are held."""
-        known, u = self._held
-        if known != shift:
-            u = make(shift)
-            self._held = shift, u
-        return u
+def spread(sensitivities: np.ndarray, places: tuple[int, ...], width: int) -> np.ndarray:
+    """Sensitivities of a trial at their places among all columns, (n, outputs, width): zero where it has none."""
+    if len(places) == width:
+        return sensitivities
+    full = np.zeros((*sensitivities.shape[:2], width))
+    full[..., list(places)] = sensitivities
+    return full
 
 
 def side_by_side(
@@ -362,21 +331,12 @@ def lane_inputs(
     return u
 
 
-def lane_values(
-    layout: Layout, values: Mapping[str, float] | Sequence[Mapping[str, float]], unknowns: Sequence[Mapping[str, float]]
-) -> np.ndarray:
-    """Values of a program's parameters side by side, shape (values, width); spare lanes are as the last trial.
-
-    `values` of all trials, or those of each.
-    """
+def lane_values(layout: Layout, values: EachTrial, unknowns: EachTrial) -> np.ndarray:
+    """Values of a program's parameters, side by side, shape (values, width); spare lanes are as the last trial."""
     p = np.empty((len(layout.values), layout.width))
     for k, name in enumerate(layout.values):
-        known = unknowns if name in layout.unknowns else values
-        if isinstance(known, Mapping):
-            p[k] = known[name]
-        else:
-            own = [u[name] for u in known]
-            p[k] = own + [own[-1]] * (layout.width - len(own))
+        own = [known[name] for known in (unknowns if name in layout.unknowns else values)]
+        p[k] = own + [own[-1]] * (layout.width - len(own))
     return p
 
 
@@ -393,7 +353,7 @@ def is_delayed(model: Model) -> bool:
 def total_delay(model: Model, values: Mapping[str, float]) -> float:
     """Delay from stimulus to muscle in s, all effects together."""
     delay = 0.0
-    for effect in model.with_parameters(values).effects:
+    for effect in model.with_parameters(values).effects if is_delayed(model) else ():
         if effect.signal == "delay":
             delay = effect.apply(delay, None)
     return max(float(delay), 0.0)
