@@ -28,13 +28,7 @@ from fes_pin.data.numbers import instance
 from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.recorded.columns import Columns
 from fes_pin.data.recorded.hint import NEW_STUDY, read_csv_or_hint
-from fes_pin.data.schema import (
-    NumberKey,
-    RigSchema,
-    check_conditions,
-    checked_numbers,
-    schema_of,
-)
+from fes_pin.data.schema import NumberKey, RigSchema, check_conditions, checked_numbers, schema_of
 from fes_pin.data.show import frame
 from fes_pin.data.table import MIN_ROWS, Table, check_time, check_times, format_csv
 
@@ -442,12 +436,7 @@ def _body_columns(path: Path, inputs_only: bool) -> tuple[dict[str, np.ndarray],
 
 
 def read_body_trial(
-    coordinates: Path,
-    ground_reaction: Path,
-    *,
-    name: str,
-    conditions: Mapping[str, float],
-    **labels: Any,
+    coordinates: Path, ground_reaction: Path, *, name: str, conditions: Mapping[str, float], **labels: Any
 ) -> Trial:
     """Read a walking trial from its two files, on the coordinates' times; `labels` are further fields of it.
 
@@ -459,10 +448,7 @@ def read_body_trial(
     with hashing() as sha256:
         moves, in_degrees = read_motion(coordinates)
         pushes, _ = read_motion(ground_reaction)
-    recordings = (
-        (moves.time, coordinates_of(moves, in_degrees)),
-        (pushes.time, ground_reaction_of(pushes)),
-    )
+    recordings = ((moves.time, coordinates_of(moves, in_degrees)), (pushes.time, ground_reaction_of(pushes)))
     time, columns = on_common_time(*recordings[0], *recordings[1])
     if len(time) < MIN_ROWS:
         message = f"expected at least {MIN_ROWS} samples in the time of {coordinates.name}, found {len(time)}"

@@ -15,14 +15,7 @@ from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.schema import IMPOSED, START_S, RigSchema
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial, derived_trial
-from fes_pin.models.parameters import (
-    ANY_NUMBER,
-    ROTARY,
-    ParameterInfo,
-    check_parameters,
-    checked_number,
-    parameters_of,
-)
+from fes_pin.models.parameters import ANY_NUMBER, ROTARY, ParameterInfo, check_parameters, checked_number, parameters_of
 from fes_pin.models.rigs.stimuli import shaped
 from fes_pin.models.session import Session, checked_session, past_of
 from fes_pin.models.stage import Effect, Signals
