@@ -4,12 +4,8 @@ from __future__ import annotations
 
 import os
 import shlex
-import shutil
 import sys
-import tempfile
-import tomllib
 from collections.abc import Mapping
-from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -19,13 +15,12 @@ import typer
 from fes_pin.cli.group import needs, release_output
 from fes_pin.cli.options import Exclude, Libraries, Trials, output, pairs, study_of
 from fes_pin.cli.progress import catalogue_with
+from fes_pin.data.as_read import HeldFile
 from fes_pin.data.errors import InputError
-from fes_pin.data.files import check_folder, write_files
+from fes_pin.data.files import check_folder, read_bytes
 from fes_pin.data.outputs import Outputs
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from fes_pin.data.new_study import NewStudy
     from fes_pin.data.schema import RigSchema
     from fes_pin.data.study import Study
@@ -93,24 +88,24 @@ def new_study(
     template = _template(pendulum, rod, slide, upright)
     if template is not None and urdf is not None:
         raise InputError("expected one of --urdf, --pendulum, --rod and --slide, found several")
+    believed = template or urdf
     if not files:
         if template is None:
             raise InputError("expected recordings, or --pendulum LENGTH MASS for a URDF alone")
-        Outputs("new-study", force).write(out or Path(), {template[0]: template[1]})
-        typer.echo(f"wrote {(out or Path()) / template[0]}")
+        Outputs("new-study", force).write(out or Path(), {template.name: read_bytes(template)})
+        typer.echo(f"wrote {(out or Path()) / template.name}")
         return
     catalogue = load_library(*(library or []))
     given: dict[str, dict[str, str]] = {"columns": pairs("--column", column), "settings": pairs("--set", setting)}
     given |= {"role": pairs("--role", role), "group": pairs("--group", group)}
-    with _urdf_file(template, urdf) as path:
-        wanted = _wanted(files, rig, out, name, catalogue, template or urdf, path, resample, fill, given)
-        check_folder(wanted.folder)
-        if os.path.lexists(wanted.folder / "study.toml") and not force:
-            raise InputError("is there already; --force writes over it", file=wanted.folder / "study.toml")
-        if wanted.schema.owner is None:
-            made = new_body_study(wanted)
-        else:
-            made = make(wanted, lambda known: guess_start(wanted.schema.owner, known, path))
+    wanted = _wanted(files, rig, out, name, catalogue, believed, resample, fill, given)
+    check_folder(wanted.folder)
+    if os.path.lexists(wanted.folder / "study.toml") and not force:
+        raise InputError("is there already; --force writes over it", file=wanted.folder / "study.toml")
+    if wanted.schema.owner is None:
+        made = new_body_study(wanted)
+    else:
+        made = make(wanted, lambda known: guess_start(wanted.schema.owner, known, believed))
     outputs = Outputs("new-study", force)
     outputs.check(wanted.folder, made.contents)
     study, warnings = _tried(made, wanted, catalogue)
@@ -149,8 +144,8 @@ def check(
 
 def _template(
     pendulum: tuple[float, float] | None, rod: tuple[float, float] | None, slide: float | None, upright: bool
-) -> tuple[str, str] | None:
-    """Name and text of the URDF that was asked for."""
+) -> HeldFile | None:
+    """The URDF that was asked for, which is on no disk."""
     from fes_pin.data import templates
 
     turning = {"pendulum": pendulum, "rod": rod}
@@ -160,22 +155,10 @@ def _template(
         raise InputError("expected one of --pendulum, --rod and --slide, found several")
     for name, numbers in given.items():
         try:
-            return f"{name}.urdf", getattr(templates, name)(*numbers)
+            return HeldFile.holding(f"{name}.urdf", getattr(templates, name)(*numbers).encode())
         except InputError as error:
             raise InputError(error.message, column=f"--{name}") from None
     return None
-
-
-@contextmanager
-def _urdf_file(template: tuple[str, str] | None, urdf: Path | None) -> Iterator[Path | None]:
-    """The rig's URDF as a file, a template's in a folder of its own for as long."""
-    if template is None:
-        yield urdf
-        return
-    with tempfile.TemporaryDirectory(prefix="fes-pin-") as folder:
-        path = Path(folder) / template[0]
-        path.write_text(template[1])
-        yield path
 
 
 def _wanted(
@@ -184,16 +167,14 @@ def _wanted(
     out: Path | None,
     name: str | None,
     catalogue: Catalogue,
-    urdf: Path | tuple[str, str] | None,
-    urdf_file: Path | None,
+    urdf: Path | None,
     resample: float | None,
     fill: bool,
     given: Mapping[str, Mapping[str, str]],
 ) -> Wanted:
-    from fes_pin.data.urdf import is_revolute
     from fes_pin.data.wanted import Wanted
 
-    schema = _schema(rig, catalogue, urdf_file)
+    schema = _schema(rig, catalogue, urdf)
     if schema.owner is None and (urdf is not None or given["columns"] or resample or fill or catalogue.origins()):
         raise InputError("expected no URDF, --column, --resample, --fill or --library for walking", column="--rig")
     if resample == 0.0:
@@ -209,7 +190,6 @@ def _wanted(
         folder=folder,
         name=name or folder.absolute().name or "study",
         urdf=urdf,
-        revolute=is_revolute(urdf_file),
         columns=given["columns"],
         settings=settings,
         kind=None if schema.owner is None else settings.pop("kind", None),
@@ -247,22 +227,17 @@ def _tried(made: NewStudy, wanted: Wanted, catalogue: Catalogue) -> tuple[Study,
     InputError
         As `read_study`; of the files and options that were given, not of copies and of what is not written yet.
     """
-    from fes_pin.data.study import read_study
+    from fes_pin.data.study import study_of_text
     from fes_pin.diagnosis.checked import odd_numbers
 
-    folder = wanted.folder
-    with tempfile.TemporaryDirectory(prefix="fes-pin-") as scratch:
-        try:
-            study = read_study(_staged(made, folder, Path(scratch)), rigs=catalogue.schemas())
-            return study, odd_numbers(study)[1]
-        except InputError as error:
-            if error.file is None or not Path(error.file).is_relative_to(scratch):
-                raise
-            place = Path(error.file).relative_to(scratch).as_posix()
-            if place == "study.toml":
-                raise InputError(error.message, column=_option_of(error.column or "", wanted)) from None
-            file = folder if place == "." else made.origins.get(place, folder / place)
-            raise InputError(error.message, file=file, row=error.row, column=error.column) from None
+    text = str(made.contents["study.toml"])
+    try:
+        study = study_of_text(text, wanted.folder, made.origins, catalogue.schemas())
+        return study, odd_numbers(study)[1]
+    except InputError as error:
+        if error.file != wanted.folder / "study.toml":
+            raise
+        raise InputError(error.message, column=_option_of(error.column or "", wanted)) from None
 
 
 def _option_of(key: str, wanted: Wanted) -> str:
@@ -278,17 +253,3 @@ def _option_of(key: str, wanted: Wanted) -> str:
     if table.startswith("trial[") and wanted.schema.owner is not None:
         return f"--set {wanted.files[int(table[6:-1])].name}:{last}"
     return f"--set {last}"
-
-
-def _staged(made: NewStudy, folder: Path, scratch: Path) -> Path:
-    """A folder like the study's to be: what is made lies in it, and a copy of what stays where it is."""
-    text = made.contents["study.toml"]
-    assert isinstance(text, str)
-    rig = tomllib.loads(text).get("rig", {})
-    for place in [*made.origins, *([rig["urdf"]] if "urdf" in rig else [])]:
-        if place not in made.contents:
-            target = scratch / place
-            target.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(folder / place, target)
-    write_files(scratch, made.contents)
-    return scratch

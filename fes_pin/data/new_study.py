@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from fes_pin.data.as_read import HeldFile
 from fes_pin.data.errors import InputError, fault_at
 from fes_pin.data.files import inside, read_bytes
 from fes_pin.data.recorded.columns import INTERPOLATE
@@ -43,7 +44,7 @@ class NewStudy:
     taken
         The rig's column, the file's name of it and its unit, as a person wants to see them.
     origins
-        Where each recording lies, by its path below the study's folder.
+        Where each recording, and the URDF, lies, by its path below the study's folder.
     kinds
         Of its trials.
     """
@@ -107,7 +108,10 @@ class _Making:
         taken = tuple(
             (c, s.get("name", "from its rate"), source_in_words(s, c, self.wanted.revolute)) for c, s in sources.items()
         )
-        return NewStudy(contents, taken, dict(zip(places, self.wanted.files, strict=True)), tuple(kinds))
+        origins = dict(zip(places, self.wanted.files, strict=True))
+        if self.wanted.urdf is not None:
+            origins[files["urdf"]] = self.wanted.urdf
+        return NewStudy(contents, taken, origins, tuple(kinds))
 
     def _one_form(self) -> TextForm | None:
         forms = {p.form: p for p in self.proposals}
@@ -274,9 +278,9 @@ class _Making:
         urdf = self.wanted.urdf
         if urdf is None:
             return {}
-        if isinstance(urdf, tuple):
-            contents[urdf[0]] = urdf[1]
-            return {"urdf": urdf[0]}
+        if isinstance(urdf, HeldFile):  # a template, which is on no disk
+            contents[urdf.name] = read_bytes(urdf)
+            return {"urdf": urdf.name}
         return {"urdf": placed(urdf, self.wanted.folder, contents)}
 
     def _columns(self, sources: Mapping[str, Mapping[str, Any]]) -> list[str]:

@@ -44,7 +44,7 @@ from fes_pin.data.schema import (
 from fes_pin.data.show import by_columns, frame, table_html
 from fes_pin.data.study_tables import HORIZON, StudyTables, check_files
 from fes_pin.data.table import format_csv
-from fes_pin.data.toml import Document, read_toml
+from fes_pin.data.toml import Document, document_of, read_toml
 from fes_pin.data.trial import LOW_PASS, POSITIVE_HZ, Trial, check_trial, read_body_trial, read_trial, trial_csv
 
 if TYPE_CHECKING:
@@ -328,6 +328,17 @@ def read_study(path: str | Path, *, rigs: Rigs | None = None) -> Study:
     study = _Reader(document, known_rigs(rigs)).study()
     vars(study)["as_read"] = AsRead(sha256, study.digest())
     return study
+
+
+def study_of_text(text: str, folder: Path, elsewhere: Mapping[str, Path], rigs: Rigs) -> Study:
+    """The study that a folder will hold whose study.toml has this text, as `read_study`.
+
+    Parameters
+    ----------
+    elsewhere
+        Where files lie that are not in the folder yet, by their paths there.
+    """
+    return _Reader(document_of(text, folder / "study.toml", elsewhere), known_rigs(rigs)).study()
 
 
 def read_columns(path: str | Path, *, rigs: Rigs | None = None) -> Columns | None:

@@ -6,7 +6,7 @@ import re
 import tomllib
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +25,8 @@ class Document:
     path: Path
     data: dict[str, Any]
     rows: dict[str, int]
+    elsewhere: Mapping[str, Path] = field(default_factory=dict)
+    """Where files lie that are not below its folder yet, by the paths there."""
 
     def error(self, key: str, message: str) -> InputError:
         """The error that names this file, the line of a key (or of its table, if it is missing) and the key."""
@@ -81,6 +83,8 @@ class Document:
         InputError
             Not a path inside this file's folder, or no file there.
         """
+        if isinstance(value, str) and value in self.elsewhere:
+            return self.elsewhere[value]
         try:
             path = inside(self.path.parent, value)
         except ValueError as problem:
@@ -100,7 +104,11 @@ def read_toml(path: str | Path) -> Document:
         Not a readable file, or not TOML, with the line.
     """
     path = as_path(path)
-    text = read_text(path)
+    return document_of(read_text(path), path)
+
+
+def document_of(text: str, path: Path, elsewhere: Mapping[str, Path] | None = None) -> Document:
+    """The TOML file that a text is or would be, as `read_toml`."""
     try:
         data = tomllib.loads(text)
     except RecursionError:
@@ -110,7 +118,7 @@ def read_toml(path: str | Path) -> Document:
         row = int(found[1]) if found else (text.count("\n") + 1 if "end of document" in str(error) else None)
         message = str(error).split(" (at ")[0]
         raise InputError(f"not TOML: {message[:1].lower() + message[1:]}", file=path, row=row) from None
-    return Document(path, data, _rows(text))
+    return Document(path, data, _rows(text), elsewhere or {})
 
 
 def _rows(text: str) -> dict[str, int]:

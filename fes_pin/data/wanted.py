@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cached_property, partial
 from glob import escape
 from pathlib import Path
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import number_in
 from fes_pin.data.schema import ROLES, NumberKey, RigSchema, one_of
+from fes_pin.data.urdf import is_revolute
 
 Ask = Callable[[str], str]
 """Puts a question to a person and gives the answer."""
@@ -31,9 +32,7 @@ class Wanted:
     name
         Of the study.
     urdf
-        Of a rig that has one: a file, or the text of a template with its name.
-    revolute
-        Whether the rig's joint turns; None if it has none.
+        Of a rig that has one: a file, or a template that is held.
     columns
         By the rig's column what a person said of it: `NAME[:UNIT][,zero=...][,scale=...]`.
     settings
@@ -52,8 +51,7 @@ class Wanted:
     schema: RigSchema
     folder: Path
     name: str
-    urdf: Path | tuple[str, str] | None = None
-    revolute: bool | None = None
+    urdf: Path | None = None
     columns: Mapping[str, str] = field(default_factory=dict)
     settings: Mapping[str, str] = field(default_factory=dict)
     kind: str | None = None
@@ -61,6 +59,11 @@ class Wanted:
     resample_hz: float | None = None
     fill: bool = False
     ask: Ask | None = None
+
+    @cached_property
+    def revolute(self) -> bool | None:
+        """Whether the rig's joint turns; None if it has none."""
+        return is_revolute(self.urdf)
 
 
 def number_set(key: str, text: str, number: NumberKey) -> float:
