@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import os
-import sys
-import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from fes_pin.cli.group import VOICE, needs, remark
+from fes_pin.cli.group import needs
 from fes_pin.cli.options import Force, Libraries, output
+from fes_pin.cli.progress import progress
 
 if TYPE_CHECKING:
     from fes_pin.cohort.run import CohortProgress
@@ -41,7 +38,11 @@ def cohort(
     from fes_pin.cohort.run import run_cohort
     from fes_pin.data.provenance import this_command
 
-    with _progress() as tell:
+    with progress(SAID_EVERY_S) as tell:
+
+        def report(p: CohortProgress) -> None:
+            tell(p.done / p.total, f"{p.done} of {p.total}, {p.failed} failed, {_left(p.left_s)}, {p.name}")
+
         made = run_cohort(
             studies,
             out,
@@ -52,7 +53,7 @@ def cohort(
             library=tuple(library or ()),
             command=this_command(),
             force=force,
-            progress=tell,
+            progress=report,
         )
     good = len(made.studies) - len(made.failed)
     typer.echo(f"{good} of {len(made.studies)} studies diagnosed")
@@ -61,31 +62,6 @@ def cohort(
     for row in made.failed:
         typer.echo(f"failed: {row['study']}: {row['error']}", err=True)
     typer.echo(f"page: {out / 'cohort.html'}")
-
-
-@contextmanager
-def _progress() -> Iterator[Callable[[CohortProgress], None]]:
-    """A bar with the time left on standard error if a person is watching, a line now and then if not."""
-    if VOICE.get() or not sys.stderr.isatty():
-        said = [0.0]
-
-        def line(p: CohortProgress) -> None:
-            if time.monotonic() - said[0] > SAID_EVERY_S or VOICE.get() > 0 or p.done == p.total:
-                said[0] = time.monotonic()
-                remark(f"fes-pin: {p.done} of {p.total}, {p.failed} failed, {_left(p.left_s)}")
-
-        yield line
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
-    from rich.progress import Progress as Bar
-
-    columns = (BarColumn(), MofNCompleteColumn(), TextColumn("{task.description}"))
-    with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("", total=None)
-        yield lambda p: bar.update(
-            task, total=p.total, completed=p.done, description=f"{p.failed} failed, {_left(p.left_s)}, {p.name}"
-        )
 
 
 def _left(seconds: float | None) -> str:

@@ -23,16 +23,8 @@ from fes_pin.data.errors import InputError
 
 app = App(pretty_exceptions_enable=False)
 app.add_typer(body, name="body")
-app.command()(allocate)
-app.command()(new_study)
-app.command()(check)
-app.command()(urdf)
-app.command()(datasets)
-app.command()(pulses)
-app.command()(cohort)
-app.command()(contrast)
-app.command()(compare)
-app.command()(predict)
+for command in (allocate, new_study, check, urdf, datasets, pulses, cohort, contrast, compare, predict):
+    app.command()(command)
 
 DIAGNOSING = 0.8
 """Share of the time of `diagnose` before the report is drawn, about."""

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
@@ -28,11 +30,21 @@ def say_whose_code(catalogue: Catalogue) -> None:
 
 
 @contextmanager
-def progress() -> Iterator[Callable[[float, str], None]]:
-    """A progress bar on standard error, if a person is watching; lines with --verbose, nothing with --quiet."""
+def progress(every_s: float = math.inf) -> Iterator[Callable[[float, str], None]]:
+    """A progress bar on standard error, if a person is watching; lines with --verbose, nothing with --quiet.
+
+    Where nobody watches there is a line every so many seconds, and at the end, without --verbose as well.
+    """
     if VOICE.get() < 0 or not sys.stderr.isatty():
-        loud = VOICE.get() > 0
-        yield lambda share, words: remark(f"fes-pin: {share:4.0%} {words}") if loud else None
+        said = [time.monotonic()]
+
+        def line(share: float, words: str) -> None:
+            due = time.monotonic() - said[0] > every_s or (share == 1.0 and every_s < math.inf)
+            if VOICE.get() > 0 or due:
+                said[0] = time.monotonic()
+                remark(f"fes-pin: {share:4.0%} {words}")
+
+        yield line
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn

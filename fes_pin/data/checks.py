@@ -70,17 +70,6 @@ def checked_label(value: object, error: KeyFault, key: str = "group", what: str 
     return value
 
 
-def checked_role(value: object, error: KeyFault) -> str:
-    """The role of a trial.
-
-    Raises
-    ------
-    InputError
-        Made by `error`, for any other word.
-    """
-    return one_of(value, ROLES, partial(error, "role"))
-
-
 def check_labels(name: object, role: object, group: object, error: KeyFault) -> None:
     """Require of a trial's name, role and group that they are such; role and group may be None.
 
@@ -91,7 +80,7 @@ def check_labels(name: object, role: object, group: object, error: KeyFault) -> 
     """
     checked_label(name, error, "name", "a name")
     if role is not None:
-        checked_role(role, error)
+        one_of(role, ROLES, partial(error, "role"))
     if group is not None:
         checked_label(group, error)
 

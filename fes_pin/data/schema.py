@@ -7,11 +7,12 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from functools import partial
-from numbers import Real
 from typing import Any
 
+import numpy as np
+
 from fes_pin.data.errors import KeyFault
-from fes_pin.data.numbers import instance
+from fes_pin.data.numbers import as_number, instance
 from fes_pin.data.read_only import ReadOnly
 
 ROLES = ("fit", "held_out")
@@ -63,12 +64,9 @@ class NumberKey:
         Exception
             What `error` makes of a message, for what is not a number, not finite, or out of bounds.
         """
-        if isinstance(value, bool) or not isinstance(value, Real):
+        number = as_number(value)
+        if number is None:
             raise error(f"expected a number{self._unit()}, found {_kind_of(value)}")
-        try:
-            number = float(value)
-        except OverflowError:
-            number = math.inf
         if not math.isfinite(number):
             raise error(f"expected a finite number{self._unit()}, found {_short(value)}")
         if number < self.lower or (self.strict and number == self.lower):
@@ -379,4 +377,4 @@ def _kind_of(value: object) -> str:
 def _short(value: object) -> str:
     if isinstance(value, int) and value.bit_length() > 100:
         return "an integer of many digits"
-    return repr(value)
+    return repr(value.item() if isinstance(value, np.generic) else value)

@@ -7,7 +7,6 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache, partial
-from numbers import Real
 from typing import Any, Concatenate, ParamSpec
 
 from fes_pin.data.errors import InputError
@@ -122,8 +121,7 @@ def checked_number(value: Any, name: str, key: NumberKey = ANY_NUMBER) -> float:
     InputError
         Not a number, not finite, or out of its bounds; names it by `name`.
     """
-    number = float(value) if isinstance(value, Real) and not isinstance(value, bool) else value
-    return key.check(number, partial(InputError, column=name))
+    return key.check(value, partial(InputError, column=name))
 
 
 def check_parameters(thing: Any, keys: Mapping[str, NumberKey] | None = None) -> None:

@@ -14,7 +14,7 @@ import numpy as np
 from fes_pin.data.imposed import MOTION, driving_values
 from fes_pin.data.trial import Trial, derived_trial
 from fes_pin.models.accepted import accepted_trials
-from fes_pin.models.compile.layout import Layout, widest, width_of
+from fes_pin.models.compile.layout import Layout, make_layout, widest, width_of
 from fes_pin.models.compile.program import Program, compiled_program
 from fes_pin.models.least_squares import least_squares
 from fes_pin.models.model import Model
@@ -232,8 +232,8 @@ class Block:
         model = model.acting(first.kind, self.rig.input_columns(first))
         available = set(model.parameters()) | set(model.unknowns(first.kind))
         chosen, width = tuple(c for c in columns if c in available), width_of(len(lanes))
-        self.program: Program = compiled_program(model, first.kind, self.inputs, chosen, measured, width)
-        self.layout, self.width = self.program.layout, width
+        self.layout, self.width = make_layout(model, first.kind, self.inputs, chosen, measured, width), width
+        self.program: Program = compiled_program(model, self.layout)
         self.places = tuple(columns.index(n) for n in self.layout.columns)
         self.substeps = substeps(model, first.dt, max_step_s)
         self.count = max(len(t) for t in self.trials)

@@ -105,9 +105,9 @@ def test_the_environment_chooses_the_engine(fresh, monkeypatch):
     expected = answer()
     monkeypatch.setenv("FES_PIN_ENGINE", "casadi")
     assert answer() == pytest.approx(expected, abs=1e-10)
-    assert isinstance(program.compiled_program(*BARE_MUSCLE), VirtualProgram)
+    assert isinstance(program.compiled_program(BARE_MUSCLE[0], make_layout(*BARE_MUSCLE)), VirtualProgram)
     monkeypatch.setenv("FES_PIN_ENGINE", "llvm")
-    assert isinstance(program.compiled_program(*BARE_MUSCLE), native.NativeProgram)
+    assert isinstance(program.compiled_program(BARE_MUSCLE[0], make_layout(*BARE_MUSCLE)), native.NativeProgram)
     monkeypatch.setenv("FES_PIN_ENGINE", "abacus")
     with pytest.raises(InputError, match="FES_PIN_ENGINE: expected llvm or casadi, found 'abacus'"):
         answer()

@@ -97,7 +97,21 @@ def make_layout(
     measured: tuple[str, ...] = (),
     width: int = WIDTH,
 ) -> Layout:
-    """The layout of a model's program for trials of a kind with these input columns."""
+    """The layout of a model's program.
+
+    Parameters
+    ----------
+    kind
+        Kind of trial.
+    inputs
+        Input columns of the trials.
+    columns
+        Parameters and unknowns to give sensitivities for.
+    measured
+        Outputs whose measurement corrects the states, for a predictor.
+    width
+        Lanes that run side by side.
+    """
     rig = model.rig
     noise: tuple[str, ...] = ()  # of a predictor: deviations of reading noise and initial states, of random states too
     if measured:

@@ -14,7 +14,7 @@ import numpy as np
 from fes_pin import settings
 from fes_pin.models.compile.disk_cache import read_cached, write_cached
 from fes_pin.models.compile.equations import Equations, derive
-from fes_pin.models.compile.layout import WIDTH, Layout, make_layout
+from fes_pin.models.compile.layout import Layout
 from fes_pin.models.compile.predictor import derive_predictor
 from fes_pin.models.compile.virtual import VirtualProgram
 from fes_pin.models.model import Model
@@ -57,35 +57,15 @@ _LOCK = threading.Lock()  # CasADi's expressions are not made for two threads
 _PROGRAMS: dict[tuple[str, str, tuple[type, ...], Layout], Program] = {}
 
 
-def compiled_program(
-    model: Model,
-    kind: str,
-    inputs: tuple[str, ...],
-    columns: tuple[str, ...],
-    measured: tuple[str, ...] = (),
-    width: int = WIDTH,
-) -> Program:
-    """The program of a model, compiled if it was not before.
-
-    Parameters
-    ----------
-    kind
-        Kind of trial.
-    inputs
-        Input columns of the trials.
-    columns
-        Parameters and unknowns to give sensitivities for.
-    measured
-        Outputs whose measurement corrects the states, for a predictor.
-    width
-        Lanes that run side by side.
+def compiled_program(model: Model, layout: Layout) -> Program:
+    """The program of a model, compiled if it was not before; see `make_layout`.
 
     Raises
     ------
     InputError
         If FES_PIN_ENGINE names no engine, or FES_PIN_CPU no processor.
     """
-    layout, engine = make_layout(model, kind, inputs, columns, measured, width), settings.engine()
+    engine = settings.engine()
     key = (engine, settings.processor(), _classes(model), layout)
     if key not in _PROGRAMS:
         with _LOCK:

@@ -126,9 +126,6 @@ class Ankle(Rig):
     def memories(self, kind: str) -> tuple[str, ...]:
         return ("r", "r_before", "rest") if kind == "motion" else ("r", "r_before")
 
-    def outputs(self, kind: str) -> tuple[str, ...]:
-        return (self.schema.outputs[kind],)
-
     def input_columns(self, trial: Trial) -> tuple[str, ...]:
         return ("pulse_width_us", *self.schema.motion(trial.kind))
 

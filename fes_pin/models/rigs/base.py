@@ -197,8 +197,8 @@ class Rig(ReadOnly):
         return self.outputs(kind)[0]
 
     def outputs(self, kind: str) -> tuple[str, ...]:
-        """Names of the columns that the model predicts."""
-        raise NotImplementedError
+        """Names of the columns that the model predicts: the one that the schema has, by default."""
+        return (self.schema.outputs[kind],)
 
     def input_columns(self, trial: Trial) -> tuple[str, ...]:
         """Columns of a trial that drive the model, an imposed motion among them."""

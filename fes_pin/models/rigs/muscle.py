@@ -86,9 +86,6 @@ class Muscle(Rig):
     def memories(self, kind: str) -> tuple[str, ...]:
         return ("r", "r_before")
 
-    def outputs(self, kind: str) -> tuple[str, ...]:
-        return ("force_n",)
-
     def input_columns(self, trial: Trial) -> tuple[str, ...]:
         stimulus = "stim" if "stim" in trial.columns else "pulse_width_us"
         return (stimulus, *self.schema.motion(trial.kind))
@@ -97,13 +94,9 @@ class Muscle(Rig):
         return ("threshold_us", "saturation_us", "pulse_period_s", "length_m")
 
     def trial_constants(self, trial: Trial) -> dict[str, float]:
-        pulsed = [trial] if "stim" in trial.columns else []
-        return {
-            "threshold_us": float(self.constants.get("threshold_us", 0.0)),
-            "saturation_us": float(self.constants.get("saturation_us", 1.0)),
-            "length_m": float(self.constants.get("length_m", 0.0)),
-            "pulse_period_s": float(self.constants.get("pulse_period_s", pulse_period(pulsed))),
-        }
+        period = pulse_period([trial] if "stim" in trial.columns else [])
+        known = {"threshold_us": 0.0, "saturation_us": 1.0, "length_m": 0.0, "pulse_period_s": period}
+        return {name: float(self.constants.get(name, value)) for name, value in known.items()}
 
     def recruited(self, trial: Trial) -> np.ndarray:
         known = self.trial_constants(trial)
