@@ -29,7 +29,7 @@ class ContrastWeighed(Weighed):
     said: Sequence[str]
 
 
-Judgement = State[Grouped, ContrastWeighed]
+Judgement = State[Grouped, ContrastModels, ContrastWeighed]
 
 
 class ContrastVerdict(Verdict[Grouped, ContrastModels, ContrastWeighed]):

@@ -70,16 +70,18 @@ W = TypeVar("W", bound=Weighed)
 
 
 @dataclass(frozen=True)
-class State(Generic[F, W]):
+class State(Generic[F, M, W]):
     """A verdict on its way.
 
     Attributes
     ----------
+    search
+        The search, by one estimator, that the set is of.
     found
         A set of candidates, its rivals, and the set less each candidate.
     weighed
         What the data say of it.
-    refused
+    rejected
         Candidates that no answer may hold.
     settled
         The set for which rivals were searched last.
@@ -87,14 +89,18 @@ class State(Generic[F, W]):
         Sets that were tried in another form.
     steps
         The claims that changed the state, in their order.
+    replaced
+        The state of another estimator of the same data, in whose place this one is; None if no estimator was replaced.
     """
 
+    search: Search[F, M]
     found: SearchResult[F]
     weighed: W
     rejected: Mapping[str, Rejected]
     settled: frozenset[str]
     formed: frozenset[frozenset[str]] = frozenset()
     steps: tuple[str, ...] = ()
+    replaced: State[F, M, W] | None = None
 
     @property
     def names(self) -> frozenset[str]:
@@ -107,7 +113,7 @@ class State(Generic[F, W]):
         return sorted(sorted(self.names), key=lambda n: self.weighed.gains[n].low)
 
 
-Claim = Callable[[State[F, W]], State[F, W] | None]
+Claim = Callable[[State[F, M, W]], State[F, M, W] | None]
 
 
 class Verdict(ABC, Generic[F, M, W]):
@@ -121,22 +127,23 @@ class Verdict(ABC, Generic[F, M, W]):
 
     def __init__(self, search: Search[F, M]) -> None:
         self.search = search
-        self.claims: Sequence[Claim[F, W]] = (
+        self.claims: Sequence[Claim[F, M, W]] = (
             self.drop_unsupported,
             self.settle,
             self.drop_rarely_chosen,
             self.try_another_form,
+            self.switch_estimator,
         )
 
     @abstractmethod
     def weigh(self, found: SearchResult[F]) -> W:
         """What data held out, and the tests of lack of fit, say of a set."""
 
-    def lack_of_fit(self, state: State[F, W]) -> LackOfFit:
-        """What is left by a set, and by the candidates that were refused beside it."""
+    def lack_of_fit(self, state: State[F, M, W]) -> LackOfFit:
+        """What is left by a set, and by the candidates that were rejected beside it."""
         return state.weighed.lack_of_fit
 
-    def unsupported(self, state: State[F, W]) -> list[str]:
+    def unsupported(self, state: State[F, M, W]) -> list[str]:
         """Candidates that data held out do not speak for."""
         weighed, names = state.weighed, state.names
         if not weighed.evidence:
@@ -145,54 +152,85 @@ class Verdict(ABC, Generic[F, M, W]):
         known = {n: None if open_ else weighed.evidence[n] for n in names}
         return [n for n, e in known.items() if not speaks_for(e, weighed.gains[n], alone=len(names) == 1)]
 
-    def is_rarely_chosen(self, state: State[F, W], name: str) -> bool:
+    def is_rarely_chosen(self, state: State[F, M, W], name: str) -> bool:
         """Whether most folds of the data choose a set without a candidate."""
         return False
 
-    def of(self, found: SearchResult[F]) -> State[F, W]:
-        """The state that no claim objects to."""
-        state = State(found, self.weigh(found), {}, frozenset(found.without))
+    def by_another_estimator(self, state: State[F, M, W]) -> State[F, M, W] | None:
+        """The verdict by another estimator of the same data; None where there is none, or where it has no say."""
+        return None
+
+    def prediction_error(self, state: State[F, M, W]) -> float:
+        """Error of the fitted data, each predicted by a fit to the others: by it an estimator is chosen."""
+        raise NotImplementedError
+
+    def of(
+        self, found: SearchResult[F], search: Search[F, M] | None = None, replaced: State[F, M, W] | None = None
+    ) -> State[F, M, W]:
+        """The state that no claim objects to.
+
+        Parameters
+        ----------
+        found
+            A set that a search found.
+        search
+            That search; by default the verdict's own.
+        replaced
+            The state by another estimator, in whose place this one may be.
+        """
+        weighed, settled = self.weigh(found), frozenset(found.without)
+        state = State(search or self.search, found, weighed, {}, settled, replaced=replaced)
         while True:
             for claim in self.claims:
                 if (changed := claim(state)) is not None:
-                    state = replace(changed, steps=(*state.steps, claim.__name__))
+                    state = replace(changed, steps=(*changed.steps, claim.__name__))
                     break
             else:
                 return state
 
-    def drop_unsupported(self, state: State[F, W]) -> State[F, W] | None:
+    def drop_unsupported(self, state: State[F, M, W]) -> State[F, M, W] | None:
         """Refuse the weakest of the candidates that data held out do not speak for."""
         return self._without_weakest(state, self.unsupported(state))
 
-    def settle(self, state: State[F, W]) -> State[F, W] | None:
+    def settle(self, state: State[F, M, W]) -> State[F, M, W] | None:
         """Search the rivals of a set that candidates were taken from."""
         if state.names == state.settled:
             return None
-        found = self.search.settle(tuple(sorted(state.names)), state.rejected)
+        found = state.search.settle(tuple(sorted(state.names)), state.rejected)
         return replace(state, found=found, weighed=self.weigh(found), settled=state.names)
 
-    def drop_rarely_chosen(self, state: State[F, W]) -> State[F, W] | None:
+    def drop_rarely_chosen(self, state: State[F, M, W]) -> State[F, M, W] | None:
         """Refuse the weakest of the candidates that most folds of the data do not choose."""
         return self._without_weakest(state, [n for n in state.names if self.is_rarely_chosen(state, n)])
 
-    def try_another_form(self, state: State[F, W]) -> State[F, W] | None:
-        """Where something is left, give the set a form that was reached another way; what was refused may come back."""
+    def try_another_form(self, state: State[F, M, W]) -> State[F, M, W] | None:
+        """Where a lack of fit remains, give the set a form that was reached another way; rejected causes may return."""
         names = tuple(sorted(state.names))
         if not self.lack_of_fit(state).unexplained or state.names in state.formed:
             return None
-        if not self.search.form_otherwise(names):
+        if not state.search.form_otherwise(names):
             return None
-        found = self.search.settle(names)
+        found = state.search.settle(names)
         settled, formed = frozenset(found.without), state.formed | {state.names}
         return replace(state, found=found, weighed=self.weigh(found), rejected={}, settled=settled, formed=formed)
 
-    def _without_weakest(self, state: State[F, W], some: Sequence[str]) -> State[F, W] | None:
+    def switch_estimator(self, state: State[F, M, W]) -> State[F, M, W] | None:
+        """Take the verdict of another estimator of the same data where that predicts them better; this is tried once.
+
+        Data that the study itself holds out have no say in it: gains on them would be optimistic.
+        """
+        other = None if state.replaced else self.by_another_estimator(state)
+        if other is None or not self.prediction_error(other) < self.prediction_error(state):
+            return None
+        return replace(other, steps=(*state.steps, *other.steps))
+
+    def _without_weakest(self, state: State[F, M, W], some: Sequence[str]) -> State[F, M, W] | None:
         """The set less the weakest of some of its candidates; None if these are none."""
         weakest = next((n for n in state.weak if n in some), None)
         if weakest is None:
             return None
         rejected = {**state.rejected, weakest: rejection_from(state.found, weakest, state.weighed.gains[weakest])}
-        found = self.search.result(tuple(sorted(state.names - {weakest})))
+        found = state.search.result(tuple(sorted(state.names - {weakest})))
         return replace(state, found=found, weighed=self.weigh(found), rejected=rejected)
 
 

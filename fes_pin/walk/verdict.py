@@ -32,7 +32,7 @@ class WalkWeighed(Weighed):
     other_leg: Mapping[str, float | None]
 
 
-Judgement = State[WalkFit, WalkWeighed]
+Judgement = State[WalkFit, WalkModels, WalkWeighed]
 
 
 class WalkVerdict(Verdict[WalkFit, WalkModels, WalkWeighed]):

@@ -1,15 +1,16 @@
 """The choice between two estimators of the same trials."""
 
-from dataclasses import replace
+from types import SimpleNamespace
 
-import numpy as np
 import pytest
 from diagnosis.hidden import study_of
 
 from fes_pin.data.trial import derived_trial
 from fes_pin.diagnosis.search.likelihood_fits import MEASUREMENT
 from fes_pin.diagnosis.search.likelihood_models import LikelihoodModels, LikelihoodSearch
-from fes_pin.diagnosis.verdict import error_within, judged_of
+from fes_pin.diagnosis.verdict import RigVerdict, RigWeighed
+from fes_pin.infer.result import Remainder
+from fes_pin.infer.verdict import State
 from fes_pin.models.nominal import nominal_model
 
 
@@ -21,10 +22,25 @@ def test_trials_that_the_study_holds_out_do_not_choose_between_estimators():
     search = LikelihoodSearch(models, lambda share, words: None)
     found = search.run()
     columns = {n: -v if n == "position" else v for n, v in held.columns.items()}
-    one, other, none = (
-        judged_of(search, found, test, 0) for test in ([held], [derived_trial(held, columns=columns)], [])
-    )
-    assert one.held_out_ahead[1].free < 1.0 < 100.0 < other.held_out_ahead[1].free
-    assert error_within(one, models) == error_within(other, models)
-    assert error_within(one, models) == pytest.approx(none.held_out_ahead[1].free, rel=1e-9)
-    assert np.isfinite(error_within(replace(none, held_out_ahead=None), models))
+    verdicts = [RigVerdict(search, test, 0) for test in ([held], [derived_trial(held, columns=columns)], [])]
+    states = [v.of(found) for v in verdicts]
+    one, other, none = (v.held_out_errors(s)[1].free for v, s in zip(verdicts, states, strict=True))
+    assert one < 1.0 < 100.0 < other
+    errors = [v.prediction_error(s) for v, s in zip(verdicts, states, strict=True)]
+    assert errors[0] == errors[1] == pytest.approx(none, rel=1e-9)
+    assert errors[2] == none
+
+
+@pytest.mark.parametrize("own", [True, False])
+@pytest.mark.parametrize("replaced", [True, False])
+def test_a_lack_of_fit_by_either_estimator_stays(own, replaced):
+    verdict = RigVerdict(SimpleNamespace(models=SimpleNamespace(library=SimpleNamespace(effects=()))), (), 0)
+
+    def state(unexplained, before=None):
+        left = Remainder(unexplained, 1e-6 if unexplained else 0.5, "rate" if unexplained else None)
+        weighed = RigWeighed({}, {}, left, (), (), None)
+        return State(None, SimpleNamespace(without={}), weighed, {}, frozenset(), replaced=before)
+
+    left, reason = verdict.remainder(state(own, state(replaced)))
+    assert left.unexplained is (own or replaced)
+    assert reason is None

@@ -1,6 +1,5 @@
 """Arms behind an elastic drive: what passes for a random effort that lasts, and what a model explains by itself."""
 
-from dataclasses import fields, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,14 +8,12 @@ from driven_rigs.arm import CAUSES, draw_arm
 
 from fes_pin.data.study import read_study
 from fes_pin.diagnosis.diagnosis import diagnose_joint
-from fes_pin.diagnosis.errors_ahead import Ahead, errors_ahead
+from fes_pin.diagnosis.errors_ahead import errors_ahead
 from fes_pin.diagnosis.estimators import found_with_white_process_noise
 from fes_pin.diagnosis.search.likelihood_maxima import LikelihoodMaxima
-from fes_pin.diagnosis.verdict import Judged, _predicting_better
 from fes_pin.identify.likelihood_fit import with_white_process_noise
 from fes_pin.identify.process_noise import first_guess, without_memory
 from fes_pin.infer.levels import CONFIDENCE_95
-from fes_pin.infer.result import Remainder
 from fes_pin.infer.scatter import as_wide_as_estimates_differ, with_honest_intervals
 from fes_pin.models.effects.coulomb_friction import CoulombFriction
 from fes_pin.models.model import Model
@@ -84,20 +81,6 @@ def test_a_diagnosis_names_the_friction_as_large_as_it_is(seed, tmp_path):
     found = diagnose_joint(read_study(drawn.study))
     assert "coulomb_friction" in [c.name for c in found.causes]
     assert all(abs(found.extended.values[n] / v - 1.0) < 0.1 for n, v in drawn.truth.items())
-
-
-@pytest.mark.parametrize(("ahead", "taken"), [(0.5, True), (1.0, False), (2.0, False)])
-@pytest.mark.parametrize("unexplained", [True, False])
-def test_what_errs_less_over_the_horizon_is_taken_and_what_is_left_by_either_stays(ahead, taken, unexplained):
-    nothing, left = Remainder(False, 1.0, None), Remainder(unexplained, 1e-6, "rate")
-    empty = Judged(**dict.fromkeys(f.name for f in fields(Judged)))
-    one, other = (
-        replace(empty, left=what, ahead=(None, Ahead(1.0, error, None)), horizon_s=error)
-        for what, error in ((left, 1.0), (nothing, ahead))
-    )
-    chosen = _predicting_better(other, one)
-    assert chosen.horizon_s == (ahead if taken else 1.0)
-    assert chosen.left.unexplained is unexplained
 
 
 @pytest.mark.parametrize(

@@ -27,7 +27,7 @@ def unsupported(evidence, low, random):
     gains = {"coulomb_friction": Gain(low + 1.0, low, low + 2.0)}
     found = SimpleNamespace(without={"coulomb_friction": None})
     return verdict.unsupported(
-        State(found, RigWeighed(gains, evidence, NOTHING, (), random, None), {}, frozenset(gains))
+        State(None, found, RigWeighed(gains, evidence, NOTHING, (), random, None), {}, frozenset(gains))
     )
 
 

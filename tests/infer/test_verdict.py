@@ -20,7 +20,7 @@ def gain(low):
 
 def state(gains, evidence, left=NOISE):
     found = SimpleNamespace(without=dict.fromkeys(gains))
-    return State(found, Weighed(gains, evidence, left), {}, frozenset(gains))
+    return State(None, found, Weighed(gains, evidence, left), {}, frozenset(gains))
 
 
 class Claims(Verdict):
@@ -103,3 +103,31 @@ def test_what_one_run_alone_shows_is_refused_and_said_to_be_refused(judged):
     found = judged(runs, x)
     assert found.names == frozenset() and "drop_unsupported" in found.steps
     assert "x07" in found.rejected and found.rejected["x07"].p_value < 1e-3
+
+
+class TwoEstimators(Claims):
+    """Another estimator of the same data, whose prediction error is given."""
+
+    def __init__(self, error):
+        super().__init__(SimpleNamespace())
+        self.claims = (self.switch_estimator,)
+        self.asked, self.error = 0, error
+
+    def weigh(self, found):
+        return Weighed({}, {}, NOISE)
+
+    def by_another_estimator(self, state):
+        self.asked += 1
+        return self.of(SimpleNamespace(without={"friction": None}), replaced=state)
+
+    def prediction_error(self, state):
+        return 1.0 if state.replaced is None else self.error
+
+
+@pytest.mark.parametrize(("error", "names"), [(0.5, {"friction"}), (1.0, {"spring"}), (2.0, {"spring"})])
+def test_another_estimator_is_asked_once_and_taken_where_it_predicts_better(error, names):
+    verdict = TwoEstimators(error)
+    found = verdict.of(SimpleNamespace(without={"spring": None}))
+    assert found.names == names and verdict.asked == 1
+    assert found.steps == (("switch_estimator",) if error < 1.0 else ())
+    assert (found.replaced is not None) == (error < 1.0)

@@ -1,0 +1,101 @@
+"""The diagnosis that reports a verdict on a rig."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from fes_pin.data.study import Study
+from fes_pin.data.trial import Trial
+from fes_pin.diagnosis.decide.chosen_again import share_of
+from fes_pin.diagnosis.decide.rivals import estimates, experiment, not_identifiable, ranking
+from fes_pin.diagnosis.errors_ahead import AheadErrors, free_errors, noise_that_is_small
+from fes_pin.diagnosis.estimators import WHITE_PROCESS_NOISE
+from fes_pin.diagnosis.result import Diagnosis
+from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodSearch
+from fes_pin.diagnosis.verdict import RigState, RigVerdict, alike_in
+from fes_pin.identify.correlation_time import words_of_reading
+from fes_pin.identify.likelihood import is_simulated
+from fes_pin.identify.likelihood_fit import LikelihoodFit
+from fes_pin.infer.result import CROSS_VALIDATED, FITTED, HELD_OUT, Cause
+from fes_pin.infer.scatter import as_wide_as_estimates_differ, as_wide_as_trials_differ, with_honest_intervals
+from fes_pin.infer.verdict import share_in, word_of
+from fes_pin.models.stage import Effect
+
+
+def _ceiling(fitted: LikelihoodFit) -> float:
+    """E of the reading noise alone, percent: of a simulation where there is no process noise."""
+    if is_simulated(fitted.noise, fitted.trials):
+        return free_errors(fitted.model, fitted.trials, noise_that_is_small(fitted)).ceiling_percent()
+    rig = fitted.model.rig
+    columns = [(t[rig.output(t.kind)], fitted.noise.white[rig.output(t.kind)] ** 2) for t in fitted.trials]
+    noise = sum(float(np.isfinite(y).sum()) * variance for y, variance in columns)
+    return 100.0 * noise / max(sum(float(np.nansum((y - np.nanmean(y)) ** 2)) for y, _ in columns), 1e-300)
+
+
+def diagnosis_of(
+    study: Study, search: LikelihoodSearch, found: Found, trials: tuple[list[Trial], list[Trial]], seed: int
+) -> Diagnosis:
+    """The diagnosis of a rig by the likelihood, from a search that has run."""
+    verdict = RigVerdict(search, trials[1], seed)
+    state = verdict.of(found)
+    found, (left, reason) = state.found, verdict.remainder(state)
+    again = [f.best for f in state.weighed.folds if f.within]
+    best, other = as_wide_as_trials_differ(with_honest_intervals(found.best), again), verdict.by_the_other(state)
+    if other is not None:
+        best = as_wide_as_estimates_differ(best, other)
+    fitted, held = verdict.errors(state), verdict.held_out_errors(state)
+    on = HELD_OUT if trials[1] else CROSS_VALIDATED if held else FITTED
+    causes = [_cause(verdict, state, one, best, on) for one in best.model.effects]
+    causes.sort(key=lambda c: -c.gain_held_out.percent)
+    return Diagnosis(
+        study=study,
+        verdict=word_of(bool(causes), left),
+        causes=tuple(causes),
+        remainder=left,
+        absorbed=not_identifiable(best, search.models.scored(found), search.models.library.not_excited()),
+        nominal=found.nominal,
+        extended=best,
+        nominal_error=(fitted[0].free, held[0].free if held else None),
+        extended_error=(fitted[1].free, held[1].free if held else None),
+        ceiling_percent=_ceiling(found.best),
+        next_experiment=experiment(best, found.rivals, causes, study),
+        ranking=ranking(best, found.rivals),
+        held_out_by=on,
+        left_out={},
+        wall_s=0.0,
+        warnings=_words(best, trials[0]),
+        random=state.weighed.random,
+        is_driven=search.models.judged_s is not None,
+        reason=reason,
+        ahead=AheadErrors(search.models.horizon_s, *fitted, *(held or (None, None))),
+    )
+
+
+def _words(fitted: LikelihoodFit, trials: Sequence[Trial]) -> tuple[str, ...]:
+    """What is to be said of what is random in a fit."""
+    said = words_of_reading(fitted.noise, fitted.model.rig, trials)
+    return (*said, WHITE_PROCESS_NOISE) if fitted.noise.timed else said
+
+
+def _cause(verdict: RigVerdict, state: RigState, one: Effect, best: LikelihoodFit, on: str) -> Cause:
+    """What is reported of one cause; `best` has intervals as wide as its scores scatter.
+
+    Its gains are found `on` such data. A likelihood is no evidence where the model leaves more than noise.
+    """
+    found, name, weighed = state.found, one.name, state.weighed
+    evidence = None if weighed.lack_of_fit.unexplained else weighed.evidence.get(name)
+    alike = alike_in(found, name)
+    return Cause(
+        name=name,
+        stage=str(one.stage),
+        parameters=estimates(best, name),
+        equivalents=alike[1:],
+        p_value=found.p_values[name],
+        gain_fit=100.0 * share_in(found, name),
+        gain_held_out=replace(weighed.gains[name], on=on),
+        evidence=replace(evidence, on=on) if evidence else None,
+        chosen_again=share_of(verdict.chosen(state), alike),
+    )
