@@ -2,16 +2,16 @@
 
 The notation: products by a space, quotients by /, powers by ^, calls by a bracket that follows at once, v' and v'' for
 derivatives, b+ for the next value, x_y for an index of a letter, -> for "becomes". Three spaces separate an equation
-from a remark on it.
+from a remark on it. It is rewritten as an expression of Python, which Python's own parser reads.
 
 Source: MathML Core, W3C.
 """
 
 from __future__ import annotations
 
+import ast
 import html
 import re
-from collections.abc import Callable
 
 from fes_pin.view.page import Markup
 
@@ -19,17 +19,32 @@ GREEK = {
     **{"alpha": "α", "beta": "β", "delta": "δ", "epsilon": "ε", "zeta": "ζ", "theta": "θ", "mu": "μ", "xi": "ξ"},
     **{"pi": "π", "rho": "ρ", "sigma": "σ", "tau": "τ", "phi": "φ", "omega": "ω"},
 }
-RELATIONS = {"=": "=", "->": "→", "<": "<", ">": ">", ",": ",", "<=": "≤", ">=": "≥"}
 WORDS = set(
     ["where", "replaced", "by", "replaces", "shortens", "the", "muscle", "from", "up", "for", "at", "if", "else", "and"]
 )
 """Words of a sentence, which are no names of quantities."""
-_TOKEN = re.compile(r"\s*(?:(\d+\.?\d*(?:e-?\d+)?)|([^\W\d]\w*)('*)|(->|<=|>=|[-+*/^()|,=<>]))")
-_NEXT = re.compile(r"([^\W\d]\w*)\+(?=\s*(?:=|$))")
-
-
-class _Unreadable(ValueError):
-    """What is no equation in this notation."""
+PRIME, NEXT = "ʹ", "ᐩ"
+"""Letters of Python's names that stand for a prime and for the plus of a next value."""
+AS_PYTHON = {
+    r"([^\W\d]\w*)\+(?=\s*(?:=|$))": rf"\1{NEXT}",
+    "'": PRIME,
+    r"\b[^\W\d]": r"_\g<0>",  # no name is a keyword
+    r"\^": "**",
+    r"(?<![<>])=": "==",
+    "->": ">>",
+    r"\|([^|]*)\|": r"abs(\1)",
+    r"(?<=[\w)])\s+(?=[\w(])": "@",  # a product
+}
+"""The notation, and what Python has for it; in this order."""
+SIGNS: dict[type[ast.AST], str] = {
+    **{ast.Add: "+", ast.UAdd: "+", ast.Sub: "−", ast.USub: "−", ast.Mult: "·", ast.RShift: "→"},
+    **{ast.Eq: "=", ast.Lt: "&lt;", ast.Gt: "&gt;", ast.LtE: "≤", ast.GtE: "≥"},
+}
+BINDING: dict[type, int] = {
+    **{ast.Tuple: 0, ast.Compare: 1, ast.RShift: 1, ast.Add: 2, ast.Sub: 2, ast.UAdd: 3, ast.USub: 3, ast.Mult: 3},
+    **{ast.MatMult: 3, ast.Div: 3, ast.Pow: 4},
+}
+"""How strongly operators bind; anything else is one thing."""
 
 
 def equations_mathml(text: str) -> Markup:
@@ -37,7 +52,7 @@ def equations_mathml(text: str) -> Markup:
     lines = [line for line in text.split("\n") if line.strip()]
     try:
         made = [_line(line) for line in lines]
-    except _Unreadable:
+    except (SyntaxError, ValueError, KeyError, RecursionError):
         return Markup(f"<pre>{html.escape(text)}</pre>")
     return Markup(f'<div class="equations">{"".join(made)}</div>')
 
@@ -45,145 +60,68 @@ def equations_mathml(text: str) -> Markup:
 def _line(line: str) -> str:
     """One line: equations and, behind three spaces, what is said of them; side by side if there is room."""
     pieces = re.split(r"(?<=[^\s])\s{3,}(?=\w)", re.sub(r"\s+(?==|->)", " ", line.strip()))
-    made = [
-        f"<math><mrow>{_math(p)}</mrow></math>" if re.search(r"[=+*/^<>|-]", p) else f"<span>{html.escape(p)}</span>"
-        for p in pieces
-    ]
+    made = [_math(p) if re.search(r"[=+*/^<>|-]", p) else f"<span>{html.escape(p)}</span>" for p in pieces]
     return f"<div>{' '.join(made)}</div>"
 
 
 def _math(text: str) -> str:
-    tokens = _tokens(text)
-    parser = _Parser(tokens)
-    made = parser.relation()
-    if parser.at < len(tokens):
-        raise _Unreadable(text)
+    """Equations; a comma may end them."""
+    written = text.removesuffix(",")
+    for pattern, instead in AS_PYTHON.items():
+        written = re.sub(pattern, instead, written)
+    made = _drawn(ast.parse(written, mode="eval").body)
+    return f"<math><mrow>{made}{'<mo>,</mo>' * text.endswith(',')}</mrow></math>"
+
+
+def _bound(node: ast.expr, least: int) -> str:
+    """An expression, in brackets where it binds less than what is around it."""
+    made = _drawn(node)
+    return _between("(", made, ")") if BINDING.get(type(getattr(node, "op", node)), 9) < least else made
+
+
+def _between(opening: str, made: str, closing: str) -> str:
+    return f'<mrow><mo stretchy="false">{opening}</mo>{made}<mo stretchy="false">{closing}</mo></mrow>'
+
+
+def _drawn(node: ast.expr) -> str:
+    match node:
+        case ast.Constant(value=int() | float() as value):
+            made = f"<mn>{value:g}</mn>"
+        case ast.Name():
+            made = _name(node.id.removeprefix("_"))
+        case ast.Call(func=ast.Name(id="abs")):
+            made = _between("|", _drawn(node.args[0]), "|")
+        case ast.Call(func=ast.Name()):
+            made = _drawn(node.func) + _between("(", "<mo>,</mo>".join(map(_drawn, node.args)), ")")
+        case ast.Tuple():
+            made = "<mo>,</mo>".join(map(_drawn, node.elts))
+        case ast.Compare():
+            pairs = zip(node.ops, node.comparators, strict=True)
+            made = _bound(node.left, 1) + "".join(f"<mo>{SIGNS[type(op)]}</mo>{_bound(one, 1)}" for op, one in pairs)
+        case ast.UnaryOp():
+            made = f"<mo>{SIGNS[type(node.op)]}</mo>{_bound(node.operand, 3)}"
+        case ast.BinOp(op=ast.Div()):
+            made = f"<mfrac><mrow>{_drawn(node.left)}</mrow><mrow>{_drawn(node.right)}</mrow></mfrac>"
+        case ast.BinOp(op=ast.Pow()):
+            made = f"<msup><mrow>{_bound(node.left, 5)}</mrow><mrow>{_drawn(node.right)}</mrow></msup>"
+        case ast.BinOp():
+            own, product = BINDING[type(node.op)], isinstance(node.op, ast.MatMult)
+            sign = '<mspace width="0.22em"/>' if product else f"<mo>{SIGNS[type(node.op)]}</mo>"
+            made = _bound(node.left, own) + sign + _bound(node.right, min(own + 1, 3))
+        case _:
+            raise SyntaxError
     return made
-
-
-def _tokens(text: str) -> list[tuple[str, str, bool]]:
-    """Kind, text and whether a space stands before it."""
-    text, out, at = _NEXT.sub(r"\1⁺", text), [], 0
-    while at < len(text.rstrip()):
-        if text[at] == "⁺":
-            out.append(("next", "+", False))
-            at += 1
-            continue
-        found = _TOKEN.match(text, at)
-        if found is None:
-            raise _Unreadable(text)
-        spaced = found.group(0)[:1].isspace()
-        number, name, primes, sign = found.groups()
-        kind = "number" if number else "name" if name else "sign"
-        out.append((kind, number or (name or "") + (primes or "") or sign, spaced))
-        at = found.end()
-    return out
-
-
-class _Parser:
-    """Recursive descent; every method gives MathML."""
-
-    def __init__(self, tokens: list[tuple[str, str, bool]]) -> None:
-        self.tokens, self.at, self.inside = tokens, 0, 0
-
-    def _peek(self) -> tuple[str, str, bool]:
-        return self.tokens[self.at] if self.at < len(self.tokens) else ("end", "", False)
-
-    def _sign(self, *signs: str) -> str | None:
-        kind, text, _ = self._peek()
-        if kind != "sign" or text not in signs:
-            return None
-        self.at += 1
-        return text
-
-    def relation(self) -> str:
-        """Sums, and what stands between them; a comma may end it, and words may stand in it."""
-        out = [self._sum()]
-        while (sign := self._sign(*RELATIONS)) is not None:
-            out.append(f"<mo>{html.escape(RELATIONS[sign])}</mo>")
-            if self._peek()[0] != "end":
-                out.append(self._sum())
-        return "".join(out)
-
-    def _sum(self) -> str:
-        sign = self._sign("-", "+")
-        out = [f"<mo>{'−' if sign == '-' else '+'}</mo>" if sign else "", self._product()]
-        while (sign := self._sign("+", "-")) is not None:
-            out += [f"<mo>{'−' if sign == '-' else '+'}</mo>", self._product()]
-        return "".join(out)
-
-    def _product(self) -> str:
-        out = self._power()
-        while True:
-            kind, text, _ = self._peek()
-            if self._sign("/"):
-                out = f"<mfrac><mrow>{_bare(out)}</mrow><mrow>{_bare(self._power())}</mrow></mfrac>"
-            elif self._sign("*"):
-                out += "<mo>·</mo>" + self._power()
-            elif kind in ("number", "name") or (kind == "sign" and (text == "(" or (text == "|" and not self.inside))):
-                out += '<mspace width="0.22em"/>' + self._power()
-            else:
-                return out
-
-    def _power(self) -> str:
-        base = self._factor()
-        if self._sign("^"):
-            return f"<msup><mrow>{base}</mrow><mrow>{_bare(self._factor())}</mrow></msup>"
-        return base
-
-    def _factor(self) -> str:
-        kind, text, _ = self._peek()
-        self.at += 1
-        if kind == "number":
-            return f"<mn>{text}</mn>"
-        if kind == "name":
-            return self._called(_name(text))
-        if kind == "sign" and text == "(":
-            return self._between("(", ")", self.relation)
-        if kind == "sign" and text == "|":
-            self.inside += 1
-            made = self._between("|", "|", self._sum)
-            self.inside -= 1
-            return made
-        raise _Unreadable(text)
-
-    def _called(self, name: str) -> str:
-        kind, text, spaced = self._peek()
-        if kind == "next":
-            self.at += 1
-            return f"<msup>{name}<mo>+</mo></msup>"
-        if kind == "sign" and text == "(" and not spaced:
-            self.at += 1
-            return name + self._between("(", ")", self.relation)
-        return name
-
-    def _between(self, opening: str, closing: str, inner: Callable[[], str]) -> str:
-        kept, self.inside = self.inside, self.inside if opening == "|" else 0
-        made = inner()
-        if self._sign(closing) is None:
-            raise _Unreadable(closing)
-        self.inside = kept
-        return f'<mrow><mo stretchy="false">{opening}</mo>{made}<mo stretchy="false">{closing}</mo></mrow>'
-
-
-def _bare(made: str) -> str:
-    """Without the brackets that a fraction or a power needs no more."""
-    opening, closing = '<mrow><mo stretchy="false">(</mo>', '<mo stretchy="false">)</mo></mrow>'
-    whole = (
-        made.startswith(opening) and made.endswith(closing) and "<mo stretchy" not in made[len(opening) : -len(closing)]
-    )
-    return made[len(opening) : -len(closing)] if whole else made
 
 
 def _name(text: str) -> str:
     """A quantity, with its index and primes."""
-    name = text.rstrip("'")
-    primes = "′" * (len(text) - len(name))
+    name = text.rstrip(PRIME + NEXT)
     if name in WORDS:
         return f'<mspace width="0.3em"/><mtext>{name}</mtext><mspace width="0.3em"/>'
     letter, _, index = name.partition("_")
     if index and (len(letter) == 1 or letter in GREEK):
-        made = f"<msub><mi>{GREEK.get(letter, html.escape(letter))}</mi><mi>{html.escape(index)}</mi></msub>"
+        made = f"<msub><mi>{GREEK.get(letter, letter)}</mi><mi>{index}</mi></msub>"
     else:
-        made = f"<mi>{GREEK.get(name, html.escape(name))}</mi>"
-    return f"<msup>{made}<mo>{primes}</mo></msup>" if primes else made
+        made = f"<mi>{GREEK.get(name, name)}</mi>"
+    marks = text[len(name) :].replace(PRIME, "′").replace(NEXT, "+")
+    return f"<msup>{made}<mo>{marks}</mo></msup>" if marks else made
