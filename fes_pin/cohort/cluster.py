@@ -13,7 +13,7 @@ from itertools import islice
 from typing import Any
 
 from fes_pin.cohort.local import DIED, Task
-from fes_pin.cohort.one import Answer, Work, diagnose_one
+from fes_pin.cohort.one import Answer, Work
 from fes_pin.data.errors import InputError
 from fes_pin.data.libraries import optional_library
 
@@ -22,9 +22,7 @@ AHEAD = 2
 PATIENCE_S = "20s"
 
 
-def on_cluster(
-    tasks: Iterable[Task], address: str, run: Callable[[Work, str], Answer] = diagnose_one
-) -> Iterator[Answer]:
+def on_cluster(tasks: Iterable[Task], address: str, run: Callable[[Work, str], Answer]) -> Iterator[Answer]:
     """Answers as they come.
 
     Raises

@@ -26,8 +26,8 @@ class Kept:
 class Store:
     """Answers in a folder, one folder each beneath `studies`."""
 
-    def __init__(self, folder: Path, outputs: Outputs | None = None) -> None:
-        self.folder, self.outputs = folder, outputs or Outputs("cohort")
+    def __init__(self, folder: Path, outputs: Outputs) -> None:
+        self.folder, self.outputs = folder, outputs
 
     def place(self, name: str) -> Path:
         """Folder of one study's answer."""

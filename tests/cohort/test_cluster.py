@@ -47,4 +47,4 @@ def test_a_worker_that_is_killed_costs_no_study(tmp_path, cluster):
 def test_a_scheduler_that_is_not_there_is_one_line(monkeypatch):
     monkeypatch.setattr("fes_pin.cohort.cluster.PATIENCE_S", "1s")
     with pytest.raises(InputError, match="no Dask scheduler answers"):
-        next(on_cluster([(None, "")], "tcp://127.0.0.1:9"))
+        next(on_cluster([(None, "")], "tcp://127.0.0.1:9", quick))
