@@ -270,29 +270,18 @@ def grown_start(
     return values, unknowns
 
 
-def fit_growing(problem: Problem, start: Mapping[str, float], max_iterations: int = MAX_ITERATIONS) -> Fit:
-    """Fit a problem from afar; see `grown_start`."""
+def fit_multistart(problem: Problem, start: Mapping[str, float], max_iterations: int = MAX_ITERATIONS) -> Fit:
+    """Fit a problem from a start, and from afar as well where that leaves a gross misfit; the better of both."""
 
     def short(trials: list[Trial]) -> Problem:
         made = Problem(problem.model, trials, problem.noise, problem.free)
         made.limits = problem.limits
         return made
 
-    values, unknowns = grown_start(short, problem.trials, start, max_iterations)
-    return fit_problem(problem, values, unknowns, max_iterations)
-
-
-def fit_multistart(
-    problem: Problem,
-    start: Mapping[str, float],
-    unknowns: Unknowns | None = None,
-    max_iterations: int = MAX_ITERATIONS,
-) -> Fit:
-    """Fit a problem from a start, and from afar as well where that leaves a gross misfit; the better of both."""
-    plain = fit_problem(problem, start, unknowns, max_iterations)
+    plain = fit_problem(problem, start, max_iterations=max_iterations)
     if plain.reduced < GROSS:
         return plain
-    grown = fit_growing(problem, start, max_iterations)
+    grown = fit_problem(problem, *grown_start(short, problem.trials, start, max_iterations), max_iterations)
     return grown if grown.sse < plain.sse or not np.isfinite(plain.sse) else plain
 
 

@@ -31,22 +31,16 @@ STEPS = 3
 """Gauss-Newton steps: the amplitudes are linear but for what the joint's own nonlinearity makes of them."""
 
 
-def predictions(
-    model: Model, trials: Sequence[Trial], noise: NoiseModel, initial: Unknowns | None = None
-) -> list[np.ndarray]:
+def predictions(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> list[np.ndarray]:
     """Readings that a model predicts of measured trials, shape (n, outputs) each; see the module.
 
     Parameters
     ----------
     noise
         By output column: what weighs the channels.
-    initial
-        Initial states of the trials; by default as predictions start.
     """
     simulator, values = Simulator(model, trials), model.parameters()
     start = simulator.start(values)
-    if initial is not None:
-        start = [{**one, **{n: i[n] for n in i if "." not in n}} for one, i in zip(start, initial, strict=True)]
     if not model.own_unknowns():
         return [s.readings for s in simulator.run(values, start)]
     cut = [halves(len(t)) for t in trials]

@@ -10,12 +10,6 @@ LARGE, DIGITS = 1e5, 6
 """From this value on, and with more digits behind the point, a number is printed with a power of ten."""
 
 
-MOST_DIGITS = 6
-"""Decimals that are printed."""
-LARGE = 1e5
-"""A value that is printed with three digits."""
-
-
 def probability(value: float) -> str:
     """A p-value as printed; never zero."""
     if math.isnan(value):

@@ -35,8 +35,8 @@ MAX_POINTS = 1200
 PENALTIES = (-2.0, 10.0)
 """Range of the logarithm of the penalty; above it the system is singular in double precision."""
 STEPS = 24
-FEW = 6
-"""Values that a bin needs."""
+BINS, FEW = 16, 6
+"""Bins of equal width, within which a function is taken as constant, and the values that one needs."""
 
 
 @dataclass(frozen=True)
@@ -195,25 +195,23 @@ def _penalised(values: np.ndarray, penalty: float) -> np.ndarray:
     return scipy.linalg.solveh_banded(bands, values)
 
 
-def explained(value: np.ndarray, against: np.ndarray, bins: int = 16) -> float:
+def explained(value: np.ndarray, against: np.ndarray) -> float:
     """Share of the variance of a quantity that is a function of one variable alone: its correlation ratio, 0 to 1.
 
     Parameters
     ----------
     value, against
         Shape (n,).
-    bins
-        Bins of equal width, within which the function is taken as constant.
     """
     size = float(np.abs(value).max(initial=0.0)) or 1.0  # a share has no unit, and squares of 1e200 no number
-    groups = [g / size for _, g in binned(value, against, bins)]
+    groups = [g / size for _, g in binned(value, against)]
     seen = np.concatenate(groups)
     total = float(np.sum((seen - seen.mean()) ** 2))
     between = sum(len(g) * float(g.mean() - seen.mean()) ** 2 for g in groups)
     return between / total if total > 0 else 0.0
 
 
-def binned(value: np.ndarray, against: np.ndarray, bins: int = 16) -> list[tuple[float, np.ndarray]]:
+def binned(value: np.ndarray, against: np.ndarray) -> list[tuple[float, np.ndarray]]:
     """The values in bins of equal width of one variable: its median in each bin, and the values there.
 
     The outermost hundredth of the variable's values on either side goes to the outermost bins; bins with fewer than
@@ -222,7 +220,7 @@ def binned(value: np.ndarray, against: np.ndarray, bins: int = 16) -> list[tuple
     low, high = np.quantile(against, (0.01, 0.99))
     if high - low < 1e-9 * max(1.0, abs(high)):
         return [(float(np.median(against)), value)]
-    index = np.clip(((against - low) / (high - low) * bins).astype(int), 0, bins - 1)
-    chosen = [np.flatnonzero(index == k) for k in range(bins)]
+    index = np.clip(((against - low) / (high - low) * BINS).astype(int), 0, BINS - 1)
+    chosen = [np.flatnonzero(index == k) for k in range(BINS)]
     made = [(float(np.median(against[g])), value[g]) for g in chosen if len(g) >= FEW]
     return made or [(float(np.median(against)), value)]

@@ -31,30 +31,13 @@ def from_afar(effect: Effect, measured: Mapping[str, np.ndarray]) -> list[Effect
     return [replace(effect, **one) for one in chosen]
 
 
-def started(
-    effect: Effect, amplitudes: Mapping[str, float], step: float | None = None, reach: float | None = None
-) -> Effect:
-    """The effect at a linear estimate of its amplitudes, or a step from its null where that says nothing.
-
-    Parameters
-    ----------
-    step
-        Size of that step in an amplitude's scales, to the side that its bounds leave; by default that of `near_null`.
-    reach
-        Scales from its null within which an estimate is taken; by default an amplitude's bounds.
-    """
+def started(effect: Effect, amplitudes: Mapping[str, float]) -> Effect:
+    """The effect at a linear estimate of its amplitudes, within bounds; next to its null where that says nothing."""
     info = effect.parameters()
     values: dict[str, Any] = {}
     for name, value in amplitudes.items():
-        null, one = effect.nulls()[name], info[name]
-        nothing = abs(value - null) < 1e-6 * one.scale
-        if not nothing:
-            away = np.inf if reach is None else reach * one.scale
-            values[name] = one.nearest(float(np.clip(value, null - away, null + away)))
-        elif step is None:
-            values[name] = near_null(type(effect), name)
-        else:
-            values[name] = null + (step if one.upper > null else -step) * one.scale
+        nothing = abs(value - effect.nulls()[name]) < 1e-6 * info[name].scale
+        values[name] = near_null(type(effect), name) if nothing else info[name].nearest(float(value))
     return replace(effect, **values)
 
 
