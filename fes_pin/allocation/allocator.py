@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from fes_pin.allocation.allocation import Allocation, AllocationSequence
-from fes_pin.allocation.bounded import PRECISE, BoundedProgram, exact, known_solver, solve_by, solve_sequence
+from fes_pin.allocation.bounded import PRECISE, BoundedProgram, known_solver, solve_by, solve_once
 from fes_pin.allocation.certificate import Certifier
 from fes_pin.allocation.efforts import error_then_effort, least_cubes
 from fes_pin.allocation.inputs import fractions, wanted_torque, wanted_torques
@@ -50,6 +51,13 @@ class Allocator(OfProblem):
 
     def __init__(self, nerves: Any, q: Any = None, *, v: Any = None, **options: Any) -> None:
         self._set_up(problem_of(nerves, q, v, Options.of(options)))
+
+    @classmethod
+    def of_problem(cls, problem: AllocationProblem) -> Allocator:
+        """The program of a problem that was checked before."""
+        program = cls.__new__(cls)
+        program._set_up(problem)
+        return program
 
     def _set_up(self, p: AllocationProblem) -> None:
         self.problem = p
@@ -107,7 +115,7 @@ class Allocator(OfProblem):
         p = self.problem
         wanted = wanted_torque(torque, p.joints, p.other)
         if solver != "daqp":
-            known_solver(solver, "daqp", "an allocation")
+            known_solver(solver, "an allocation")
             if not p.plain:
                 raise InputError(f"least recruitments, cubes and lexicographic are solved by daqp, not by {solver!r}")
         before = self._previous if previous is None else previous
@@ -134,13 +142,10 @@ class Allocator(OfProblem):
             r, note = least_cubes(self.squares, f, p.prices, p.change, lower, upper, self.certify.unseen(wanted))
             return self.result(r, wanted, lower, upper, before, note)
         if solver == "daqp":
-            r = self.program.solve(f, lower, upper)
-        else:  # it proposes which limits hold; the answer is made exact
-            r = np.clip(solve_by(solver, self.H, f, lower=lower, upper=upper)[0], lower, upper)
-
-        def solve(low: np.ndarray, high: np.ndarray) -> np.ndarray:
-            return exact(self.H, f, r, low, high)
-
+            r = self.program.solve(f[None], lower, upper)[0][0]
+        else:
+            r = np.clip(solve_by(solver, self.H, f, lower, upper)[0], lower, upper)
+        solve = partial(solve_once, self.H, f)
         found = self.result(r, wanted, lower, upper, before, solve=solve)
         if found.certificate.residual <= self.precise:
             return found
@@ -200,20 +205,15 @@ class Allocator(OfProblem):
         if not p.plain:
             raise InputError("least recruitments, cubes and lexicographic are allocated one torque at a time")
         start = np.zeros(p.n) if previous is None else fractions(previous, p.names, PREVIOUS)
-        F = wanted @ self.pull
-
-        def settle(k: int, r: np.ndarray, before: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-            f = F[k] - p.change * before
-            return self.certify.at_limits(before, wanted[k], r, low, high, lambda *held: exact(self.H, f, r, *held))
-
-        carried: dict[str, Any] = {"keep": p.change, "rate": p.rate, "previous": start}
-        r = solve_sequence(self.H, F, p.lower, p.upper, **carried, precise=self.precise, settle=settle)
-        before: Any = np.vstack([start, r[:-1]]) if p.change or p.rate < np.inf else start
-        lower, upper = p.limits(before)
-        if not p.change and p.rate == np.inf:  # else each was settled before the next followed from it
-            slack = np.minimum(r - lower, upper - r)
-            for k in np.flatnonzero(self.certify.close(slack, wanted).any(1)):
-                r[k] = settle(int(k), r[k], start, lower, upper)
-        achieved = r @ p.matrix.T
-        residual = self.certify.residual(before, wanted, r, lower, upper)
-        return AllocationSequence(r, p.curves.pulse_width_us(r), wanted, achieved, residual, p)
+        r, follows = np.empty((len(wanted), p.n)), bool(p.change) or p.rate < np.inf
+        each = np.arange(len(wanted))
+        if not follows:  # all at once, and one by one those that are not exact
+            r = self.program.solve(wanted @ self.pull, p.lower, p.upper)[0]
+            near = self.certify.close(np.minimum(r - p.lower, p.upper - r), wanted).any(axis=1)
+            near |= ~(self.certify.residual(start, wanted, r, p.lower, p.upper) <= self.precise)
+            each = np.flatnonzero(near)
+        for k in each.tolist():
+            r[k] = self._solve(wanted[k], r[k - 1] if follows and k else start, "daqp").recruitment
+        before: Any = np.vstack([start, r[:-1]]) if follows else start
+        residual = self.certify.residual(before, wanted, r, *p.limits(before))
+        return AllocationSequence(r, p.curves.pulse_width_us(r), wanted, r @ p.matrix.T, residual, p)

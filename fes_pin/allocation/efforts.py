@@ -6,7 +6,7 @@ import numpy as np
 from scipy.linalg import null_space
 from scipy.optimize import lsq_linear
 
-from fes_pin.allocation.bounded import lone_steps, new_model, solve_once
+from fes_pin.allocation.bounded import BoundedProgram, lone_steps, solve_once
 from fes_pin.allocation.problem import EPSILON
 
 STEPS = 100
@@ -74,9 +74,10 @@ def error_then_effort(
     if not along.shape[1]:
         return r, "one choice alone has the least error, to 0"
     slope = root**2 * (r - target)
-    model = new_model(np.eye(along.shape[1]), along.T @ slope, lower - r, upper - r, along)
-    moved, _, flag, info = model.solve()
-    if flag != 1:
+    endless = np.full(along.shape[1], np.inf)
+    limits = np.append(-endless, lower - r), np.append(endless, upper - r)
+    moved, y = (each[0] for each in BoundedProgram(np.eye(len(endless)), along).solve(slope[None] @ along, *limits))
+    if np.isnan(y).any():
         return r, "least error; the least effort among its choices was not found"
-    unexplained = along.T @ (slope + root**2 * (along @ moved) + info["lam"])
+    unexplained = along.T @ (slope + root**2 * (along @ moved) + y[len(endless) :])
     return np.clip(r + along @ moved, lower, upper), f"least effort among equals, to {np.abs(unexplained).max():.0e}"

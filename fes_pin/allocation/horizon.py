@@ -9,9 +9,8 @@ import numpy as np
 
 from fes_pin.allocation.allocation import ByName
 from fes_pin.allocation.allocator import Allocator
-from fes_pin.allocation.bounded import known_solver
+from fes_pin.allocation.bounded import BoundedProgram, held, known_solver, solve_by
 from fes_pin.allocation.certificate import NOTHING
-from fes_pin.allocation.horizon_program import NO_ROOM, HorizonProgram
 from fes_pin.allocation.inputs import fractions, wanted_torques
 from fes_pin.allocation.problem import AllocationProblem, within_rate
 from fes_pin.data.errors import InputError
@@ -105,8 +104,6 @@ class Plan(ByName, ReadOnly):
         Residuals, recomputed: distance of the solver's answer from the limits, slope that no limit explains.
     gap
         No plan costs less than this one by more (of the cost divided by `scale`).
-    iterations, rounds
-        Of the interior-point method; guesses at what is active until one was exact, 0 if none was.
     problem
         Names, moment arms, weights, prices.
     """
@@ -117,8 +114,6 @@ class Plan(ByName, ReadOnly):
     primal: float
     dual: float
     gap: float
-    iterations: int
-    rounds: int
     problem: AllocationProblem
 
 
@@ -173,17 +168,19 @@ class Horizon:
         self.queue = np.zeros((self.delay_steps, n))
         self._assemble()
 
-    def _assemble(self, like: HorizonProgram | None = None) -> None:
-        p, steps = self.program.problem, self.steps
+    def _assemble(self, like: BoundedProgram | None = None) -> None:
+        p, steps, n = self.program.problem, self.steps, self.program.n
         self.matrix = p.matrix * self.left
-        strength = np.sqrt(p.weights / p.scale)[:, None] * self.matrix
-        self.exact = HorizonProgram(strength, p.prices, p.change, self.keep, steps, p.rate < 1.0, like)
-        self.response = self.exact.response
-        self.G = (self.matrix.T * p.weights) @ self.matrix / p.scale
+        later = np.subtract.outer(np.arange(steps), np.arange(steps))
+        self.response = np.where(later >= 0, (1.0 - self.keep) * self.keep ** np.maximum(later, 0), 0.0)
         step = np.eye(steps) - np.eye(steps, k=-1)
-        self.S, self.T = self.response.T @ self.response, p.change * step.T @ step
+        squares = (self.matrix.T * p.weights) @ self.matrix / p.scale
+        self.H = np.kron(self.response.T @ self.response, squares) + np.kron(p.change * step.T @ step, np.eye(n))
+        self.H[np.diag_indices(steps * n)] += np.tile(p.prices, steps)
+        self.rows = np.kron(step[1:], np.eye(n))
+        self.exact = BoundedProgram(self.H, self.rows, like)
 
-    def plan(self, torques: Any, *, solver: str = "piqp") -> Plan:
+    def plan(self, torques: Any, *, solver: str = "daqp") -> Plan:
         """Stimulation for the torques ahead, from the present state.
 
         Parameters
@@ -192,7 +189,7 @@ class Horizon:
             (steps, joints) N m, by name or in the order of the program's joints: wanted at the pulses `delay_steps` + 1
             ... `delay_steps` + steps ahead.
         solver
-            `piqp`, whose plan is made exact, or any solver that qpsolvers knows (`osqp`, `daqp` ...).
+            `daqp`, whose plan is exact, or any solver that qpsolvers knows (`osqp`, `piqp` ...).
 
         Raises
         ------
@@ -202,7 +199,7 @@ class Horizon:
         p = self.program.problem
         for name in ("act", "left", "before"):
             fractions(getattr(self, name), p.names, name)
-        known_solver(solver, "piqp", "a horizon")
+        known_solver(solver, "a horizon")
         wanted = wanted_torques(torques, p.joints, f"{self.steps} steps", p.other)
         if len(wanted) != self.steps:
             raise InputError(f"torques must be {self.steps} steps x {len(p.joints)}, got shape {wanted.shape}")
@@ -211,12 +208,27 @@ class Horizon:
         f = self.response.T @ (error @ self.matrix)
         f[0] -= p.change * self.before
         low, high = self.limits()
-        found = self.exact.solve(f, low, high) if solver == "piqp" else self.exact.solve_by(solver, f, low, high)
-        u = self.feasible(found.u, low, high)
-        primal = float(np.abs(u - found.u).max())
-        u, dual, gap = self._at_limits(u, found.y, f, low, high, wanted)
+        found, y = self._solve(f, low, high) if solver == "daqp" else self._solve_by(solver, f, low, high)
+        u = self.feasible(found, low, high)
+        primal = float(np.abs(u - found).max())
+        u, dual, gap = self._at_limits(u, y, f, low, high, wanted)
         achieved = (free + self.response @ u) @ self.matrix.T
-        return Plan(u, p.curves.pulse_width_us(u), achieved, primal, dual, gap, found.iterations, found.rounds, p)
+        return Plan(u, p.curves.pulse_width_us(u), achieved, primal, dual, gap, p)
+
+    def _solve(self, f: np.ndarray, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The exact plan (steps, n) for a linear term (steps, n), and its multipliers, shaped as limits."""
+        ends = low.ravel(), high.ravel()
+        _, (y,) = self.exact.solve(f.reshape(1, -1), *ends)
+        u, y = self.exact.exact(f.ravel(), y, *ends)
+        return u.reshape(f.shape), y.reshape(low.shape)
+
+    def _solve_by(self, solver: str, f: np.ndarray, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The same by another solver, at the limits whose multipliers are greater than their slack."""
+        x, flat = solve_by(solver, self.H, f.ravel(), low.ravel(), high.ravel(), self.rows)
+        u, y = x.reshape(f.shape), flat.reshape(low.shape)
+        box, least, most = y[: self.steps], low[: self.steps], high[: self.steps]
+        slack = np.where(box > 0.0, most - u, u - least)
+        return held(u, np.where(np.abs(box) > slack, box, 0.0), least, most), y
 
     def _at_limits(
         self, u: np.ndarray, y: np.ndarray, f: np.ndarray, low: np.ndarray, high: np.ndarray, wanted: np.ndarray
@@ -258,13 +270,13 @@ class Horizon:
         self, u: np.ndarray, y: np.ndarray, f: np.ndarray, low: np.ndarray, high: np.ndarray
     ) -> tuple[float, float]:
         """Dual residual and a bound on the gap, from the plan and a solver's multipliers."""
-        slope = self.S @ u @ self.G + self.T @ u + u * self.program.problem.prices + f
+        slope = (self.H @ u.ravel()).reshape(f.shape) + f
         rows = np.vstack([u, np.diff(u, axis=0)])
         pull = y[: self.steps].copy()
         pull[1:] += y[self.steps :]
         pull[:-1] -= y[self.steps :]
         unexplained = slope + pull
-        stuck = high[: self.steps] - low[: self.steps] <= NO_ROOM  # its multiplier is whatever its slope asks for
+        stuck = high[: self.steps] == low[: self.steps]  # its multiplier is whatever its slope asks for
         y = y.copy()
         y[: self.steps][stuck] -= unexplained[stuck]
         unexplained[stuck] = 0.0

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from fes_pin.allocation.allocation import Allocation, AllocationSequence
-from fes_pin.allocation.bounded import solve_sequence
-from fes_pin.allocation.certificate import Certifier, residuals
+from fes_pin.allocation.allocator import Allocator
 from fes_pin.allocation.inputs import in_range, wanted_torques
 from fes_pin.allocation.problem import Options, problem_of
 from fes_pin.data.errors import InputError
@@ -24,23 +23,16 @@ class WalkAllocation(AllocationSequence):
     ----------
     matrices
         (samples, joints, n) torque at full recruitment, N m.
-    scale
-        (N m)^2, what prices are of along the whole motion.
+    each
+        The samples; prices are of one scale along the whole motion, the squared torque of the strongest channel in it.
     """
 
     matrices: np.ndarray
-    scale: float
+    each: tuple[Allocation, ...]
 
     def at(self, k: int) -> Allocation:
         """Sample k with its reasons in words."""
-        p, matrix = self.problem, self.matrices[k]
-        scale = float((p.weights @ matrix**2).max()) or 1.0
-        same = self.scale / scale  # one scale of prices for the whole motion
-        here = replace(p, matrix=matrix, nominal=matrix, scale=scale, prices=p.prices * same, change=p.change * same)
-        r, wanted, before = self.recruitment[k], self.wanted[k], self.recruitment[k - 1] if k else np.zeros(p.n)
-        proof, achieved, gradient = Certifier(here)(before, wanted, r, p.lower, p.upper)
-        width = self.pulse_width_us[k]
-        return Allocation(r, width, wanted, achieved, gradient, p.lower, p.upper, before, proof, proof.gap, here)
+        return self.each[k]
 
 
 def allocate_walk(torques: Any, nerves: Any, q: Any, v: Any = None, **options: Any) -> WalkAllocation:
@@ -76,16 +68,15 @@ def allocate_walk(torques: Any, nerves: Any, q: Any, v: Any = None, **options: A
     if not p.plain or p.rate < np.inf:
         raise InputError("least recruitments, cubes, lexicographic and rate are allocated one torque at a time")
     matrices = matrices * (p.upper > 0.0)
-    weighed = np.swapaxes(matrices, 1, 2) * p.weights
-    H = weighed @ matrices
-    scale = float(np.einsum("kii->ki", H).max()) or 1.0
-    H /= scale
-    H[:, range(p.n), range(p.n)] += p.prices + p.change
-    F = -np.einsum("knj,kj->kn", weighed, wanted) / scale
-    r = solve_sequence(H, F, p.lower, p.upper, keep=p.change)
-    achieved = np.einsum("kjn,kn->kj", matrices, r)
-    before = np.vstack([np.zeros(p.n), r[:-1]])
-    gradient = np.einsum("knj,kj->kn", weighed, achieved - wanted) / scale + p.prices * r + p.change * (r - before)
-    curvature = np.einsum("kii->ki", H)
-    residual = np.maximum.reduce(residuals(gradient, r, p.lower, p.upper, curvature)[:3])
-    return WalkAllocation(r, p.curves.pulse_width_us(r), wanted, achieved, residual, p, matrices, scale)
+    scale = float(np.einsum("kji,j,kji->ki", matrices, p.weights, matrices).max()) or 1.0  # of prices: one for all
+    each: list[Allocation] = []
+    before = np.zeros(p.n)
+    for matrix, torque in zip(matrices, wanted, strict=True):
+        program = Allocator.of_problem(replace(p, nominal=matrix, matrix=matrix, scale=scale, other=None))
+        each.append(program(torque, before))
+        before = each[-1].recruitment
+    r, widths, achieved = (
+        np.array(a) for a in zip(*((o.recruitment, o.pulse_width_us, o.achieved) for o in each), strict=True)
+    )
+    residual = np.array([one.certificate.residual for one in each])
+    return WalkAllocation(r, widths, wanted, achieved, residual, p, matrices, tuple(each))
