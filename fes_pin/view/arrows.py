@@ -32,26 +32,21 @@ class Arrow:
     colour: int = 0x17191C
 
 
-def arrow_commands(arrow: Arrow, name: str, animation) -> list:
-    """meshcat's drawing commands of one arrow; its motion goes into the animation."""
-    from meshcat.commands import SetObject, SetTransform  # noqa: PLC0415
+def draw_arrow(arrow: Arrow, place, animation) -> None:
+    """Draw an arrow at a place of meshcat's viewer; its motion goes into the animation."""
     from meshcat.geometry import Cylinder, MeshLambertMaterial  # noqa: PLC0415
-    from meshcat.path import Path as Place  # noqa: PLC0415
 
     parts = {"shaft": Cylinder(1.0, SHAFT_M), "head": Cylinder(3.0 * HEAD_M, radiusTop=0.0, radiusBottom=HEAD_M)}
-    out = []
     for part, shape in parts.items():
-        place = Place(("meshcat", "arrow", name, part))
-        out.append(SetObject(shape, MeshLambertMaterial(color=arrow.colour), place))
+        place[part].set_object(shape, MeshLambertMaterial(color=arrow.colour))
         for t, (foot, vector) in enumerate(zip(arrow.foot, arrow.vector, strict=True)):
             turn, middle, scale = _placed(part, foot, vector)
+            placed = pin.SE3(turn, middle).homogeneous
             if t == 0:
-                matrix = np.eye(4)
-                matrix[:3, :3], matrix[:3, 3] = turn.matrix() * scale, middle
-                out.append(SetTransform(matrix, place))
-            if len(arrow.foot) > 1:
-                set_key(animation, place, t, turn, middle, scale)
-    return out
+                place[part].set_transform(placed @ np.diag([*scale, 1.0]))
+            frame = animation.at_frame(place[part], t)
+            frame.set_transform(placed)
+            frame.set_property("scale", "vector3", scale.tolist())
 
 
 def _placed(part: str, foot: np.ndarray, vector: np.ndarray) -> tuple[pin.Quaternion, np.ndarray, np.ndarray]:
@@ -65,13 +60,3 @@ def _placed(part: str, foot: np.ndarray, vector: np.ndarray) -> tuple[pin.Quater
     if part == "shaft":
         return turn, foot + 0.5 * shaft * along, np.array([1.0, shaft, 1.0])
     return turn, foot + (shaft + 1.5 * HEAD_M) * along, np.ones(3)
-
-
-def set_key(animation, place, frame: int, turn: pin.Quaternion, middle: np.ndarray, scale=(1.0, 1.0, 1.0)) -> None:
-    """Where a part is in one frame of an animation, how it is turned and how large it is."""
-    from meshcat.animation import AnimationClip  # noqa: PLC0415
-
-    clip = animation.clips.setdefault(place, AnimationClip(fps=animation.default_framerate))
-    clip.set_property(frame, "position", "vector3", middle.tolist())
-    clip.set_property(frame, "quaternion", "quaternion", turn.coeffs().tolist())
-    clip.set_property(frame, "scale", "vector3", list(scale))

@@ -27,13 +27,11 @@ from fes_pin.data.errors import InputError
 from fes_pin.data.files import write_text
 from fes_pin.data.named import NamedArray
 from fes_pin.data.numbers import instance
-from fes_pin.view.arrows import Arrow, arrow_commands, set_key
+from fes_pin.view.arrows import Arrow, draw_arrow
 
 FRAMES_A_SECOND = 30
 MODE_SWING_DEG, MODE_PERIOD_S = 12.0, 2.0
 """How far the joint that moves most is shown to move, and how fast: to be seen, not to scale."""
-_UPRIGHT = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
-"""meshcat's cylinders lie along y, coal's along z."""
 
 
 @dataclass
@@ -100,56 +98,49 @@ class BodyScene:
 
     def commands(self) -> list:
         """meshcat's drawing commands."""
-        import_meshcat()
+        meshcat = import_meshcat()
         from meshcat.animation import Animation  # noqa: PLC0415
-        from meshcat.commands import SetAnimation, SetObject, SetProperty, SetTransform  # noqa: PLC0415
         from meshcat.geometry import Box, MeshLambertMaterial, Sphere  # noqa: PLC0415
-        from meshcat.path import Path as Place  # noqa: PLC0415
 
         if not self.frames:
             self.pose("neutral")
-        shapes = pin.buildGeomFromUrdfString(self.body.model, self.body.urdf, pin.GeometryType.VISUAL)
-        out: list = [SetProperty("visible", False, Place(("Grid",))), SetProperty("visible", False, Place(("Axes",)))]
-        out += [
-            SetProperty("top_color", [0.93, 0.95, 0.97], Place(("Background",))),
-            SetProperty("bottom_color", [0.70, 0.75, 0.80], Place(("Background",))),
-            SetTransform(_moved([0.1, 0.0, -0.9]), Place(("meshcat",))),  # the camera looks at the origin
-            SetProperty("position", [1.3, 0.2, 1.8], Place(("Cameras", "default", "rotated", "<object>"))),
-        ]
-        floor = MeshLambertMaterial(color=0x9DAA9D)
-        out.append(SetObject(Box([3.0, 1.6, 0.02]), floor, Place(("meshcat", "floor"))))
+        page, animation = meshcat.Visualizer(window=(kept := _Kept())), Animation(default_framerate=self.fps)
+        for hidden in ("/Grid", "/Axes"):
+            page[hidden].set_property("visible", False)
+        page["/Background"].set_property("top_color", [0.93, 0.95, 0.97])
+        page["/Background"].set_property("bottom_color", [0.70, 0.75, 0.80])
+        page["/Cameras/default/rotated/<object>"].set_property("position", [1.3, 0.2, 1.8])
+        page.set_transform(_moved([0.1, 0.0, -0.9]))  # the camera looks at the origin
         tilt = pin.SE3(pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), ground_normal(self.slope)), np.zeros(3))
-        out.append(SetTransform(tilt.homogeneous @ _moved([0.0, 0.0, -0.011]), Place(("meshcat", "floor"))))
-        for k, shape in enumerate(shapes.geometryObjects):
-            geometry, _ = _meshcat_geometry(shape.geometry)
-            red, green, blue = (int(255 * c) for c in shape.meshColor[:3])
-            colour = (red << 16) + (green << 8) + blue
-            material = MeshLambertMaterial(color=colour, opacity=self.opacity, transparent=self.opacity < 1.0)
-            out.append(SetObject(geometry, material, Place(("meshcat", "body", str(k)))))
-        for k, (_, radius, colour) in enumerate(self.balls):
-            ball = SetObject(Sphere(radius), MeshLambertMaterial(color=colour), Place(("meshcat", "ball", str(k))))
-            out.append(ball)
-        animation = Animation(default_framerate=self.fps)
-        data, geometry_data = self.body.model.createData(), shapes.createData()
-        for t, q in enumerate(self.frames):
-            pin.updateGeometryPlacements(self.body.model, data, shapes, geometry_data, q)
-            for k, shape in enumerate(shapes.geometryObjects):
-                _, turn = _meshcat_geometry(shape.geometry)
-                place = geometry_data.oMg[k]
-                matrix = (tilt * self.roots[t] * place if self.roots else tilt * place).homogeneous.copy()
-                matrix[:3, :3] = matrix[:3, :3] @ turn
-                path = Place(("meshcat", "body", str(k)))
-                if t == 0:
-                    out.append(SetTransform(matrix, path))
-                if len(self.frames) > 1:
-                    set_key(animation, path, t, pin.Quaternion(matrix[:3, :3]), matrix[:3, 3])
-        for k, (centre, _, _) in enumerate(self.balls):
-            out.append(SetTransform(_moved(tilt.act(centre)), Place(("meshcat", "ball", str(k)))))
-        for number, arrow in enumerate(self.arrows):
-            out += arrow_commands(arrow, str(number), animation)
+        page["floor"].set_object(Box([3.0, 1.6, 0.02]), MeshLambertMaterial(color=0x9DAA9D))
+        page["floor"].set_transform(tilt.homogeneous @ _moved([0.0, 0.0, -0.011]))
+        drawn = self._body_on(page)
+        roots = [(tilt * root).homogeneous for root in self.roots or [pin.SE3.Identity()] * len(self.frames)]
+        seen = [page, *(animation.at_frame(page, t) for t in range(len(self.frames)))]  # at rest, and moving
+        for place, root, q in zip(seen, [roots[0], *roots], [self.frames[0], *self.frames], strict=True):
+            drawn.viewer = place
+            drawn.display(q)
+            place["body"].set_transform(root)
+        for k, (centre, radius, colour) in enumerate(self.balls):
+            page[f"ball/{k}"].set_object(Sphere(radius), MeshLambertMaterial(color=colour))
+            page[f"ball/{k}"].set_transform(_moved(tilt.act(centre)))
+        for k, arrow in enumerate(self.arrows):
+            draw_arrow(arrow, page[f"arrow/{k}"], animation)
         if len(self.frames) > 1:
-            out.append(SetAnimation(animation, play=True, repetitions=1_000_000))
-        return out
+            page.set_animation(animation, play=True, repetitions=1_000_000)
+        return kept.commands
+
+    def _body_on(self, page):
+        """Pinocchio's viewer of the body, which is drawn on a page."""
+        from pinocchio.visualize import MeshcatVisualizer  # noqa: PLC0415
+
+        shapes = pin.buildGeomFromUrdfString(self.body.model, self.body.urdf, pin.GeometryType.VISUAL)
+        for shape in shapes.geometryObjects:
+            shape.meshColor = np.append(shape.meshColor[:3], self.opacity)
+        drawn = MeshcatVisualizer(self.body.model, None, shapes)
+        drawn.initViewer(page)
+        drawn.loadViewerModel("body")
+        return drawn
 
     def html(self) -> str:
         """The page."""
@@ -336,18 +327,15 @@ def import_meshcat():
     return meshcat
 
 
-def _meshcat_geometry(shape):
-    """meshcat's geometry of a coal shape, and the rotation from one's axes to the other's."""
-    import coal  # noqa: PLC0415
-    from meshcat.geometry import Box, Cylinder, Sphere  # noqa: PLC0415
+class _Kept:
+    """What stands for a browser: it keeps what is sent."""
 
-    if isinstance(shape, coal.Sphere):
-        return Sphere(shape.radius), np.eye(3)
-    if isinstance(shape, coal.Cylinder):
-        return Cylinder(2.0 * shape.halfLength, shape.radius), _UPRIGHT
-    if isinstance(shape, coal.Box):
-        return Box((2.0 * shape.halfSide).tolist()), np.eye(3)
-    raise InputError(f"the viewer draws spheres, cylinders and boxes, not {type(shape).__name__}")
+    def __init__(self) -> None:
+        self.commands: list = []
+
+    def send(self, command) -> None:
+        """Keep a drawing command."""
+        self.commands.append(command)
 
 
 _PAGE = """<!DOCTYPE html>

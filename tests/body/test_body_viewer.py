@@ -265,8 +265,9 @@ def test_a_slope_tilts_the_floor_and_the_body_and_gravity_is_down(body):
     assert np.allclose(floor[:3, :3] @ gravity / np.linalg.norm(gravity), [0.0, 0.0, -1.0])
     for path, matrix in level.items():
         if "/body/" in path:
-            assert np.allclose(tilted[path][:3, :3], floor[:3, :3] @ matrix[:3, :3])
-            assert np.allclose(tilted[path][:3, 3], floor[:3, :3] @ matrix[:3, 3])
+            placed = tilted["/meshcat/body"] @ tilted[path]
+            assert np.allclose(placed[:3, :3], floor[:3, :3] @ matrix[:3, :3])
+            assert np.allclose(placed[:3, 3], floor[:3, :3] @ matrix[:3, 3])
 
 
 @pytest.mark.parametrize(
