@@ -103,6 +103,11 @@ def _field_of(about: Callable[P, ParameterInfo]) -> Callable[Concatenate[float, 
 parameter = _field_of(ParameterInfo)
 
 
+def refinement(default: float, **attributes: Any) -> Any:
+    """A parameter that is a refinement of the form: switched off at its default."""
+    return parameter(default, null=default, optional=True, **attributes)
+
+
 def parameters_of(thing: Any) -> dict[str, ParameterInfo]:
     """Name and description of every parameter of a dataclass or an instance of one, in order."""
     return dict(_parameters_of(thing if isinstance(thing, type) else type(thing)))

@@ -22,6 +22,7 @@ from fes_pin.models.parameters import (  # noqa: F401 - what the file of a cause
     check_parameters,
     parameter,
     parameters_of,
+    refinement,
 )
 
 Measured = Mapping[str, np.ndarray]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from fes_pin.models.maths import clip, lag, maximum
-from fes_pin.models.stage import ByName, Effect, Stage, parameter
+from fes_pin.models.stage import ByName, Effect, Stage, parameter, refinement
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class AntagonistSpillover(Effect):
     onset_us: float = parameter(
         600.0, unit="us", lower=0.0, upper=2000.0, scale=50.0, grid=(300.0, 450.0, 600.0, 750.0, 900.0)
     )
-    lag_s: float = parameter(0.0, unit="s", null=0.0, lower=0.0, upper=0.5, scale=0.02, optional=True, grid=(0.05,))
+    lag_s: float = refinement(0.0, unit="s", lower=0.0, upper=0.5, scale=0.02, grid=(0.05,))
 
     name, stage, signal, rigs = "antagonist_spillover", Stage.NERVE, "net_force", ("ankle",)
     states = ("act",)

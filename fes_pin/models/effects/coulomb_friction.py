@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from fes_pin.models.maths import exp, fabs, lag, log, play, power, sqrt
-from fes_pin.models.stage import Bounds, ByName, Effect, Grids, Measured, Stage, parameter
+from fes_pin.models.stage import Bounds, ByName, Effect, Grids, Measured, Stage, parameter, refinement
 
 STIFFEST = 2.5
 """Largest rate of decay times step that it may show; RK4 is stable to 2.78: Hairer, Wanner, Solving ODEs II, IV.2."""
@@ -84,24 +84,16 @@ class CoulombFriction(Effect):
     """
 
     torque_nm: float = parameter(0.01, unit="{effort}", null=0.0, lower=0.0, upper=1e6, scale=0.01)
-    stiction: float = parameter(0.0, null=0.0, lower=0.0, upper=10.0, scale=0.1, optional=True, grid=(0.3, 1.0))
+    stiction: float = refinement(0.0, lower=0.0, upper=10.0, scale=0.1, grid=(0.3, 1.0))
     stribeck_speed: float = parameter(
         1.0, unit="{q}/s", lower=1e-4, upper=30.0, scale=0.5, optional=True, grid=(1.0, 0.2, 4.0)
     )
-    creep_speed: float = parameter(
-        CREEP, unit="{q}/s", null=CREEP, lower=1e-5, upper=0.5, scale=0.002, optional=True, grid=(0.02,)
-    )
-    softness: float = parameter(CORNER, null=CORNER, lower=1e-3, upper=50.0, scale=0.1, optional=True, grid=(0.5,))
-    load_exponent: float = parameter(
-        0.0, null=0.0, lower=0.0, upper=2.0, scale=1.0, optional=True, fitted=False, grid=(1.0, 4.0 / 3.0, 1.5)
-    )
-    asymmetry: float = parameter(
-        0.0, null=0.0, lower=-1.0, upper=1.0, scale=0.1, optional=True, grid=(0.3, -0.3), rigs=("ankle",)
-    )
-    presliding: float = parameter(0.0, unit="{q}", null=0.0, lower=0.0, upper=10.0, scale=0.01, optional=True)
-    stretch: float = parameter(
-        0.0, unit="{q}", null=0.0, lower=0.0, upper=10.0, scale=0.001, optional=True, rigs=("joint",)
-    )
+    creep_speed: float = refinement(CREEP, unit="{q}/s", lower=1e-5, upper=0.5, scale=0.002, grid=(0.02,))
+    softness: float = refinement(CORNER, lower=1e-3, upper=50.0, scale=0.1, grid=(0.5,))
+    load_exponent: float = refinement(0.0, lower=0.0, upper=2.0, scale=1.0, fitted=False, grid=(1.0, 4.0 / 3.0, 1.5))
+    asymmetry: float = refinement(0.0, lower=-1.0, upper=1.0, scale=0.1, grid=(0.3, -0.3), rigs=("ankle",))
+    presliding: float = refinement(0.0, unit="{q}", lower=0.0, upper=10.0, scale=0.01)
+    stretch: float = refinement(0.0, unit="{q}", lower=0.0, upper=10.0, scale=0.001, rigs=("joint",))
 
     name, stage, signal, rigs = "coulomb_friction", Stage.JOINT, "friction", ("ankle", "joint")
     states, memories, of_form = ("share",), ("anchor",), {"share": "presliding", "anchor": "stretch"}

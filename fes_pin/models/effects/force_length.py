@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from fes_pin.models.maths import exp
-from fes_pin.models.stage import Bounds, Effect, Grids, Measured, Stage, parameter, span
+from fes_pin.models.stage import Bounds, Effect, Grids, Measured, Stage, parameter, refinement, span
 
 
 @dataclass(frozen=True)
@@ -25,9 +25,7 @@ class ForceLength(Effect):
 
     slope_per_rad: float = parameter(0.2, unit="1/{q}", null=0.0, lower=-1e4, upper=1e4, scale=0.1)
     curvature_per_rad2: float = parameter(0.2, unit="1/{q}2", null=0.0, lower=-1e6, upper=1e7, scale=0.2)
-    skew_per_rad3: float = parameter(
-        0.0, unit="1/{q}3", null=0.0, lower=-1e9, upper=1e9, scale=0.2, optional=True, rigs=("muscle",)
-    )
+    skew_per_rad3: float = refinement(0.0, unit="1/{q}3", lower=-1e9, upper=1e9, scale=0.2, rigs=("muscle",))
 
     name, stage, signal, rigs = "force_length", Stage.MUSCLE, "fibres", ("ankle", "muscle")
 

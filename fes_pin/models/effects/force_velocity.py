@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from fes_pin.models.maths import sqrt, where
-from fes_pin.models.stage import Bounds, Effect, Grids, Measured, Stage, parameter
+from fes_pin.models.stage import Bounds, Effect, Grids, Measured, Stage, parameter, refinement
 
 PLATEAU = 2.0
 """1 / (1.5 - 1): a stretched muscle bears half more than its isometric force at most, until data show another: van
@@ -32,11 +32,9 @@ class ForceVelocity(Effect):
     """
 
     slope_s_per_rad: float = parameter(0.05, unit="s/{q}", null=0.0, lower=-100.0, upper=1e4, scale=0.05)
-    bend: float = parameter(
-        0.0, null=0.0, lower=-20.0, upper=20.0, scale=0.5, optional=True, grid=(0.5,), rigs=("ankle",)
-    )
-    hill: float = parameter(0.0, null=0.0, lower=0.0, upper=20.0, scale=1.0, optional=True)
-    plateau: float = parameter(PLATEAU, null=PLATEAU, lower=0.0, upper=20.0, scale=1.0, optional=True)
+    bend: float = refinement(0.0, lower=-20.0, upper=20.0, scale=0.5, grid=(0.5,), rigs=("ankle",))
+    hill: float = refinement(0.0, lower=0.0, upper=20.0, scale=1.0)
+    plateau: float = refinement(PLATEAU, lower=0.0, upper=20.0, scale=1.0)
 
     name, stage, signal, rigs = "force_velocity", Stage.MUSCLE, "fibres", ("ankle", "muscle")
 

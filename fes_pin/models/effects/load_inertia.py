@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from fes_pin.models.maths import cos, sin
-from fes_pin.models.stage import Effect, Stage, parameter
+from fes_pin.models.stage import Effect, Stage, parameter, refinement
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,7 @@ class LoadInertia(Effect):
     """
 
     share: float = parameter(0.5, null=0.0, lower=0.0, upper=3.0, scale=0.1)
-    wheel: float = parameter(0.0, null=0.0, lower=0.0, upper=1.0, scale=1.0, fitted=False, optional=True, grid=(1.0,))
+    wheel: float = refinement(0.0, lower=0.0, upper=1.0, scale=1.0, fitted=False, grid=(1.0,))
 
     name, stage, signal, rigs = "load_inertia", Stage.JOINT, "driving", ("ankle",)
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from fes_pin.models.maths import exp, ramp, sqrt
-from fes_pin.models.stage import Bounds, Effect, Grids, Measured, Stage, parameter
+from fes_pin.models.stage import Bounds, Effect, Grids, Measured, Stage, parameter, refinement
 
 FLAT = 1e-6
 """Squared rate at which the exponential is a straight line, 1/m2."""
@@ -30,9 +30,7 @@ class ParallelStiffness(Effect):
 
     stiffness_nm_per_rad: float = parameter(0.05, unit="{effort}/{q}", null=0.0, lower=0.0, upper=1e8, scale=0.05)
     rest_angle_rad: float = parameter(1.6, unit="{q}", lower=-20.0, upper=20.0, scale=0.1, times="stiffness_nm_per_rad")
-    hardening_per_rad2: float = parameter(
-        0.0, unit="1/{q}2", null=0.0, lower=0.0, upper=1e7, scale=1.0, optional=True, grid=(1.0,)
-    )
+    hardening_per_rad2: float = refinement(0.0, unit="1/{q}2", lower=0.0, upper=1e7, scale=1.0, grid=(1.0,))
 
     name, stage, signal, rigs = "parallel_stiffness", Stage.JOINT, "torque", ("ankle", "joint", "muscle")
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from fes_pin.models.maths import power
-from fes_pin.models.stage import Effect, Stage, parameter
+from fes_pin.models.stage import Effect, Stage, parameter, refinement
 
 LEAST = 1e-3
 """Activation below which its powers are replaced by a straight line, which keeps derivatives finite."""
@@ -26,7 +26,7 @@ class PulseSummation(Effect):
     """
 
     saturation: float = parameter(1.0, null=0.0, lower=-0.9, upper=200.0, scale=0.5)
-    cooperation: float = parameter(0.0, null=0.0, lower=-0.5, upper=4.0, scale=0.5, optional=True, grid=(1.0,))
+    cooperation: float = refinement(0.0, lower=-0.5, upper=4.0, scale=0.5, grid=(1.0,))
 
     name, stage, signal, rigs = "pulse_summation", Stage.MUSCLE, "activation", ("muscle",)
 

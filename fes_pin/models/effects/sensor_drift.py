@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fes_pin.models.stage import Bounds, Effect, Measured, Stage, parameter, reading_range, symmetric
+from fes_pin.models.stage import Bounds, Effect, Measured, Stage, parameter, reading_range, refinement, symmetric
 
 
 @dataclass(frozen=True)
@@ -21,9 +21,7 @@ class SensorDrift(Effect):
     """
 
     rate_per_s: float = parameter(0.001, unit="{y}/s", null=0.0, lower=-100.0, upper=100.0, scale=0.0005)
-    settling_per_s: float = parameter(
-        0.0, unit="1/s", null=0.0, lower=0.0, upper=10.0, scale=0.1, optional=True, grid=(0.2,)
-    )
+    settling_per_s: float = refinement(0.0, unit="1/s", lower=0.0, upper=10.0, scale=0.1, grid=(0.2,))
 
     name, stage, signal, rigs = "sensor_drift", Stage.SENSOR, "reading", ("ankle", "joint", "muscle")
 

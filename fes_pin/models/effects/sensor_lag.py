@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from fes_pin.models.maths import lag, lag_time
-from fes_pin.models.stage import ByName, Effect, Measured, Stage, least_step, parameter
+from fes_pin.models.stage import ByName, Effect, Measured, Stage, least_step, parameter, refinement
 
 
 @dataclass(frozen=True)
@@ -24,9 +24,7 @@ class SensorLag(Effect):
     """
 
     lag_s: float = parameter(0.005, unit="s", null=0.0, lower=0.0, upper=0.5, scale=0.005)
-    shift: float = parameter(
-        0.0, null=0.0, lower=0.0, upper=1.0, scale=1.0, fitted=False, optional=True, grid=(1.0,), rigs=("joint",)
-    )
+    shift: float = refinement(0.0, lower=0.0, upper=1.0, scale=1.0, fitted=False, grid=(1.0,), rigs=("joint",))
 
     name, stage, signal, rigs = "sensor_lag", Stage.SENSOR, "reading", ("ankle", "joint", "muscle")
     states = ("filtered",)

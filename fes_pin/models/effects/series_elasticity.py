@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from fes_pin.models.maths import exp
-from fes_pin.models.stage import Bounds, ByName, Effect, Grids, Measured, Stage, parameter, span
+from fes_pin.models.stage import Bounds, ByName, Effect, Grids, Measured, Stage, parameter, refinement, span
 
 RIGID = 1e-16
 """Compliance that counts as none, m/N."""
@@ -30,7 +30,7 @@ class SeriesElasticity(Effect):
     """
 
     compliance: float = parameter(1e-4, unit="m/N", null=0.0, lower=0.0, upper=1.0, scale=1e-4)
-    toe: float = parameter(0.0, unit="m", null=0.0, lower=0.0, upper=0.1, scale=1e-4, optional=True)
+    toe: float = refinement(0.0, unit="m", lower=0.0, upper=0.1, scale=1e-4)
     toe_force: float = parameter(1.0, unit="N", lower=1e-3, upper=1e4, scale=1.0, optional=True)
 
     name, stage, signal, rigs = "series_elasticity", Stage.MUSCLE, "fibre", ("muscle",)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from fes_pin.models.stage import Effect, Stage, parameter
+from fes_pin.models.stage import Effect, Stage, parameter, refinement
 
 
 @dataclass(frozen=True)
@@ -21,9 +21,7 @@ class ThresholdDrift(Effect):
     """
 
     rate_us_per_s: float = parameter(2.0, unit="us/s", null=0.0, lower=-100.0, upper=100.0, scale=2.0)
-    settling_per_s: float = parameter(
-        0.0, unit="1/s", null=0.0, lower=0.0, upper=10.0, scale=0.1, optional=True, grid=(0.2,)
-    )
+    settling_per_s: float = refinement(0.0, unit="1/s", lower=0.0, upper=10.0, scale=0.1, grid=(0.2,))
 
     name, stage, signal, rigs = "threshold_drift", Stage.NERVE, "pulse_width", ("ankle", "muscle")
 
