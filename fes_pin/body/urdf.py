@@ -10,6 +10,7 @@ import numpy as np
 from fes_pin.body.joints import JOINTS, SIDES, BodyJoint, axis_of, joint_limits
 from fes_pin.body.skeleton import Skeleton
 from fes_pin.data.numbers import in_full, known_word
+from fes_pin.data.urdf import MOMENTS
 
 EFFORT_NM, VELOCITY_RADPS = 500.0, 30.0
 """URDF asks for them; above what walking needs, and never used here."""
@@ -102,15 +103,8 @@ def _joint(joint: BodyJoint, parent: str, child: str, xyz: np.ndarray) -> list[s
 
 def _link(name: str, skeleton: Skeleton, origin: np.ndarray) -> list[str]:
     segment = skeleton.segments[name]
-    i = segment.inertia
-    moments = " ".join(
-        f'{key}="{in_full(value)}"'
-        for key, value in zip(
-            ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"),
-            (i[0, 0], i[0, 1], i[0, 2], i[1, 1], i[1, 2], i[2, 2]),
-            strict=True,
-        )
-    )
+    values = zip(MOMENTS, segment.inertia[np.triu_indices(3)], strict=True)
+    moments = " ".join(f'{key}="{in_full(value)}"' for key, value in values)
     return [
         f'  <link name="{name}">',
         f'    <inertial><origin xyz="{in_full(*segment.com - origin)}"/><mass value="{in_full(segment.mass)}"/>',

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from xml.etree.ElementTree import Element, ParseError, SubElement, tostring
 
@@ -19,12 +19,14 @@ MOVING = ("revolute", "continuous", "prismatic", "floating", "planar")
 ONE_JOINT = ("revolute", "continuous", "prismatic")
 SMALLEST, LARGEST = 1e-9, 1e6
 """Round figures far outside any rig, in SI units: masses and lengths of directions lie between, all else below."""
+MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+"""Of an inertia, as URDF names them: the upper triangle of its matrix, row by row."""
 NumbersOf = Mapping[str, tuple[int, float | None]]
 PLACE: NumbersOf = {"xyz": (3, 0.0), "rpy": (3, 0.0)}
 LINK_NUMBERS: Mapping[str, NumbersOf] = {
     "origin": PLACE,
     "mass": {"value": (1, None)},
-    "inertia": {**dict.fromkeys(("ixx", "iyy", "izz"), (1, None)), **dict.fromkeys(("ixy", "ixz", "iyz"), (1, 0.0))},
+    "inertia": {key: (1, None if key[1] == key[2] else 0.0) for key in MOMENTS},
 }
 JOINT_NUMBERS: Mapping[str, NumbersOf] = {
     "origin": PLACE,
@@ -108,6 +110,29 @@ def mechanics(path: str | Path) -> str:
     return _Urdf(path).mechanics()
 
 
+def links_beyond(path: str | Path, joint: str) -> list[str]:
+    """Names of the links beyond a joint, the one that it moves first.
+
+    Raises
+    ------
+    InputError
+        As `moving_joints`.
+    """
+    return _Urdf(path).beyond(joint)
+
+
+def inertia_matrix(moments: Iterable[float]) -> np.ndarray:
+    """The matrix, shape (3, 3), of an inertia's `MOMENTS`."""
+    upper = np.zeros((3, 3))
+    upper[np.triu_indices(3)] = list(moments)
+    return np.asarray(upper + np.triu(upper, 1).T)
+
+
+def is_possible(principal: np.ndarray) -> bool:
+    """Whether a body can have these principal moments, in ascending order, but for rounding."""
+    return bool(principal[0] >= -1e-9 * abs(principal).max())
+
+
 class _Urdf:
     """The parts of one URDF, checked as they are read."""
 
@@ -171,9 +196,8 @@ class _Urdf:
         return value
 
     def _check_inertia(self, inertia: Mapping[str, tuple[float, ...]], name: str) -> None:
-        xx, yy, zz, xy, xz, yz = (values[0] for values in inertia.values())
-        principal = np.linalg.eigvalsh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
-        if principal[0] < -1e-9 * abs(principal).max():
+        principal = np.linalg.eigvalsh(inertia_matrix(value for (value,) in inertia.values()))
+        if not is_possible(principal):
             raise self.error(f"expected an inertia that is positive, found a principal one of {principal[0]:g}", name)
 
     def _check_joint(self, joint: Element) -> None:
@@ -257,9 +281,13 @@ class _Urdf:
 
     def moved_mass(self, joint: str) -> float:
         """Mass of all links beyond a joint, kg."""
+        return sum(self.masses[link] for link in self.beyond(joint))
+
+    def beyond(self, joint: str) -> list[str]:
+        """Links beyond a joint, the one that it moves first."""
         child = next(j for j in self.joints if j.get("name") == joint).find("child")
         first = "" if child is None else child.get("link", "")
-        return sum(mass for link, mass in self.masses.items() if first in self._ancestry(link))
+        return [first, *(link for link in self.links if link != first and first in self._ancestry(link))]
 
     def _ancestry(self, link: str) -> set[str]:
         found = set[str]()

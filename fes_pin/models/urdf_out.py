@@ -11,7 +11,7 @@ from defusedxml import ElementTree
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import in_full
-from fes_pin.data.urdf import check_one_joint, mechanics
+from fes_pin.data.urdf import MOMENTS, check_one_joint, inertia_matrix, is_possible, links_beyond, mechanics
 from fes_pin.models.effects import CoulombFriction
 from fes_pin.models.model import Model
 from fes_pin.models.rigs import Joint
@@ -53,7 +53,7 @@ def extended_urdf(model: Model, urdf: str | Path) -> tuple[str, tuple[str, ...],
     _check_same(rig, body, urdf)
     root = ElementTree.fromstring(mechanics(urdf))
     joint = next(j for j in root.findall("joint") if j.get("name") == name)
-    changed = _scale(root, joint, rig, joint_inertia(body), urdf)
+    changed = _scale(root, joint, links_beyond(urdf, name), rig, joint_inertia(body), urdf)
     friction = next((e for e in model.effects if isinstance(e, CoulombFriction)), None)
     dynamics = joint.find("dynamics")
     dynamics = SubElement(joint, "dynamics") if dynamics is None else dynamics
@@ -73,7 +73,7 @@ def _check_same(rig: Joint, body: pin.Model, urdf: str | Path) -> None:
         raise InputError(message, file=urdf)
 
 
-def _scale(root: Element, joint: Element, rig: Joint, inertia: float, urdf: str | Path) -> str:
+def _scale(root: Element, joint: Element, moving: list[str], rig: Joint, inertia: float, urdf: str | Path) -> str:
     """Scale masses by the weight, and add the remaining inertia about the joint's axis; returns what else was changed.
 
     Where the inertia is less than that of masses where they are, all lengths of what moves are multiplied by k and the
@@ -87,26 +87,12 @@ def _scale(root: Element, joint: Element, rig: Joint, inertia: float, urdf: str 
         raise InputError(f"a sliding mass has one factor for inertia and weight, found {found}", file=urdf)
     if not factor > 0.0:
         raise InputError(f"expected a gravity_scale above 0, found {factor:g}: no mass weighs so", file=urdf)
-    moving = _moving(root, joint)
     if slides or _add(root, joint, moving, (rig.inertia_scale / factor - 1.0) * inertia, urdf):
         _multiply(root, moving, factor, 1.0)
         return ""
     ratio = rig.inertia_scale / factor
     _multiply(root, moving, factor / ratio, ratio)
     return f"lengths of what moves are multiplied by {ratio:.4g}: the mass that weighs as fitted has less inertia there"
-
-
-def _moving(root: Element, joint: Element) -> list[str]:
-    """Links beyond a joint, the nearest first."""
-    child = joint.find("child")
-    assert child is not None
-    out = [child.get("link", "")]
-    for name in out:
-        for other in root.findall("joint"):
-            parent, below = other.find("parent"), other.find("child")
-            if parent is not None and below is not None and parent.get("link") == name:
-                out.append(below.get("link", ""))
-    return out
 
 
 def _multiply(root: Element, moving: list[str], mass: float, length: float) -> None:
@@ -118,7 +104,7 @@ def _multiply(root: Element, moving: list[str], mass: float, length: float) -> N
         weight, inertia = inertial.find("mass"), inertial.find("inertia")
         assert weight is not None and inertia is not None
         weight.set("value", in_full(mass * float(weight.get("value", "0"))))
-        for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"):
+        for key in MOMENTS:
             inertia.set(key, in_full(mass * length**2 * float(inertia.get(key, "0"))))
         _lengthen(inertial.find("origin"), length)
     for joint in root.findall("joint"):
@@ -149,13 +135,9 @@ def _add(root: Element, joint: Element, moving: list[str], extra: float, urdf: s
         raise InputError("expected a mass on the link that the joint moves", file=urdf, column=moving[0])
     axis, rpy = _vector(joint.find("axis"), "xyz", "1 0 0"), _vector(bare.find("origin"), "rpy", "0 0 0")
     axis = pin.rpy.rpyToMatrix(*rpy).T @ (axis / np.linalg.norm(axis))
-    keys = (("ixx", 0, 0), ("ixy", 0, 1), ("ixz", 0, 2), ("iyy", 1, 1), ("iyz", 1, 2), ("izz", 2, 2))
-    tensor = np.zeros((3, 3))
-    for key, i, j in keys:
-        tensor[i, j] = tensor[j, i] = float(inertia.get(key, "0"))
-    tensor += extra * np.outer(axis, axis)
-    if np.linalg.eigvalsh(tensor)[0] < -1e-9 * abs(tensor).max():
+    matrix = inertia_matrix(float(inertia.get(key, "0")) for key in MOMENTS) + extra * np.outer(axis, axis)
+    if not is_possible(np.linalg.eigvalsh(matrix)):
         return False
-    for key, i, j in keys:
-        inertia.set(key, in_full(tensor[i, j]))
+    for key, value in zip(MOMENTS, matrix[np.triu_indices(3)], strict=True):
+        inertia.set(key, in_full(value))
     return True
