@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -145,56 +144,44 @@ class Simulator:
         the model follows the first 0.2 s best, position and rate fitted together. What effects have of each trial's own
         is at its null.
         """
-        rig = self.model.rig
-        out = [self.model.initial_unknowns(t) for t in self.trials]
-        todo = [i for i, t in enumerate(self.trials) if rig.unmeasured(t)]
-        if todo:
-            found = _first_motion(self.model, [self.trials[i] for i in todo], values, [out[i] for i in todo])
-            for i, unknowns in zip(todo, found, strict=True):
-                out[i].update({n: unknowns[n] for n in rig.unmeasured(self.trials[i])})
+        rig, out = self.model.rig, [self.model.initial_unknowns(t) for t in self.trials]
+        unmeasured = [i for i, t in enumerate(self.trials) if rig.unmeasured(t)]
+        if unmeasured:
+            kind = self.trials[unmeasured[0]].kind
+            found = self._following(values, out, unmeasured, rig.unknowns(kind), rig.output(kind))
+            for i, own in zip(unmeasured, found, strict=True):
+                out[i].update({n: own[n] for n in rig.unmeasured(self.trials[i])})
         if any(e.signal in ("play", "reading") for e in self.model.effects):
-            _read_through(self.model, self.trials, values, out)
+            read = [rig.read_first(t) for t in self.trials]
+            for name, column in dict.fromkeys(pair for own in read for pair in own.items()):
+                those = [i for i, own in enumerate(read) if own.get(name) == column]
+                found = self._following(values, out, those, (name,), column, samples=1)
+                for i, own in zip(those, found, strict=True):
+                    out[i] = own
         return out
 
-
-def _read_through(
-    model: Model, trials: Sequence[Trial], values: Mapping[str, float], unknowns: Sequence[dict[str, float]]
-) -> None:
-    """Move what a first sample tells until the model, its sensor included, reads that sample: Newton's steps."""
-    read = [model.rig.read_first(t) for t in trials]
-    names = dict.fromkeys(n for columns in read for n in columns)
-    if not names:
-        return
-    simulator = Simulator(model, [_first_samples(t) for t in trials])
-    for name, _ in itertools.product(names, range(NEWTON_STEPS)):
-        base = simulator.run(values, unknowns)
-        moved = simulator.run(values, [{**u, name: u[name] + NUDGE} for u in unknowns])
-        for i, trial in enumerate(trials):
-            if name not in read[i]:
-                continue
-            k = model.rig.outputs(trial.kind).index(read[i][name])
-            slope = float(moved[i].readings[0, k] - base[i].readings[0, k]) / NUDGE
-            step = float(trial[read[i][name]][0] - base[i].readings[0, k]) / slope if slope else 0.0
-            unknowns[i][name] += step if math.isfinite(step) else 0.0
-
-
-def _first_motion(
-    model: Model, trials: Sequence[Trial], values: Mapping[str, float], start: Sequence[Mapping[str, float]]
-) -> list[dict[str, float]]:
-    """EachTrial of trials with which a model follows their first samples best: Gauss-Newton on differences."""
-    rig, short = model.rig, [_first_samples(t) for t in trials]
-    simulator, guess = Simulator(model, short), [dict(u) for u in start]
-    names = rig.unknowns(short[0].kind)
-    for _ in range(NEWTON_STEPS):
-        base = simulator.run(values, guess)
-        moved = [simulator.run(values, [{**u, n: u[n] + NUDGE} for u in guess]) for n in names]
-        for i, trial in enumerate(short):
-            reading = base[i].readings[:, 0]
-            slopes = np.stack([(m[i].readings[:, 0] - reading) / NUDGE for m in moved], axis=1)
-            missed = trial[rig.output(trial.kind)] - reading
-            for name, step in zip(names, least_squares(slopes, missed), strict=True):
-                guess[i][name] += float(step)
-    return guess
+    def _following(
+        self,
+        values: Mapping[str, float],
+        unknowns: Sequence[dict[str, float]],
+        places: Sequence[int],
+        names: Sequence[str],
+        column: str,
+        samples: int | None = None,
+    ) -> list[dict[str, float]]:
+        """Unknowns with which some trials' first samples of a column are followed best: Gauss-Newton on differences."""
+        short, guess = [_first_samples(self.trials[i]) for i in places], [dict(unknowns[i]) for i in places]
+        simulator = Simulator(self.model, short)
+        for _ in range(NEWTON_STEPS):
+            base = simulator.run(values, guess)
+            moved = [simulator.run(values, [{**u, n: u[n] + NUDGE} for u in guess]) for n in names]
+            for i, trial in enumerate(short):
+                k = self.model.rig.outputs(trial.kind).index(column)
+                reading = base[i].readings[:samples, k]
+                slopes = np.stack([(m[i].readings[:samples, k] - reading) / NUDGE for m in moved], axis=1)
+                for name, step in zip(names, least_squares(slopes, trial[column][:samples] - reading), strict=True):
+                    guess[i][name] += float(step)
+        return guess
 
 
 def _first_samples(trial: Trial) -> Trial:
