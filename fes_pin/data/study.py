@@ -44,7 +44,7 @@ from fes_pin.data.schema import (
 from fes_pin.data.show import by_columns, frame, table_html
 from fes_pin.data.study_tables import HORIZON, StudyTables, check_files
 from fes_pin.data.table import format_csv
-from fes_pin.data.toml import Document, document_of, read_toml
+from fes_pin.data.toml import document_of, read_toml
 from fes_pin.data.trial import LOW_PASS, POSITIVE_HZ, Trial, check_trial, read_body_trial, read_trial, trial_csv
 
 if TYPE_CHECKING:
@@ -357,18 +357,12 @@ def read_columns(path: str | Path, *, rigs: Rigs | None = None) -> Columns | Non
 class _Reader(StudyTables):
     """One reading of a study.toml with its trials."""
 
-    def __init__(self, document: Document, rigs: Rigs) -> None:
-        super().__init__(document, rigs)
-        self.own: Columns | None = None
-
     def study(self) -> Study:
         constants, files = self.rig_table()
         start = self.start_table(constants)
-        self.own = self.columns_table(files)
-        names = self._trial_names()
-        trials = []
-        for index, table in enumerate(self._trial_tables()):
-            trials.append(self._trial(f"trial[{index}]", table, names[index]))
+        own, tables = self.columns_table(files), self._trial_tables()
+        each = enumerate(zip(tables, self._trial_names(tables), strict=True))
+        trials = [self._trial(f"trial[{index}]", table, name, own) for index, (table, name) in each]
         check_same_inputs([(t.kind, t.columns) for t in trials], self.schema, constants, self._fault_of)
         horizon = self.horizon()
         folder = self.folder.absolute()
@@ -382,12 +376,12 @@ class _Reader(StudyTables):
             raise self.error("trial", "missing; expected at least one table [[trial]]")
         return tables
 
-    def _trial_names(self) -> list[str]:
+    def _trial_names(self, tables: Sequence[Mapping[str, Any]]) -> list[str]:
         """What trials call themselves, else the stems of their files, or their paths where stems are the same."""
         main = self.schema.recordings[0]
         paths: list[PurePosixPath] = []
         seen: dict[Path, str] = {}
-        for index, table in enumerate(self._trial_tables()):
+        for index, table in enumerate(tables):
             key = f"trial[{index}].{main}"
             if main not in table:
                 raise self.error(key, "missing; expected the path of a file inside the study")
@@ -398,9 +392,9 @@ class _Reader(StudyTables):
             paths.append(PurePosixPath(table[main].replace("\\", "/")))
         stems = Counter(path.stem for path in paths)
         names = [path.stem if stems[path.stem] == 1 else str(path.with_suffix("")) for path in paths]
-        return [table.get("name", name) for table, name in zip(self._trial_tables(), names, strict=True)]
+        return [table.get("name", name) for table, name in zip(tables, names, strict=True)]
 
-    def _trial(self, where: str, table: Mapping[str, Any], name: str) -> Trial:
+    def _trial(self, where: str, table: Mapping[str, Any], name: str, own: Columns | None) -> Trial:
         named, error = self.schema.recordings, self.document.under(where)
         kind, role, group = checked_kind(self.schema, table.get("kind"), error), table.get("role"), table.get("group")
         check_labels(name, role, group, error)
@@ -416,7 +410,7 @@ class _Reader(StudyTables):
                 raise error(key, "missing; expected the path of a file inside the study")
         paths = [self.document.path_of(f"{where}.{key}", table[key]) for key in named]
         if len(paths) == 1:
-            return read_trial(paths[0], rig=self.schema, kind=kind, own=self.own, **labels)
+            return read_trial(paths[0], rig=self.schema, kind=kind, own=own, **labels)
         return read_body_trial(paths[0], paths[1], **labels)
 
     def _fault_of(self, place: int | None, key: str, message: str) -> InputError:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from fes_pin.data import libraries
+from fes_pin.data.as_read import HeldFile
 from fes_pin.data.errors import InputError
 from fes_pin.data.new_study import new_study
 from fes_pin.data.recorded.formats import read_recording
@@ -108,10 +109,11 @@ WRITERS = {
 def test_a_recording_of_each_format_becomes_a_study(tmp_path, name):
     path = tmp_path / name
     WRITERS[name](path)
-    wanted = Wanted((path,), known_rigs()["joint"], tmp_path, "own", ("p.urdf", pendulum(0.3, 0.5)), True)
+    believed = HeldFile.holding("p.urdf", pendulum(0.3, 0.5).encode())
+    wanted = Wanted((path,), known_rigs()["joint"], tmp_path, "own", believed)
     made = new_study(wanted, lambda _: {"inertia_scale": 1.0, "damping": 0.01})
     for place, content in made.contents.items():
-        (tmp_path / place).write_text(content)
+        (tmp_path / place).write_bytes(content if isinstance(content, bytes) else content.encode())
     (trial,) = read_study(tmp_path).trials
     assert trial.dt == pytest.approx(0.005) and len(trial) == len(TIME)
     single = 1e-5 if name.endswith("c3d") else 1e-6  # C3D holds single precision

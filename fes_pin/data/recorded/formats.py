@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -98,8 +99,13 @@ def _library(module: str, extra: str, path: Path) -> Any:
     return optional_library(module, extra, needed, file=path)
 
 
-def _unreadable(path: Path, kind: str, error: BaseException) -> InputError:
-    return InputError(f"cannot be read as {kind}: {' '.join(str(error).split())[:120]}", file=path)
+@contextmanager
+def _reading(path: Path, kind: str) -> Iterator[None]:
+    """What a library cannot read is an input error."""
+    try:
+        yield
+    except Exception as error:
+        raise InputError(f"cannot be read as {kind}: {' '.join(str(error).split())[:120]}", file=path) from None
 
 
 def _made(path: Path, columns: Mapping[str, np.ndarray], wanted: Sequence[str] | None, **more: Any) -> Table:
@@ -113,10 +119,8 @@ def _made(path: Path, columns: Mapping[str, np.ndarray], wanted: Sequence[str] |
 def _parquet(path: Path, wanted: Sequence[str] | None) -> Table:
     parquet = _library("pyarrow.parquet", "parquet", path)
     types = _library("pyarrow.types", "parquet", path)
-    try:
+    with _reading(path, "Parquet"):
         table = parquet.read_table(path)
-    except Exception as error:
-        raise _unreadable(path, "Parquet", error) from None
     columns: dict[str, np.ndarray] = {}
     for name, column in zip(without_twins(list(table.column_names)), table.columns, strict=True):
         kind = column.type
@@ -137,10 +141,8 @@ def matlab_vectors(path: Path) -> dict[str, np.ndarray]:
         Not a MATLAB file, or pymatreader is not installed.
     """
     reader = _library("pymatreader", "matlab", path)
-    try:
+    with _reading(path, "a MATLAB file"):
         content = reader.read_mat(str(path))
-    except Exception as error:
-        raise _unreadable(path, "a MATLAB file", error) from None
     return dict(_vectors(content))
 
 
@@ -180,15 +182,13 @@ def _vectors(content: Any, name: str = "") -> Iterator[tuple[str, np.ndarray]]:
 def _c3d(path: Path, wanted: Sequence[str] | None) -> Table:
     """Analog channels at their rate; where only points are wanted, `<marker>_x`, `_y`, `_z` in m at theirs."""
     ezc3d = _library("ezc3d", "c3d", path)
-    try:
+    with _reading(path, "C3D"):
         content = ezc3d.c3d(str(path))
         about = content["parameters"]["ANALOG"]
         labels = without_twins([str(n).strip() for n in about.get("LABELS", {}).get("value", [])])
         units = [str(u).strip() for u in about.get("UNITS", {}).get("value", [])]
         values = np.asarray(content["data"]["analogs"], dtype=float)[0]
         rate = float(content["header"]["analogs"]["frame_rate"])
-    except Exception as error:
-        raise _unreadable(path, "C3D", error) from None
     analog = dict(zip(labels, values, strict=False)) if values.size else {}
     points = c3d_points(content, path) if content["data"]["points"].size else {}
     names = (TIME, *analog, *(n for n in points if n != TIME))
@@ -215,12 +215,10 @@ def _xdf(path: Path, wanted: Sequence[str] | None) -> Table:
     pyxdf = _library("pyxdf", "xdf", path)
     if read_bytes(path)[:4] not in (b"XDF:", b"\x1f\x8b\x08\x00", b"\x1f\x8b\x08\x08"):
         raise InputError("cannot be read as XDF: it does not begin as one", file=path)  # pyxdf would leave it open
-    try:
+    with _reading(path, "XDF"):
         streams, _ = pyxdf.load_xdf(str(path))
         numbers = [s for s in streams if np.asarray(s["time_series"]).dtype.kind in "iuf" and len(s["time_stamps"])]
         named = [(str(s["info"]["name"][0]), s, _channels(s)) for s in numbers]
-    except Exception as error:
-        raise _unreadable(path, "XDF", error) from None
     columns: dict[str, np.ndarray] = {}
     units: dict[str, str] = {}
     for name, stream, channels in named:

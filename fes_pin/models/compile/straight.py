@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Sequence
+from functools import partialmethod
 from typing import NamedTuple
 
 from fes_pin.models.compile.layout import WIDTH
@@ -52,21 +53,8 @@ class Lines:
         """Of two values of a type: fadd, fsub, fmul, fdiv, add, sub, shl, ashr, and, or, xor."""
         return self._made(one.type, f"{' '.join((name, *flags))} {one.type} {one.text}, {other.text}")
 
-    def fadd(self, one: Value, other: Value, flags: Sequence[str] = ()) -> Value:
-        """Sum of numbers."""
-        return self.operation("fadd", one, other, flags)
-
-    def fsub(self, one: Value, other: Value, flags: Sequence[str] = ()) -> Value:
-        """Difference of numbers."""
-        return self.operation("fsub", one, other, flags)
-
-    def fmul(self, one: Value, other: Value, flags: Sequence[str] = ()) -> Value:
-        """Product of numbers."""
-        return self.operation("fmul", one, other, flags)
-
-    def fdiv(self, one: Value, other: Value, flags: Sequence[str] = ()) -> Value:
-        """Quotient of numbers."""
-        return self.operation("fdiv", one, other, flags)
+    fadd, fsub = partialmethod(operation, "fadd"), partialmethod(operation, "fsub")
+    fmul, fdiv = partialmethod(operation, "fmul"), partialmethod(operation, "fdiv")
 
     def fneg(self, one: Value) -> Value:
         """The number with its sign turned round."""
