@@ -1,4 +1,4 @@
-"""What can be said of a study before any cause is looked for: what is odd about it, and what its trials can show."""
+"""Checks of a study before a search: implausible numbers, and the causes that its trials can identify."""
 
 from __future__ import annotations
 
@@ -23,24 +23,24 @@ if TYPE_CHECKING:
     import pandas
 
 FAR = 0.3
-"""Share of the variance that a nominal model leaves from which on it is said that it is far off."""
+"""Share of the variance that the nominal model leaves above which a warning says so."""
 NOT_JUDGED = "its files can be read; numbers of walking are not judged before a diagnosis"
 
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Checked(ReadOnly):
-    """What is odd about a study, and what its trials can and cannot show.
+    """Implausible numbers of a study, and the causes that its trials can and cannot identify.
 
     Attributes
     ----------
     study
         As it was given.
     odd
-        What is odd about its numbers, a line each: warnings that a diagnosis gives as well.
+        Warnings about its numbers, a line each; a diagnosis gives the same.
     limits
         What a verdict on so few trials lacks, a line each.
     testable
-        What the trials can show, or why that is not known before a diagnosis.
+        The causes that the trials can identify, or the reason why that is not known before a diagnosis.
     """
 
     study: Study
@@ -49,7 +49,7 @@ class Checked(ReadOnly):
     testable: Testable | str = NOT_JUDGED
 
     def as_dict(self) -> dict[str, Any]:
-        """The same for JSON; `shown` holds the share of each cause's sensitivity that nothing else takes up."""
+        """Return the check for JSON; `shown` has the share of each cause's sensitivity that is its own."""
         record: dict[str, Any] = {"study": self.study.name, "rig": self.study.rig, "trials": len(self.study.trials)}
         record |= {"odd": list(self.odd), "limits": list(self.limits)}
         found = self.testable
@@ -60,9 +60,9 @@ class Checked(ReadOnly):
         return {**record, "shown": shares, **lists, "unexplained_percent": shown(100.0 * found.unexplained, 4)}
 
     def to_frame(self) -> pandas.DataFrame:
-        """One row a cause: whether it would show, and the share of its sensitivity that nothing else takes up (0 to 1).
+        """Return one row a cause: whether it is identifiable, and the share of its sensitivity that is its own, 0 to 1.
 
-        What is shared by causes that are absorbed or silent is not a number.
+        The share is NaN for a cause that is not identifiable or acts in no trial.
         """
         found, rows = self.testable, list[tuple[str, str, float]]()
         if isinstance(found, Testable):
@@ -84,10 +84,10 @@ class Checked(ReadOnly):
         if isinstance(found, Testable):
             if found.unexplained > FAR:
                 share = f"{100.0 * found.unexplained:.3g} % of the variance"
-                lines.append(f"the nominal model leaves {share}: what follows is linearized far from what was measured")
+                lines.append(f"the nominal model leaves {share}: these lines rest on a linearization far from the data")
             lines += _listed(f"these trials can show {len(found.shown)} causes", found.shown)
-            lines += _listed("they cannot show, as what is fitted takes it up", found.absorbed)
-            lines += _listed("they cannot show, as it acts in none of them", found.silent)
+            lines += _listed("not identifiable, as fitted parameters can take their place", found.absorbed)
+            lines += _listed("not identifiable, as they act in none of the trials", found.silent)
             if found.alike:
                 groups = "; ".join(" and ".join(group) for group in found.alike)
                 lines.append(f"they look alike on these trials: {groups}")
@@ -97,14 +97,14 @@ class Checked(ReadOnly):
 
 
 def check(study: Study, *, library: Source | Sequence[Source] | None = None) -> Checked:
-    """Say what is odd about a study before anything is looked for, and what its trials can and cannot show.
+    """Check a study before a diagnosis: its numbers, and the causes that its trials can and cannot identify.
 
     Parameters
     ----------
     study
         The rig and its trials.
     library
-        Causes beside those written here and installed; see `diagnose`.
+        Causes in addition to those of the library and of installed packages; see `diagnose`.
 
     Returns
     -------
@@ -122,12 +122,12 @@ def check(study: Study, *, library: Source | Sequence[Source] | None = None) -> 
     found = testable_causes(clean, catalogue_of(library))
     given_away = () if isinstance(found, str) else found.warnings
     count = len(split(clean)[0])
-    alone = ["one trial: nothing can be held out, and no cause can be borne out by another trial"] * (count == 1)
+    alone = ["one trial: nothing can be held out, and no other trial can confirm a cause"] * (count == 1)
     return Checked(study, (*odd, *given_away), (*few_trials(count), *alone), found)
 
 
 def odd_numbers(study: Study) -> tuple[Study, list[str]]:
-    """A study without what its sensors did not measure, and what is odd about its numbers before any fit.
+    """Return a study without spikes and stuck sensors, and warnings about its numbers.
 
     Raises
     ------
@@ -138,12 +138,12 @@ def odd_numbers(study: Study) -> tuple[Study, list[str]]:
         return study, []
     clean = measured_study(study)
     count = sum(len(k) for columns in clean.left_out.values() for k in columns.values())
-    said = [f"{count} samples look like spikes, and are taken for what their neighbours say"] if count else []
+    said = [f"{count} samples look like spikes, and are replaced by what their neighbours say"] if count else []
     return clean.study, [*said, *clean.warnings, *check_study(clean.study, nominal_model(clean.study))]
 
 
 def odd_lines(study: Study, odd: Sequence[str]) -> list[str]:
-    """A study in one line, and what is odd about its numbers."""
+    """Return a study in one line, and the warnings about its numbers."""
     nothing = NOT_JUDGED if study.schema.owner is None else "nothing is odd about its numbers"
     return [str(study), *(f"odd: {one}" for one in odd)] + [nothing] * (not odd)
 

@@ -1,9 +1,10 @@
-"""Trials of which one may state a condition that it did not have: searched as stated, and with what it must have had.
+"""Search of trials of which one may state a wrong condition: as stated, and with the value that was estimated for it.
 
-Where restating a trial takes away most of what the nominal model gets wrong it comes first, and where only noise is
-then left nothing can be simpler. Else trials are searched as stated, and one that stands out of what the causes that
-were found leave is restated then. A misreading competes with every other explanation by price: the causes that the
-restated trials still need, with its own parameter, against those that the trials as stated need.
+A trial is restated first where that removes most of the nominal model's error. The search of restated trials is the
+answer if it leaves only noise, for no explanation has fewer parameters. Otherwise the trials are searched as stated,
+and a trial that is an outlier under the causes that were found is restated then. The penalised likelihood decides: the
+causes that the restated trials still need, with the parameter of the condition, against those that the trials as stated
+need.
 """
 
 from __future__ import annotations
@@ -35,16 +36,16 @@ R = TypeVar("R")
 
 @dataclass(frozen=True)
 class Restated(Generic[S, R]):
-    """A search on trials of which one is restated, and why.
+    """A search of trials of which one is restated.
 
     Attributes
     ----------
     misread
-        What the trial must have had.
+        The condition that was misread, with its estimate.
     trials
-        Those that were searched, restated.
+        The restated trials.
     search, searched
-        On them.
+        Their search, and its result.
     """
 
     misread: Misread
@@ -54,14 +55,14 @@ class Restated(Generic[S, R]):
 
 
 class Conditions(ABC, Generic[S, R]):
-    """Searches trials, and again with one of them restated if it stands out and that is the cheaper explanation.
+    """Search trials, and again with an outlying trial restated; the lower penalised likelihood is the answer.
 
     Parameters
     ----------
     nominal
-        With start values.
+        The nominal model, with start values.
     run
-        Searches trials.
+        Search of trials.
     """
 
     def __init__(self, nominal: Model, run: Callable[[list[Trial]], tuple[S, R]]) -> None:
@@ -69,29 +70,29 @@ class Conditions(ABC, Generic[S, R]):
 
     @abstractmethod
     def misread(self, trials: Sequence[Trial], searched: R | None) -> Misread | None:
-        """The trial that stands out under what was found, or under the nominal model."""
+        """Return the trial that is an outlier under the causes that were found, or under the nominal model."""
 
     @abstractmethod
     def has_causes(self, searched: R) -> bool:
-        """Whether anything was found."""
+        """Return whether a search found any cause."""
 
     @abstractmethod
     def saved(self, searched: R, trials: Sequence[Trial], made: Restated[S, R]) -> float:
-        """By how much the price falls from what was found in trials as stated to what was in the restated ones."""
+        """Return by how much the criterion falls from the trials as stated to the restated ones."""
 
     def leaves_noise(self, made: Restated[S, R]) -> bool:
-        """Whether the restated trials hold nothing but noise, as far as that can be told."""
+        """Return whether no test finds a lack of fit in the restated trials."""
         return False
 
     def is_explained(self, made: Restated[S, R]) -> bool:
-        """Whether nothing stands out of what the restated trials leave.
+        """Return whether no restated trial is an outlier any more.
 
-        Beside a model that is not right itself, a trial is odd by the model's error.
+        Under a model with an error of its own, a trial may be an outlier by that error.
         """
         return True
 
     def search(self, trials: Sequence[Trial]) -> tuple[S, R, Restated[S, R] | None]:
-        """The search, what it found, and what was restated for it; None if nothing was."""
+        """Return the search, its result, and the restated trials; None if none was restated."""
         first = self._misread(trials, None)
         made = self._restated(trials, first) if first is not None and takes_most(first) else None  # one is always worst
         if made is not None and not self.has_causes(made.searched) and self.leaves_noise(made):
@@ -104,27 +105,27 @@ class Conditions(ABC, Generic[S, R]):
         return made.search, made.searched, made
 
     def _by_causes(self, trials: Sequence[Trial], searched: R, first: Misread | None) -> Restated[S, R] | None:
-        """A search with the trial restated that stands out by the causes that were found, if it explains that."""
+        """Return a search with the trial restated that is an outlier under the causes found, if that explains it."""
         misread = self._misread(trials, searched) if self.has_causes(searched) else first
         made = None if misread is None else self._restated(trials, misread)
         return made if made is not None and self.is_explained(made) else None
 
     def _is_cheaper(self, search: S, searched: R, trials: Sequence[Trial], made: Restated[S, R]) -> bool:
-        """Whether the price falls by more than that of a condition, of all that are stated."""
+        """Return whether the criterion falls by more than the penalty of one condition among all that are stated."""
         if search.was_stopped or made.search.was_stopped:
             return False
         criterion = PARAMETER_PENALTY + 2.0 * math.log(sum(len(self.nominal.rig.stated(t)) for t in trials))
         return self.saved(searched, trials, made) > criterion + SEPARABLE
 
     def _misread(self, trials: Sequence[Trial], searched: R | None) -> Misread | None:
-        """A misreading; none where time is over, or where the model cannot be calculated with."""
+        """Return a misreading; None where time is over, or where the model cannot be evaluated."""
         try:
             return self.misread(trials, searched)
         except (OutOfTime, ArithmeticError, np.linalg.LinAlgError):
             return None
 
     def _restated(self, trials: Sequence[Trial], misread: Misread) -> Restated[S, R]:
-        """A search of the restated trials; once more with the value by the causes that it finds."""
+        """Return a search of the restated trials, made again with the value by the causes that it finds."""
         other = restated_trials(self.nominal, trials, misread)
         search, searched = self.run(other)
         if self.has_causes(searched) and not search.was_stopped:

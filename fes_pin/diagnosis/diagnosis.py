@@ -1,4 +1,4 @@
-"""What the nominal model of a study gets wrong: the study is prepared, its causes searched, what is found judged."""
+"""Diagnosis of a study: it is prepared, its causes are searched, and what is found is judged."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ from fes_pin.models.rigs.base import Rig
 from fes_pin.workers import OutOfTime, Progress, noting_stops, one_thread_each, time_limit
 
 LOOKED = 0.1
-"""Share of a limit of time that a fit of the nominal model is looked at for what it gives away, besides."""
+"""Share of a limit of time that the checks of the fitted nominal model may take in addition."""
 
 
 def diagnose_joint(
@@ -54,22 +54,23 @@ def diagnose_joint(
     limit: float | None = None,
     progress: Progress | None = None,
 ) -> Diagnosis:
-    """Find out what the nominal model of a study gets wrong.
+    """Find the causes that explain the error of a study's nominal model.
 
     Parameters
     ----------
     study
-        Rig, start values and trials. Trials with the role "held_out" take no part but in the gain; without such roles
-        the gain is cross-validated over all trials.
+        Rig, start values and trials. Trials with the role "held_out" serve the gain alone; without such roles the gain
+        is cross-validated over all trials.
     library
-        Causes beside those written here and installed: files, modules, classes or what `load_library` made of them.
+        Causes in addition to those of the library and of installed packages: files, modules, classes or what
+        `load_library` made of them.
     seed
-        Of what is simulated: critical values and bootstrap intervals.
+        Of the simulated critical values and bootstrap intervals.
     limit
-        Seconds that the search may take; then it stops at the best set so far, and says so. What is done with that set,
-        and the first fit of the nominal model, come on top.
+        Seconds that the search may take; it then stops at the best set so far, and the verdict says so. The first fit
+        of the nominal model and the judgement of that set take time in addition.
     progress
-        Called with a share done and a few words.
+        Called with the share that is done and a few words.
 
     Returns
     -------
@@ -102,23 +103,23 @@ def diagnose_joint(
 
 
 class _Work:
-    """What turns a study that was measured into a diagnosis.
+    """The steps from a measured study to its diagnosis.
 
     Parameters
     ----------
     catalogue, seed, tell
         As of `diagnose_joint`.
     end
-        When searches must have ended, of `time.perf_counter`.
+        Time at which searches stop, of `time.perf_counter`.
     stops
-        Holds something once a search had to; see `noting_stops`.
+        Not empty once a search was stopped; see `noting_stops`.
     """
 
     def __init__(self, catalogue: Catalogue, seed: int, tell: Progress, end: float, stops: list[float]) -> None:
         self.catalogue, self.seed, self.tell, self.end, self.stops = catalogue, seed, tell, end, stops
 
     def diagnosis_of_log(self, study: Study) -> Diagnosis:
-        """The diagnosis of a study as its log wrote it down, with what that did to its trials undone if it can be."""
+        """Return the diagnosis of a study as recorded, with the faults of its log corrected where that is possible."""
         nominal, (train, _) = nominal_model(study), split(study)
         driven = _is_answered(nominal.rig, train)
         logged = all(EFFORT in nominal.rig.input_columns(t) for t in study.trials)
@@ -139,12 +140,12 @@ class _Work:
         return with_words(faults.with_timing(found, late))
 
     def _logged(self, study: Study, log: Log) -> Diagnosis:
-        """The diagnosis of a study with what a log did to its trials undone."""
+        """Return the diagnosis of a study with the given faults of its log corrected."""
         found = self.diagnosis(replace(study, trials=tuple(log.applied(t) for t in study.trials)))
         return replace(found, log=log)
 
     def diagnosis(self, study: Study) -> Diagnosis:
-        """Search the causes of one study, and judge what is found."""
+        """Search the causes of one study, judge them, and return the diagnosis."""
         nominal = nominal_model(study)
         train, test = split(study)
         answered = _is_answered(nominal.rig, train)
@@ -164,7 +165,7 @@ class _Work:
         except NominalFitError as problem:
             found = unfitted(study, problem.nominal, str(problem), test)
         except (ArithmeticError, np.linalg.LinAlgError) as problem:
-            reason = f"the search met numbers that cannot be calculated with ({problem})"
+            reason = f"the search met numbers that are not finite ({problem})"
             found = unfitted(study, ran[-1].nominal(), reason, test)
         return replace(found, warnings=(*said, *found.warnings))
 
@@ -180,21 +181,21 @@ class _Work:
 
 
 def _is_answered(rig: Rig, trials: Sequence[Trial]) -> bool:
-    """True if what drives a rig answers its reading: noise, and what acts at random, come back as an input."""
+    """Return whether a rig is driven in closed loop: noise comes back as an input."""
     return is_fed_back(rig, trials) or is_stimulus_fed_back(rig, trials)
 
 
 def _searched(study: Study, trials: Sequence[Trial], driven: bool) -> list[Trial]:
-    """What a search by the likelihood fits of the trials of a study."""
+    """Return the trials of a study, or the parts of them, that a search fits."""
     train, _ = split(replace(study, trials=tuple(trials)))
     return in_parts(nominal_model(study).rig, searched_part(train, study.schema, driven)[0])
 
 
 def _low_passed(diagnosis: Diagnosis, end: float) -> Study | None:
-    """The study with the low pass that its readings seem to have gone through; None where nothing speaks for one.
+    """Return the study with a low pass of its readings estimated; None where the likelihood does not support one.
 
-    It is asked for only where a test of lack of fit rejects the model. Of rigs whose input answers their reading,
-    `identify.correlation_time` finds the correlation time of the noise instead.
+    A low pass is estimated only where a test of lack of fit rejects the model. For rigs in closed loop
+    `identify.correlation_time` estimates the correlation time of the noise instead.
     """
     restated = any(c.name == MISREAD for c in diagnosis.causes)
     if not diagnosis.remainder.unexplained or diagnosis.is_driven or restated:
@@ -210,29 +211,29 @@ def _low_passed(diagnosis: Diagnosis, end: float) -> Study | None:
 
 
 def _likelier(passed: Diagnosis, recorded: Diagnosis) -> Diagnosis:
-    """The diagnosis of readings as low-passed, if what it leaves is the likelier noise by what a low pass must earn."""
+    """Return the diagnosis with the low pass if it improves the likelihood of the residual noise enough."""
     fits = passed.extended, recorded.extended
     if not improves(*fits):
         return recorded
     trials = passed.extended.trials
     names = " and ".join(dict.fromkeys(n for t in trials for n in passed.extended.model.rig.outputs(t.kind) if n in t))
     cutoff = trials[0].low_pass_hz
-    said = f"{names} seems low-passed at {cutoff:.2g} Hz: what is simulated was low-passed there as well"
+    said = f"{names} seems low-passed at {cutoff:.2g} Hz: the simulation was low-passed there as well"
     return replace(passed, log=replace(passed.log, low_pass_hz=cutoff), warnings=(said, *passed.warnings))
 
 
 @dataclass(frozen=True)
 class Measured:
-    """A study without what its sensors did not measure.
+    """A study without spikes and without stretches of stuck sensors.
 
     Attributes
     ----------
     study
-        Spikes replaced, stretches of stuck sensors cut out.
+        The study, with spikes replaced and stretches of stuck sensors cut out.
     left_out
-        Which samples were spikes, by trial and column.
+        Samples that were spikes, by trial and column.
     warnings
-        What was cut out, a line each.
+        The stretches that were cut out, a line each.
     """
 
     study: Study
@@ -241,15 +242,15 @@ class Measured:
 
 
 def measured_study(study: Study) -> Measured:
-    """A study without spikes of its measured columns and without stretches in which a sensor was stuck.
+    """Return a study without spikes of its measured columns and without stretches in which a sensor was stuck.
 
-    A sample that its neighbours replace is no evidence of its own: intervals are too narrow by half the share of such
-    samples, half a percent where one in a hundred is a spike.
+    A sample that its neighbours replace carries no information of its own. Intervals are therefore too narrow by half
+    the share of such samples: half a percent where one in a hundred is a spike.
 
     Raises
     ------
     InputError
-        If nothing else is left.
+        If no trial has a reading that is not stuck.
     """
     rig, trials, found, warnings = nominal_model(study).rig, [], {}, []
     for trial in study.trials:
@@ -269,9 +270,9 @@ def measured_study(study: Study) -> Measured:
 
 
 def split(study: Study) -> tuple[list[Trial], list[Trial]]:
-    """Trials to fit and trials that the study holds out.
+    """Return the trials to fit and the trials that the study holds out.
 
-    Free motion is fitted at the rate that its noise is modelled at: without an input there is nothing faster to follow.
+    Free motion is fitted at the rate that its noise is modelled at, since no input is faster.
     """
     test = [t for t in study.trials if t.role == "held_out"]
     schema, fitted = study.schema, [t for t in study.trials if t.role != "held_out"]

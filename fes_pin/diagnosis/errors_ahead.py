@@ -1,4 +1,4 @@
-"""How far ahead a model foretells what a rig reads, and what acts on a driven rig at random."""
+"""Errors of predictions one step ahead, over a horizon and in free simulation; and the process noise of driven rigs."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from fes_pin.models.predictor import StateSpaceNoise
 from fes_pin.workers import in_parallel
 
 TENTHS = 10
-"""Pieces of a trial that is simulated freely, where there are fewer than `FOLDS` trials."""
+"""Pieces into which the error of a free simulation is divided where there are fewer than `FOLDS` trials."""
 
 _Predicted = tuple[dict[str, np.ndarray], dict[str, np.ndarray]]
 
 
 @dataclass(frozen=True)
 class RandomPart:
-    """What acts at random on a rig.
+    """Process noise of a rig: a random effort.
 
     Attributes
     ----------
@@ -39,9 +39,9 @@ class RandomPart:
     std
         Stationary standard deviation, in the rig's unit of effort.
     time_constant_s
-        s.
+        Its time constant, s.
     share
-        Deviation of its means over `AVERAGED_S`, over the root mean square of what drives the rig.
+        Standard deviation of its means over `AVERAGED_S`, divided by the root mean square of the driving effort.
     """
 
     name: str
@@ -54,7 +54,7 @@ class RandomPart:
 class Ahead:
     """Errors E of one model, percent: one sample ahead, over the horizon, free (None where the rig falls).
 
-    `noise` is what noise alone leaves over the horizon, see `noise_that_is_small`; None of one simulated freely.
+    `noise` is the error over the horizon of noise alone, see `noise_that_is_small`; None for a free simulation.
     """
 
     one_step: float
@@ -65,7 +65,7 @@ class Ahead:
 
 @dataclass(frozen=True)
 class AheadErrors:
-    """Errors over time, of both models: on the trials that were fitted, and on trials held out if there were any."""
+    """Errors of both models by horizon: on the trials that were fitted, and on trials held out if there were any."""
 
     horizon_s: float
     nominal: Ahead
@@ -75,24 +75,24 @@ class AheadErrors:
 
     @property
     def words(self) -> str:
-        """What is predicted."""
+        """Return in words what is predicted."""
         return f"predictions {self.horizon_s:g} s ahead"
 
 
 def random_parts(fitted: LikelihoodFit) -> tuple[RandomPart, ...]:
-    """The random efforts that act in a fit, with their share of what drives the rig."""
+    """Return the random efforts that act in a fit, with their share of the driving effort."""
     sizes, still = driving_size(fitted.model, fitted.trials), fitted.noise.still
     parts = ((n, std, fitted.noise.time[n]) for n, std in fitted.noise.std.items() if n in sizes and n not in still)
     return tuple(RandomPart(n, std, time, _averaged(std, time) / sizes[n]) for n, std, time in parts)
 
 
 def are_large(random: Sequence[RandomPart]) -> bool:
-    """Whether what acts at random is more than small beside what drives the rig."""
+    """Return whether process noise is more than a small share of the driving effort."""
     return any(r.share > SMALL_SHARE for r in random)
 
 
 def _averaged(std: float, time: float) -> float:
-    """Deviation of the means over `AVERAGED_S` of a first-order process.
+    """Return the standard deviation of the means over `AVERAGED_S` of a first-order process.
 
     With x = time / AVERAGED_S, std sqrt(2 x (1 - x (1 - exp(-1 / x)))).
     """
@@ -103,15 +103,15 @@ def _averaged(std: float, time: float) -> float:
 def squared_errors(
     pairs: Sequence[tuple[LikelihoodFit, LikelihoodFit, Sequence[Trial]]], ahead_s: float | None
 ) -> Errors:
-    """Squared errors over a horizon, by seconds of each trial; or of free simulations, by trials.
+    """Return squared errors over a horizon, by seconds of each trial; or of free simulations, by trials.
 
     Parameters
     ----------
     pairs
-        A fit, the one whose white noise is the unit of its errors, so that models can be compared, and trials.
+        A fit, the fit whose white noise is the unit of its errors so that models can be compared, and trials.
     ahead_s
-        The horizon; None for free simulations, whose errors are alike through all of a trial: where there are few
-        trials tenths of each are taken.
+        The horizon, s; None for free simulations, whose errors are correlated all through a trial. Where there are few
+        trials, each is divided into tenths.
     """
     if ahead_s is None:
         return joined_errors([free_errors(f.model, trials, noise_that_is_small(floor)) for f, floor, trials in pairs])
@@ -121,15 +121,15 @@ def squared_errors(
 
 
 def free_errors(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> Errors:
-    """Squared errors of a model that is simulated from the inputs of each trial alone, by trials.
+    """Return squared errors of a model that is simulated from the inputs of each trial alone, by trials.
 
-    Where there are few trials tenths of each are taken. What is each trial's own is estimated from other parts of it
-    than those that it is judged on: see `identify.per_trial`.
+    Where there are few trials, each is divided into tenths. Amplitudes of a trial's own are estimated from other parts
+    of it than those on which the error is found: see `identify.per_trial`.
 
     Parameters
     ----------
     noise
-        Whose variances are the unit, by output column.
+        Its variances are the unit, by output column.
     """
     pieces = 1 if len(trials) >= FOLDS else TENTHS
     found = in_parallel(lambda t: _free_squares(model, t, noise, pieces), trials)
@@ -137,7 +137,7 @@ def free_errors(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> Err
 
 
 def _free_squares(model: Model, trial: Trial, noise: NoiseModel, pieces: int) -> np.ndarray:
-    """Squares, spread and number of readings of a trial that is simulated freely, shape (3, pieces)."""
+    """Return squared errors, spread and number of readings of a free simulation of a trial, shape (3, pieces)."""
     lines = np.zeros((3, len(trial)))
     for name, missed in free_residuals(model, trial, noise).items():
         variance = noise[name].std ** 2
@@ -148,7 +148,7 @@ def _free_squares(model: Model, trial: Trial, noise: NoiseModel, pieces: int) ->
 
 
 def _squares(fitted: LikelihoodFit, floor: LikelihoodFit, trial: Trial, horizon_s: float) -> np.ndarray:
-    """`Errors` of a trial by its seconds, shape (4, seconds); errors of as long as the horizon have one origin."""
+    """Return `Errors` of a trial by its seconds, shape (4, seconds); errors within one horizon are correlated."""
     predicted, noise = _predicted(fitted, trial, horizon_s)
     lines = np.zeros((4, len(trial)))
     for name, values in predicted.items():
@@ -167,9 +167,9 @@ _PREDICTED: WeakKeyDictionary[LikelihoodFit, dict[tuple[int, float], tuple[Trial
 
 
 def _predicted(fitted: LikelihoodFit, trial: Trial, horizon_s: float) -> _Predicted:
-    """What is foretold over the horizon, and the variance of its errors by noise alone, shape (n,) by output.
+    """Return predictions over the horizon and the variance of their errors by noise alone, shape (n,) by output.
 
-    The same is asked where causes are judged and where errors are told: it is kept as long as the fit is.
+    Judging causes and reporting errors need the same predictions: these are cached as long as the fit exists.
     """
     known, key = _PREDICTED.setdefault(fitted, {}), (id(trial), horizon_s)
     if key not in known:
@@ -188,7 +188,7 @@ def _predict(fitted: LikelihoodFit, trial: Trial, horizon_s: float) -> _Predicte
 
 
 def _predict_freely(fitted: LikelihoodFit, trial: Trial, horizon_s: float) -> _Predicted:
-    """The same without process noise: a free simulation, and what measurement noise predicts of what it misses."""
+    """Return the same without process noise: a free simulation plus the prediction of autoregressive noise."""
     predicted, variances = {}, {}
     steps = max(1, round(horizon_s / trial.dt))
     for name, missed in free_residuals(fitted.model, trial, fitted.noise).items():
@@ -200,17 +200,17 @@ def _predict_freely(fitted: LikelihoodFit, trial: Trial, horizon_s: float) -> _P
 
 
 def _first(fitted: LikelihoodFit, trial: Trial, horizon_s: float) -> int:
-    """The first sample that is foretold from more than the first; 0 where the trial ends before, or where nothing of
-    its start is unknown."""
+    """Return the first sample that is predicted from more than the first reading; 0 where the trial ends before, or
+    where its initial state is known."""
     first = sum(reach_of(trial, horizon_s)) if fitted.model.rig.unknowns(trial.kind) else 0
     return first if first < len(trial) else 0
 
 
 def noise_that_is_small(fitted: LikelihoodFit) -> StateSpaceNoise:
-    """What is random about a rig and its readings that is noise.
+    """Return the part of the process and measurement noise of a fit that is noise and not an error of the model.
 
-    A random effort as far as it is small beside what drives the rig: what is more than `SMALL_SHARE` of that, is
-    something that the model misses. White noise of a simulation as far as it is new in each sample.
+    A random effort counts as noise up to `SMALL_SHARE` of the driving effort; more than that is missed by the model.
+    The measurement noise of a free simulation counts as far as it is white.
     """
     if is_simulated(fitted.noise, fitted.trials) and not any(fitted.noise.ar.values()):
         rough = first_guess(fitted.model, fitted.trials).white
@@ -225,7 +225,7 @@ def noise_that_is_small(fitted: LikelihoodFit) -> StateSpaceNoise:
 def errors_ahead(
     pairs: Sequence[tuple[LikelihoodFit, LikelihoodFit, Sequence[Trial]]], horizon_s: float, falling: bool
 ) -> Ahead:
-    """E of the first output one sample ahead, over the horizon, and free; `pairs` as of `squared_errors`."""
+    """Return E of the first output one sample ahead, over the horizon and free; `pairs` as in `squared_errors`."""
     work = [(fitted, floor, trial) for fitted, floor, trials in pairs for trial in trials]
     missed, around = np.sum(in_parallel(lambda one: _sums(*one, horizon_s), work), axis=0)
     one_step, horizon, free, noise = (float(v) for v in 100.0 * missed / np.maximum(around, 1e-300))
@@ -233,9 +233,10 @@ def errors_ahead(
 
 
 def _sums(fitted: LikelihoodFit, floor: LikelihoodFit, trial: Trial, horizon_s: float) -> np.ndarray:
-    """Squared errors of the first output of a trial, and what it varies where they are judged, shape (2, 4).
+    """Return squared errors of the first output of a trial and the squares of its deviations, shape (2, 4).
 
-    One sample ahead, over the horizon, free, and over the horizon by noise alone; in units of the noise of `floor`.
+    The columns are: one sample ahead, over the horizon, free, and over the horizon by noise alone; in units of the
+    noise of `floor`.
     """
     name = fitted.model.rig.output(trial.kind)
     measured, (predicted, noise) = trial[name], _predicted(fitted, trial, horizon_s)
@@ -258,9 +259,9 @@ def _sums(fitted: LikelihoodFit, floor: LikelihoodFit, trial: Trial, horizon_s: 
 
 
 def free_residuals(model: Model, trial: Trial, noise: NoiseModel) -> dict[str, np.ndarray]:
-    """Measured minus simulated from the inputs alone, shape (n,), by output column of a trial; NaN where unmeasured.
+    """Return measured minus freely simulated, shape (n,), by output column of a trial; NaN where unmeasured.
 
-    A simulation that runs away counts as `RUNAWAY` times the largest reading off.
+    The error of a simulation that diverges is limited to `RUNAWAY` times the largest reading.
     """
     (readings,) = predictions(model, [trial], noise)
     out = {}

@@ -1,4 +1,4 @@
-"""What was found, judged again where errors of form passed for a random effort that lasts: `identify.process_noise`."""
+"""Estimators of one study: without process noise, with coloured or white process noise, by least squares."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from fes_pin.infer.search import Policy
 from fes_pin.workers import OutOfTime, in_parallel, time_limit
 
 WHITE_PROCESS_NOISE = (
-    "what acts at random was taken for new in every sample: beside what lasts, the model foretold less"
+    "process noise is modelled as white: with coloured process noise the same model predicted worse over the horizon"
 )
-"""What is told of it."""
+"""Warning where the estimator with white process noise is the answer."""
 
 
 def searched(search: LikelihoodSearch) -> tuple[LikelihoodSearch, Found]:
-    """A search that has run: without process noise first where no controller answers, with it where that improves.
+    """Run a search and return it with its result: without process noise first where the rig is not in closed loop.
 
-    Of a set without process noise every prediction is a free simulation, which takes a third of the time. Process noise
-    must improve the penalised likelihood of the best set; else nothing of it is needed.
+    Without process noise every prediction is a free simulation, which takes a third of the time. The search is made
+    again with process noise only if that improves the penalised likelihood of the best set.
     """
     found = search.run()
     if search.was_stopped or search.models.noise != MEASUREMENT:
@@ -44,12 +44,12 @@ def searched(search: LikelihoodSearch) -> tuple[LikelihoodSearch, Found]:
 
 
 def least_error(search: LikelihoodSearch) -> tuple[LikelihoodSearch, Found] | None:
-    """The same causes searched by the least error of free simulations, every error weighed alike; None if time is up.
+    """Search the same causes by least squares of free simulations; return None if time is up.
 
-    Where a model is not right, a likelihood with process noise or autoregressive measurement noise takes what it misses
-    for noise. Least squares give the model that predicts best from the inputs alone (Ljung, System Identification,
-    2nd ed., section 8.3). Causes are chosen by what they predict of trials left out; where there are too few of these,
-    none is.
+    Where a model is wrong, a likelihood with process noise or autoregressive measurement noise takes its error for
+    noise. Least squares give the model that predicts best from the inputs alone (Ljung, System Identification,
+    2nd ed., section 8.3). Causes are chosen by their predictions of trials left out; where there are too few trials,
+    none is chosen.
     """
     if search.models.answered or search.was_stopped:
         return None
@@ -66,7 +66,7 @@ def least_error(search: LikelihoodSearch) -> tuple[LikelihoodSearch, Found] | No
 
 
 def _with_process_noise(search: LikelihoodSearch) -> tuple[LikelihoodSearch, Found] | None:
-    """The same causes searched with process noise; None if that did not end."""
+    """Search the same causes with process noise; return None if the search did not end."""
     other = LikelihoodSearch(search.models.with_noise(PROCESS), search.progress)
     try:
         with time_limit(search.seconds_left):
@@ -77,7 +77,7 @@ def _with_process_noise(search: LikelihoodSearch) -> tuple[LikelihoodSearch, Fou
 
 
 def found_with_white_process_noise(search: LikelihoodSearch, found: Found) -> LikelihoodFit | None:
-    """What was found, beside random efforts that are new in every sample; None where none that lasts acts."""
+    """Return the best set fitted with white process noise; None where no coloured process noise acts."""
     if search.was_stopped or not search.models.answered or not _may_last(found.best):
         return None
     try:
@@ -88,17 +88,17 @@ def found_with_white_process_noise(search: LikelihoodSearch, found: Found) -> Li
 
 
 def judged_again(search: LikelihoodSearch, found: Found, white: LikelihoodFit) -> tuple[LikelihoodSearch, Found] | None:
-    """What was found beside random efforts that are new in every sample; None where it gains nothing there.
+    """Return a search of the same causes with white process noise, and its result; None where that predicts no better.
 
-    It gains where its errors over the horizon are less, by a thousandth of what the nominal model gets wrong: a random
-    effort that lasts is foretold as far as it does, and what takes its place gains nothing. Nothing is claimed by that.
-    No cause is searched for: what is left has a colour that new efforts have not, and a likelihood without it tells
-    causes apart that it should not.
+    White noise is better where it lowers the error over the horizon by a thousandth of the nominal model's. Coloured
+    process noise is itself predicted over its time constant, so that a cause which takes its place gains nothing there.
+    No further cause is searched: the residual is coloured, and a likelihood of white noise would be too sure of
+    differences between causes.
 
     Parameters
     ----------
-    fresh
-        Of `found_with_white_process_noise`.
+    white
+        The fit of `found_with_white_process_noise`.
     """
     try:
         with time_limit(search.seconds_left):
@@ -114,14 +114,14 @@ def judged_again(search: LikelihoodSearch, found: Found, white: LikelihoodFit) -
 
 
 def _predicts_better(white: LikelihoodFit, search: LikelihoodSearch, found: Found) -> bool:
-    """Whether errors over the horizon are less beside efforts that are new."""
+    """Return whether errors over the horizon are smaller with white process noise."""
     many = [[(f, found.best, f.trials)] for f in (found.nominal, found.best, white)]
     nominal, coloured, new = (squared_errors(one, search.models.horizon_s) for one in many)
     return held_out_gain(nominal, coloured, new, search.models.seed).percent > NOTHING_PERCENT
 
 
 def _parts_and_rivals(found: Found) -> list[LikelihoodFit]:
-    """The parts of what was found, and what cannot be told from it, beside efforts that are new."""
+    """Return fits with white process noise of the subsets of the best set, and of the rivals equivalent to it."""
     parts = {names_of(f): f for f in (*found.without.values(), found.nominal)}
     parts |= {names_of(f): f for many in found.rivals.values() for f in not_excluded(found.best, many)}
     parts.pop(names_of(found.best), None)
@@ -129,10 +129,10 @@ def _parts_and_rivals(found: Found) -> list[LikelihoodFit]:
 
 
 def _may_last(fitted: LikelihoodFit) -> bool:
-    """Whether something acts at random on a rig whose starts are unknown, and lasts longer than a reading.
+    """Return whether coloured process noise acts on a rig whose initial states are unknown.
 
-    Where the motion is imposed effort itself is read, and a reading of it lasts as it does; where a rig begins at rest
-    noise that foretells itself is told from a random effort (`LikelihoodFits.nominal`).
+    Where the motion is imposed, the effort itself is read, with noise that may be as coloured. Where a rig begins at
+    rest, autoregressive measurement noise is distinguished from process noise (`LikelihoodFits.nominal`).
     """
     is_coloured = any(fitted.noise.time[n] > step_s(fitted.noise, fitted.trials) for n in fitted.noise.acting)
     return is_coloured and all(t.kind != IMPOSED and fitted.model.rig.unknowns(t.kind) for t in fitted.trials)

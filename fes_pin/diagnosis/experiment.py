@@ -1,4 +1,4 @@
-"""The experiment that would tell confounded causes apart."""
+"""The next experiment: the trial that distinguishes confounded causes best."""
 
 from __future__ import annotations
 
@@ -23,32 +23,32 @@ from fes_pin.models.simulate import Simulator
 
 NEXT_FILE = "next_trial.csv"
 MOST_REPEATS = 50
-"""A proposal that must be run more often than this is none."""
+"""A trial that must be run more often than this is not proposed."""
 SECONDS = 8.0
-"""Length of a trial that is proposed."""
+"""Length of a proposed trial."""
 ROOM = 0.5
 """Share of the measured range by which a proposed trial may leave it on either side: a model is not known beyond."""
 ALIKE = 0.01
 """Squared noise units below which two predictions are the same."""
 QUIET_S = 0.4
-"""At the beginning and the end of a trial the stimulus is as the shapes have it."""
+"""Time at the beginning and at the end of a trial in which the refinement leaves the stimulus as it is."""
 ROUNDS, CHILDREN = 24, 4
-"""Of the refinement: that many times, so many changed stimuli are compared with the best so far."""
+"""Rounds of the refinement, and changed stimuli that each compares with the best so far."""
 
 
 @dataclass(frozen=True)
 class NextExperiment:
-    """A trial that separates two causes, or the reason why none does.
+    """A trial that distinguishes two causes, or the reason why no trial does.
 
     Attributes
     ----------
     why
-        In words.
+        The reason, in words.
     separates
-        The pair; of several rivals the one that the trial separates least.
+        The pair of causes; of several rivals the one that the trial separates least.
     trial
         Its inputs and conditions, without outputs; None where no input of the rig separates the pair.
-    promised
+    expected
         What the trial is expected to add to the lead of the first cause if it is the true one, and to that of the
         second if that is, in twice the log-likelihood.
     """
@@ -56,10 +56,10 @@ class NextExperiment:
     why: str
     separates: tuple[str, str]
     trial: Trial | None
-    promised: tuple[float, float] = (0.0, 0.0)
+    expected: tuple[float, float] = (0.0, 0.0)
 
     def record(self) -> dict[str, Any]:
-        """As JSON files have it; the inputs are in `NEXT_FILE`."""
+        """Return the experiment as JSON files have it; the inputs are in `NEXT_FILE`."""
         trial, one = None, self.trial
         if one is not None:
             trial = {"file": NEXT_FILE, "kind": one.kind, **{n: shown(v) for n, v in one.conditions.items()}}
@@ -68,24 +68,24 @@ class NextExperiment:
 
 @dataclass(frozen=True)
 class Discrimination:
-    """What a trial is expected to add to the lead of the better of two models, in twice the log-likelihood.
+    """The expected contribution of a trial to the likelihood ratio of two models, in twice the log-likelihood.
 
-    With r the whitened difference of the two predictions, J the sensitivities of the model that is wrong and H the
-    information that its parameters have from the data they were fitted to, `repeats` = n trials add
+    With r the whitened difference of the two predictions, J the sensitivities of the wrong model and H the information
+    on its parameters in the data that it was fitted to, `repeats` = n trials add
 
         D(n) = n r'r - (n J'r)' (H + n J'J)^-1 (n J'r),
 
-    the distance that its parameters cannot take up without leaving those data. The ratio of likelihoods has mean D and
-    standard deviation 2 sqrt(D).
+    the part of the difference that its parameters cannot reproduce without contradicting those data. Twice the
+    logarithm of the likelihood ratio has mean D and standard deviation 2 sqrt(D).
 
     Attributes
     ----------
     lead
-        What the better model is ahead by without the trial.
+        Lead of the better model without the trial, in twice the log-likelihood.
     news
         Normal equations of the trial alone: if the better model is true, and if the other is.
     known
-        Information of the model that is wrong, in the same order.
+        Information on the parameters of the wrong model, in the same order.
     """
 
     lead: float
@@ -93,44 +93,45 @@ class Discrimination:
     known: tuple[np.ndarray, np.ndarray]
 
     def distance(self, way: int, repeats: int = 1) -> float:
-        """D(n) if the better model is true (`way` 0) or the other one (1)."""
+        """Return D(n) if the better model is true (`way` 0) or the other one (1)."""
         new, known = self.news[way], self.known[way]
         hessian, gradient = known + repeats * new.hessian, repeats * new.gradient
         gained = gradient @ least_squares_step(hessian, gradient)
         return float(max(repeats * (new.sse - new.local_gain) - gained, 0.0))
 
     def margin(self, repeats: int = 1) -> float:
-        """How far the true model is ahead afterwards 95 times in 100, whichever of the two it is."""
+        """Return the lead of the true model after the trial, at 95 % confidence, whichever of the two it is."""
         leads = (self.lead, -self.lead)
         distances = [self.distance(way, repeats) for way in (0, 1)]
         return min(m + d - 2.0 * SURE * np.sqrt(d) for m, d in zip(leads, distances, strict=True))
 
     @property
     def worth(self) -> float:
-        """The smaller of the two distances: what trials are compared by."""
+        """The smaller of the two distances, by which trials are compared."""
         return min(self.distance(0), self.distance(1))
 
     def repeats(self) -> int | None:
-        """How often the trial must be run to decide 95 times in 100; None if that is too often."""
+        """Return how often the trial must be run to decide at 95 % confidence; None if that is too often."""
         return next((n for n in range(1, MOST_REPEATS + 1) if self.margin(n) >= SEPARABLE), None)
 
 
 def next_experiment(
     best: LikelihoodFit, rivals: Mapping[str, LikelihoodFit], name: str, study: Study
 ) -> NextExperiment:
-    """The feasible trial on which a model differs most from its rivals, each after it has been fitted to it too.
+    """Return the feasible trial on which a model differs most from its rivals, once each is fitted to that trial too.
 
-    Either of two may be the wrong one: trials are compared by the smaller separation, and by that of the closest rival.
-    The best of a dozen stimuli under every condition is then refined, a stretch of it at a time.
+    Either of two models may be the wrong one, so that trials are compared by the smaller separation, and by that of the
+    closest rival. The best of a dozen stimuli under every condition is then refined, one stretch at a time.
 
     Parameters
     ----------
     best, rivals
-        The best model, and by the name of a cause what has this in the place of `name`; all fitted to the same data.
+        The best model, and by the name of a cause the model with that cause in the place of `name`; all are fitted to
+        the same data.
     name
         The cause of the best model that the rivals lack.
     study
-        What the rig is and has been run under.
+        The rig, and the conditions that it was run under.
     """
     if falls(best.model, best.trials):
         pair = (name, next(iter(rivals)))
@@ -157,14 +158,14 @@ def next_experiment(
 
 def _often(repeats: int | None) -> str:
     if repeats is None:
-        return "it is evidence, but repeats of it alone do not decide 95 times in 100: diagnose again with it"
+        return "repeats of it alone do not decide at 95 % confidence, but it is evidence: diagnose again with it"
     return f"{'once decides' if repeats == 1 else f'{repeats} repeats decide'} 95 times in 100"
 
 
 def discriminations(
     best: LikelihoodFit, rival: LikelihoodFit, trials: Sequence[Trial], study: Study
 ) -> list[Discrimination | None]:
-    """What each trial tells of the two; None for one that leaves what the study has measured, or is not finite."""
+    """Return the discrimination of two models by each trial; None for one beyond the measured range, or not finite."""
     own = {n: v for n, v in best.unknowns[0].items() if n in best.model.own_unknowns()}
     begin = [{**best.model.initial_unknowns(t), **own} for t in trials]
     measured = []
@@ -195,7 +196,7 @@ def _equations(one: Linearized, other: Linearized) -> tuple[NormalEquations, Nor
 
 
 def _ranges(measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, float]]:
-    """Where each output may go: what was measured, and some room."""
+    """Return the range of each output in a proposed trial: the measured range, widened by `ROOM`."""
     ends = {n: (float(y.min()), float(y.max())) for n, y in measured.items()}
     return {n: (low - ROOM * (high - low), high + ROOM * (high - low)) for n, (low, high) in ends.items()}
 
@@ -210,7 +211,7 @@ BestTrial = tuple[dict[str, Discrimination], Trial]
 def _best(
     best: LikelihoodFit, rivals: Mapping[str, LikelihoodFit], trials: Sequence[Trial], study: Study
 ) -> BestTrial | None:
-    """The trial that separates the closest rival best, and what it tells of each."""
+    """Return the trial that separates the closest rival best, with its discrimination of each rival."""
     each = {n: discriminations(best, rival, trials, study) for n, rival in rivals.items()}
     found: list[BestTrial] = []
     for k, trial in enumerate(trials):
@@ -225,7 +226,7 @@ def _worth(found: BestTrial) -> float:
 
 
 def _refined(best: LikelihoodFit, rivals: Mapping[str, LikelihoodFit], found: BestTrial, study: Study) -> BestTrial:
-    """The trial with stretches of its stimulus held at other levels, where that separates better."""
+    """Return the trial with stretches of its stimulus held at other levels, where that separates better."""
     rng = np.random.default_rng(7)
     column = rig_of(study).steered(study)
     if column is None:
@@ -239,7 +240,7 @@ def _refined(best: LikelihoodFit, rivals: Mapping[str, LikelihoodFit], found: Be
 
 
 def _changed(trial: Trial, column: str, study: Study, rng: np.random.Generator) -> Trial:
-    """The same trial with one stretch of 0.1 to 2 s at another level; it stays at rest where it begins and ends."""
+    """Return the same trial with one stretch of 0.1 to 2 s at another level, but for its beginning and its end."""
     values, time = trial[column].copy(), trial.time
     begin = rng.uniform(QUIET_S, time[-1] - QUIET_S)
     length = np.exp(rng.uniform(np.log(0.1), np.log(2.0)))
@@ -249,7 +250,7 @@ def _changed(trial: Trial, column: str, study: Study, rng: np.random.Generator) 
 
 
 def candidates(study: Study) -> Iterator[Trial]:
-    """Trials that the rig can run as it is: under each of its conditions a dozen stimuli."""
+    """Yield trials that the rig can run as it is: a dozen stimuli under each of its conditions."""
     rig, time = rig_of(study), np.arange(0.0, SECONDS, study.trials[0].dt)
     column = rig.steered(study)
     shaped = ({column: rig.driven(study, shape)} for shape in _shapes(time)) if column else None
@@ -260,7 +261,7 @@ def candidates(study: Study) -> Iterator[Trial]:
 
 
 def _shapes(time: np.ndarray) -> Sequence[np.ndarray]:
-    """Stimuli between 0 and 1: steps, staircases, ramps, sines, trains and a random sequence."""
+    """Return stimuli between 0 and 1: steps, staircases, ramps, sines, trains and a random sequence."""
     t = time / time[-1]
     rng = np.random.default_rng(45)
     held = np.repeat(rng.random(40), -(-len(time) // 40))[: len(time)]

@@ -1,4 +1,4 @@
-"""Trials held out of a diagnosis: what causes add to their likelihood, what they gain of their errors."""
+"""Trials held out of a diagnosis: evidence for each cause from their likelihood, and gains on their errors."""
 
 from __future__ import annotations
 
@@ -18,35 +18,35 @@ from fes_pin.infer.search import SearchResult
 from fes_pin.workers import in_parallel
 
 Found = SearchResult[LikelihoodFit]
-"""What a search among causes found."""
+"""Result of a search among causes."""
 
 
 def folds_of(trials: Sequence[Trial]) -> list[list[int]]:
-    """Trials to hold out together: every kind and every load dealt round; none where there is but one."""
+    """Return the trials of each fold, in which every kind and load is spread evenly; none where there is one trial."""
     return deal(sorted(range(len(trials)), key=lambda i: (trials[i].kind, sorted(trials[i].conditions.items()), i)))
 
 
 @dataclass(frozen=True)
 class Fold:
-    """Fits without some trials, and those trials."""
+    """Trials that are held out together, and the fits without them."""
 
     nominal: LikelihoodFit
     best: LikelihoodFit
     without: dict[str, LikelihoodFit]
     test: tuple[Trial, ...]
     within: bool = True
-    """False if the trials were held out by the study itself, and are in no fit."""
+    """False if the study itself holds the trials out, so that they are in no fit."""
     chosen: LikelihoodFit | None = None
-    """What is chosen anew without the trials, fitted to the others; None where `best` is not to be doubted."""
+    """The set that is chosen again without the trials, fitted to the others; None where no choice is made again."""
 
 
 class Again:
-    """Fits made again to other trials, each once: a set less a cause that is refused is the next set.
+    """Cache of fits to other trials: a set without a rejected cause is the next set that is judged.
 
     Parameters
     ----------
     refitted
-        Makes a fit to other trials from one.
+        Fits the model of a fit to other trials.
     """
 
     def __init__(self, refitted: Callable[[LikelihoodFit, Sequence[Trial]], LikelihoodFit]) -> None:
@@ -62,7 +62,7 @@ class Again:
 
 
 def make_folds(found: Found, train: Sequence[Trial], test: Sequence[Trial], refitted: Again) -> list[Fold]:
-    """The study's own held-out trials, or every trial in its turn; none where there is but one."""
+    """Return the trials that the study holds out as one fold, or folds to cross-validate; none of one trial."""
     if test:
         return [Fold(found.nominal, found.best, found.without, tuple(test), within=False)]
     if len(train) < 2:
@@ -79,25 +79,25 @@ def make_folds(found: Found, train: Sequence[Trial], test: Sequence[Trial], refi
 
 
 def with_choices(folds: Sequence[Fold], chosen: Sequence[LikelihoodFit], refitted: Again) -> list[Fold]:
-    """The folds with what each chooses anew.
+    """Return the folds with the set that each chooses again.
 
     Parameters
     ----------
     chosen
-        For each fold, the fit to all trials of the set that is chosen without its own.
+        For each fold, the fit to all trials of the set that is chosen without its own trials.
     """
     again = refitted([(one, fold.best.trials) for one, fold in zip(chosen, folds, strict=True)])
     return [replace(fold, chosen=one) for fold, one in zip(folds, again, strict=True)]
 
 
 def refit(fitted: LikelihoodFit, trials: Sequence[Trial]) -> LikelihoodFit:
-    """A fit again, to other trials, with what is random in these."""
+    """Return the fit of the same model to other trials, with the noise of these."""
     problem, unknowns = _problem(fitted, trials)
     return maximise(problem, fitted.values, unknowns, near=True)
 
 
 def as_random_as_in_all(fitted: LikelihoodFit, trials: Sequence[Trial]) -> LikelihoodFit:
-    """A fit again, to other trials, at what was random in its own."""
+    """Return the fit of the same model to other trials, with the noise of its own trials."""
     problem, unknowns = _problem(fitted, trials)
     if problem.is_simulated:
         return fit_of(problem, minimise(problem, fitted.values, unknowns))
@@ -105,17 +105,17 @@ def as_random_as_in_all(fitted: LikelihoodFit, trials: Sequence[Trial]) -> Likel
 
 
 def _problem(fitted: LikelihoodFit, trials: Sequence[Trial]) -> tuple[LikelihoodProblem, Unknowns]:
-    """The problem of a fit on other trials, and where their unknowns begin."""
+    """Return the problem of a fit's model on other trials, and start values of their unknowns."""
     known = {id(t): u for t, u in zip(fitted.trials, fitted.unknowns, strict=True)}
     problem = LikelihoodProblem(fitted.model, trials, fitted.noise)
     return problem, [known.get(id(t), u) for t, u in zip(trials, problem.start_unknowns(), strict=True)]
 
 
 def evidence_of(folds: Sequence[Fold], found: Found, alike: Again) -> dict[str, Evidence]:
-    """What each cause adds to twice the log-likelihood of held-out trials, foretold by fits to the others.
+    """Return the evidence for each cause: what it adds to twice the log-likelihood of held-out trials.
 
-    What is random is as in all trials: learned without one that is unlike the others, it made that one so unlikely
-    that no cause could speak for itself. See `infer.held_out.marginal_cost`.
+    Held-out trials are predicted by fits to the others. Noise is that of all trials: estimated without a trial that is
+    unlike the others, it makes that trial so unlikely that no cause is supported. See `infer.held_out.marginal_cost`.
     """
     predicted = {n: 0.0 for n in ("", *found.without)}
     for fold in folds:
@@ -134,7 +134,7 @@ def _cost(fitted: LikelihoodFit) -> float:
 
 
 def held_errors_ahead(folds: Sequence[Fold], horizon_s: float, falling: bool) -> tuple[Ahead, Ahead] | None:
-    """Errors ahead of the nominal model and of what each fold chooses, on trials held out; None where none are."""
+    """Return errors of the nominal model and of the set of each fold on trials held out; None where none are."""
     if not folds:
         return None
     return (
@@ -146,19 +146,20 @@ def held_errors_ahead(folds: Sequence[Fold], horizon_s: float, falling: bool) ->
 def gains_of(
     folds: Sequence[Fold], without: Mapping[str, LikelihoodFit], horizon_s: float | None, seed: int
 ) -> dict[str, Gain]:
-    """What each cause gains over the horizon, or of the errors of free simulations.
+    """Return the gain of each cause in errors over the horizon, or in errors of free simulations.
 
-    Where it is nothing over the horizon, over as long as the random effort lasts that is mistaken for the cause in the
-    fit without it: a filter follows what is slow, as a spring's torque, and predicts it for so long.
+    A cause that gains nothing over the horizon is judged over the time constant of the process noise that takes its
+    place in the fit without it, if that is longer: a filter follows a slow cause, as the torque of a spring, and
+    predicts it for as long as the noise is correlated.
 
     Parameters
     ----------
     folds
-        Trials, and fits that they are foretold by.
+        Trials, and the fits that predict them.
     without
         By cause, the fit to all trials without it.
     horizon_s, seed
-        How far ahead errors look, s, None for free simulations; of the bootstrap of their intervals.
+        The horizon, s, None for free simulations; the seed of the bootstrap of intervals.
     """
     found_over = _gains_over(folds, tuple(without), horizon_s, seed)
     if horizon_s is None:
@@ -173,7 +174,7 @@ def gains_of(
 
 
 def _gains_over(folds: Sequence[Fold], names: Sequence[str], horizon_s: float | None, seed: int) -> dict[str, Gain]:
-    """What causes gain on the trials of the folds, so far ahead."""
+    """Return the gains of causes on the trials of the folds over one horizon."""
 
     def errors(fits: Sequence[LikelihoodFit]) -> Errors:
         pairs = zip(fits, folds, strict=True)

@@ -1,4 +1,4 @@
-"""Efforts that were recorded late, or with noise: faults of the log, not of the rig."""
+"""Faults of a log: efforts that were recorded late or with noise."""
 
 from __future__ import annotations
 
@@ -33,16 +33,16 @@ T = TypeVar("T")
 
 
 class LogFaults:
-    """What the log of a rig that a recorded effort drives did to that effort.
+    """Estimates of what a log did to the effort that drives a rig.
 
     Parameters
     ----------
     trials
-        As recorded, those that are held out among them.
+        All trials as recorded, held-out ones included.
     prepared
-        What a search makes of them before it fits them.
+        Preparation of trials before they are fitted.
     end
-        When searches must have ended, of `time.perf_counter`.
+        Time at which searches stop, of `time.perf_counter`.
     """
 
     def __init__(self, trials: Sequence[Trial], prepared: Prepared, end: float) -> None:
@@ -50,34 +50,34 @@ class LogFaults:
 
     @cached_property
     def answers(self) -> list[ControllerAnswer]:
-        """What the effort of each trial answers."""
+        """The controller that each trial's effort follows."""
         return in_parallel(answered, self.trials)
 
     def effort_noise_of_nominal(self, nominal: Model) -> float:
-        """Noise of the efforts, in their unit, beside a model without causes; 0 where nothing speaks for it."""
+        """Return the noise of recorded efforts under the nominal model, in their unit; 0 where it is not supported."""
         return self._in_time(
             lambda: self._noise(LikelihoodFits(nominal, self.prepared(self.trials), ()).nominal()), 0.0
         )
 
     def effort_noise_of(self, diagnosis: Diagnosis) -> float:
-        """The same beside a diagnosis; what was taken out for it is put back where efforts are likelier with it."""
+        """Return the same under a diagnosis; 0 where the efforts as recorded are likelier than the corrected ones."""
         fitted, known = diagnosis.extended, diagnosis.log.effort_noise
         if known:
             return known * self._in_time(lambda: float(fitted.sse < self._as_recorded(fitted).sse), 1.0)
         return self._in_time(lambda: self._noise(fitted), 0.0) if diagnosis.verdict != "adequate" else 0.0
 
     def _as_recorded(self, fitted: LikelihoodFit) -> LikelihoodFit:
-        """The same model on trials with all the noise that their efforts were recorded with."""
+        """Return the fit of the same model to trials with their efforts as recorded."""
         return maximum_from(fitted, self.prepared(self.trials))
 
     def _noise(self, fitted: LikelihoodFit) -> float:
         return effort_noise_of(fitted, self.trials, self.answers, self.prepared)
 
     def lateness(self, diagnosis: Diagnosis) -> Lateness | None:
-        """How late the efforts were written down; None where they were not, or there is no time to tell.
+        """Return the delay with which efforts were recorded; None where there is none, or no time to estimate it.
 
-        What was found may stand for it: the nominal model is asked where something is left beside, or where it is
-        cheaper with efforts in time than all that was found.
+        Causes that were found may be mistaken for a delay. The delay is therefore estimated with the nominal model too;
+        it counts if the set has a lack of fit, or if it gives a lower criterion than all causes that were found.
         """
         return self._in_time(lambda: self._lateness(diagnosis), None)
 
@@ -94,12 +94,12 @@ class LogFaults:
         return late
 
     def with_timing(self, diagnosis: Diagnosis, late: Lateness | None) -> Diagnosis:
-        """The diagnosis with intervals that hold what is not known of when a reading was taken, and an effort acted.
+        """Return the diagnosis with intervals that include the uncertain timing of readings and efforts.
 
         Parameters
         ----------
         late
-            How late the efforts are, if they were moved.
+            The delay of the efforts, if they were moved.
         """
         row_s, fitted = min(t.dt for t in self.trials), diagnosis.extended
 
@@ -115,7 +115,7 @@ class LogFaults:
         return replace(diagnosis, extended=wide, causes=causes)
 
     def _in_time(self, ask: Callable[[], T], otherwise: T) -> T:
-        """What is told in the time that is left."""
+        """Return an estimate, or another value if it is not finite or time is over."""
         try:
             with time_limit(self._end - time.perf_counter()):
                 return ask()
@@ -124,17 +124,17 @@ class LogFaults:
 
 
 def with_timing_of(log: Log, timed: Log) -> Log:
-    """A log with efforts that acted when another says."""
+    """Return a log with the timing of efforts of another."""
     return replace(log, effort_late_s=timed.effort_late_s, effort_over_s=timed.effort_over_s)
 
 
 def likelier(other: Diagnosis, one: Diagnosis) -> Diagnosis:
-    """Another diagnosis of the same readings, by other efforts, if it is likelier; else the one."""
+    """Return the likelier of two diagnoses of the same readings with different efforts."""
     return other if _is_likelier(other.extended, one.extended) else one
 
 
 def with_words(diagnosis: Diagnosis) -> Diagnosis:
-    """The diagnosis with what is to be said of efforts that are not as they were recorded."""
+    """Return the diagnosis with warnings about efforts that are corrected."""
     log, said = diagnosis.log, []
     if log.effort_late_s or log.effort_over_s:
         said.append(words_of_lateness(log))
@@ -144,9 +144,9 @@ def with_words(diagnosis: Diagnosis) -> Diagnosis:
 
 
 def _is_likelier(one: LikelihoodFit, other: LikelihoodFit) -> bool:
-    """True if the same readings are foretold better for as many parameters: those that are news to both.
+    """Return whether the first fit has the lower criterion, both at the longer correlation time of measurement noise.
 
-    Beside random efforts that are new in every sample where those of one are.
+    If the process noise of one is white, both are fitted with white process noise.
     """
     both = one.noise, other.noise
     correlation_s, timed = max(n.correlation_s for n in both), any(n.timed for n in both)
@@ -155,7 +155,7 @@ def _is_likelier(one: LikelihoodFit, other: LikelihoodFit) -> bool:
 
 
 def _as_random(fitted: LikelihoodFit, correlation_s: float, timed: bool) -> LikelihoodFit:
-    """The fit to readings so far apart, and beside random efforts that are new in every one if these are to be."""
+    """Return the fit at a correlation time of measurement noise, with white process noise if asked for."""
     if fitted.noise.correlation_s != correlation_s:
         fitted = maximum_from(fitted, fitted.trials, replace(fitted.noise, correlation_s=correlation_s))
     return with_white_process_noise(fitted) if timed and not fitted.noise.timed else fitted

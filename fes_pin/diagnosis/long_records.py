@@ -1,4 +1,4 @@
-"""Records longer than a search can hold: what part of them is searched, and in what words that is told."""
+"""Records longer than a search can hold: the part that is searched, and the warning that says so."""
 
 from __future__ import annotations
 
@@ -11,28 +11,28 @@ from fes_pin.data.trial import Trial, derived_trial
 from fes_pin.infer.noise import noise_step, thin, thinning
 
 MOST_SAMPLES = 120_000
-"""Samples of all trials together that a search takes: sensitivities to every cause of the library take about 10 kB a
-sample, and a computer of 4 GB must do. Ten minutes of motion at 200 Hz, or four trials of 30 s at 1 kHz."""
+"""Samples of all trials together that a search takes. Sensitivities to every cause of the library take about 10 kB a
+sample, and 4 GB of memory must suffice. This is ten minutes of motion at 200 Hz, or four trials of 30 s at 1 kHz."""
 MOST_DRIVEN = 60_000
-"""The same of a rig whose effort answers its reading, before samples are averaged: a search by the likelihood predicts
-them some thousand times, and a step of 4 ms tells what one of 1 ms does: dry friction of 20 N as 20.09 N or 20.06 N, an
-offset of -3 N as -3.24 N or -3.34 N, in a quarter of the time (`scripts/benchmark slide`)."""
+"""The same for a rig in closed loop, before samples are averaged. A search by the likelihood predicts them some
+thousand times, and a step of 4 ms estimates what one of 1 ms does in a quarter of the time: dry friction of 20 N as
+20.09 N or 20.06 N, an offset of -3 N as -3.24 N or -3.34 N (`scripts/benchmark slide`)."""
 
 
 def searched_part(
     trials: Sequence[Trial], schema: RigSchema, driven: bool = False, groups: int = 1
 ) -> tuple[list[Trial], list[Trial], list[str]]:
-    """The trials, or the part of them, that a search takes; trials left for judging it; and what is to be said.
+    """Return the trials, or the part of them, that a search takes; trials that are kept for judging; and warnings.
 
-    First samples are averaged to the step that noise is modelled at; then whole trials are left out, evenly spread over
-    the session; a single record that is too long even so is cut at its end, as a simulation begins at its beginning.
+    Samples are first averaged to the step that noise is modelled at. Then whole trials are left out, evenly spread over
+    the session. A single record that is still too long is cut at its end, as a simulation begins at its beginning.
 
     Parameters
     ----------
     driven
-        True if the rig's effort answers its reading.
+        Whether the rig is in closed loop.
     groups
-        How many groups of trials are searched together, of which this is one; none are left for judging then.
+        Number of groups of trials that are searched together, this one among them; then none are kept for judging.
     """
     room = MOST_SAMPLES // groups
     if _size(trials) <= (min(room, MOST_DRIVEN // groups) if driven else room):
@@ -56,7 +56,7 @@ def searched_part(
 
 
 def _spread(trials: Sequence[Trial], count: int) -> tuple[list[Trial], list[Trial]]:
-    """So many trials, evenly spread, and as many of the others."""
+    """Return `count` trials, evenly spread, and as many of the others."""
     chosen = {round(k) for k in np.linspace(0, len(trials) - 1, count)}
     others = [t for k, t in enumerate(trials) if k not in chosen]
     left = [others[round(k)] for k in np.linspace(0, len(others) - 1, min(count, len(others)))]
@@ -64,12 +64,11 @@ def _spread(trials: Sequence[Trial], count: int) -> tuple[list[Trial], list[Tria
 
 
 def thinned(trial: Trial, schema: RigSchema, driven: bool = False) -> Trial:
-    """The trial at the time step that noise is modelled at.
+    """Return the trial at the time step that noise is modelled at.
 
-    What is held between samples is averaged over the new step. What is read is averaged about its beginning: about its
-    middle, a rig would seem to answer half a step before it is driven. Without an input there is no such time. Where
-    the effort answers the reading, only what is read there is kept: noise comes in with the effort, and a mean of an
-    encoder's counts is no count.
+    Inputs that are held between samples are averaged over the new step. Readings are averaged about its beginning:
+    averaged about its middle, a rig would seem to respond half a step before it is driven. In closed loop only the
+    readings at the new steps are kept, since noise enters the effort, and a mean of an encoder's counts is no count.
     """
     count = thinning(trial.dt, noise_step([trial.dt]))
     held = [n for n in schema.inputs if n in trial.columns and n != schema.outputs[trial.kind]]
@@ -82,7 +81,7 @@ def thinned(trial: Trial, schema: RigSchema, driven: bool = False) -> Trial:
 
 
 def _about(values: np.ndarray, count: int, side: int) -> np.ndarray:
-    """Means of so many samples to either side of every `count`-th; mirrored in the ends."""
+    """Return means of `side` samples to either side of every `count`-th sample, mirrored at the ends."""
     before, after = 2.0 * values[0] - values[side:0:-1], 2.0 * values[-1] - values[-2 : -2 - side : -1]
     whole = np.convolve(np.concatenate([before, values, after]), np.full(2 * side + 1, 1.0 / (2 * side + 1)), "valid")
     return whole[: len(values) // count * count : count]

@@ -1,12 +1,13 @@
-"""One trial's stated load, angle or length does not fit what it measured: which trial, and the value it must have had.
+"""Misread conditions: a trial whose stated load, angle or length contradicts its readings, and the value estimated.
 
-The model is fitted to all trials but one, and that trial's own condition to it: with z_j the step that trial j would
-take from what it states, in standard deviations by the noise of the others and by their parameters' covariance,
+The model is fitted to all trials but one, and the condition of that trial is then estimated. Let z_j be the difference
+between the estimated and the stated condition of trial j, in standard deviations by the noise of the others and by the
+covariance of their parameters. Then
 
     t = z_i / sqrt(phi),   phi = max(1, mean of z_j^2 over the others)
 
-is Student's with as many degrees of freedom as there are others. So what repeats differ by anyway is no misreading,
-whatever of them scatters. A trial that is restated must then be as well explained as the others are.
+has Student's distribution with as many degrees of freedom as there are other trials. Scatter between repeats is
+therefore not taken for a misreading. A restated trial must also be explained as well as the others.
 """
 
 from __future__ import annotations
@@ -37,22 +38,22 @@ DESCRIBED = f"""{NAME} (rig; rigs: ankle, joint, muscle)
   Tell-tale: one trial is off as a whole, as another load or length would have it, and all others are right.
     value, of the condition that the trial states
 """
-"""As `fes-pin effects` tells it: it is of a trial, not of the rig, and no effect of a model."""
+"""Description for `fes-pin effects`: a misreading belongs to a trial, not to the rig, and is no effect of a model."""
 CANDIDATES = 3
-"""Trials that are left out in turn, those that the screen finds oddest."""
+"""Trials that are left out in turn: those of the largest scores."""
 UNFELT = 1e-7
-"""Share of an answer's spread that a step of a condition moves it by where only rounding does."""
+"""Change of a simulation by a step of a condition, as a share of its spread, that rounding alone may cause."""
 ENDS = 0.01
-"""Step, in standard deviations of the value, with which its search ends."""
+"""Step, in standard deviations of the value, at which its estimation ends."""
 STEPS = 8
-"""Gauss-Newton steps of one value, which half a step of its own size usually ends."""
+"""Most Gauss-Newton steps of one value; it usually takes fewer."""
 SHARE = 1e-4
-"""Step of a numerical derivative, of the spread of what trials state, or of its size where all state the same."""
+"""Step of a numerical derivative, as a share of the spread of the stated values, or of their size if all are equal."""
 
 
 @dataclass(frozen=True)
 class Misread:
-    """A condition that a trial did not have.
+    """A condition of a trial that was not as stated.
 
     Attributes
     ----------
@@ -61,13 +62,13 @@ class Misread:
     condition
         "load_kg", "angle_rad", "length_m" ...
     stated, value, std
-        What the trial says, and what it must have been.
+        The stated value, its estimate, and the standard deviation of the estimate.
     p_value
-        Over all trials.
+        Family-wise, over all trials.
     halves
-        The value that the odd quarters of the trial tell, and that the even ones tell.
+        Estimates from the odd quarters of the trial, and from the even ones.
     whole, others
-        Fits of the model to all trials as they are stated, and to all but this one.
+        Fits of the model to all trials as stated, and to all but this one.
     """
 
     trial: str
@@ -82,14 +83,14 @@ class Misread:
 
     @property
     def words(self) -> str:
-        """What happened, in plain words."""
+        """Return the misreading in words."""
         return f"trial {self.trial} states {self.condition} = {self.stated:.4g}; it was {self.value:.4g}"
 
 
 @dataclass(frozen=True)
 class _Step:
-    """What one trial says of one of its conditions: its step in units of the condition, with its deviation;
-    and the mean square that is left of it."""
+    """Estimate of a condition from its own trial: difference from the stated value in its unit, standard deviation, and
+    mean square of the residual."""
 
     value: float
     std: float
@@ -101,14 +102,14 @@ class _Step:
 
 
 def find_misread(model: Model, trials: Sequence[Trial]) -> Misread | None:
-    """The trial whose condition was misread, under a model; None if none stands out of the others.
+    """Return the trial whose condition was misread, under a model; None if no trial is an outlier.
 
     Parameters
     ----------
     model
-        With start values; it is fitted here, by free simulation.
+        The model, with start values; it is fitted here by free simulation.
     trials
-        What was measured, with what was stated.
+        Measured trials with their stated conditions.
     """
     sizes = _sizes(model, trials)
     first = {(t.kind, n): t for t in reversed(trials) for n in model.rig.stated(t)}
@@ -125,12 +126,12 @@ def find_misread(model: Model, trials: Sequence[Trial]) -> Misread | None:
 
 
 def restated_trials(model: Model, trials: Sequence[Trial], found: Misread) -> list[Trial]:
-    """The trials, one of them with the value that it must have had."""
+    """Return the trials, one of them with the estimated value of its condition."""
     return [model.rig.restated(t, found.condition, found.value) if t.name == found.trial else t for t in trials]
 
 
 def takes_most(found: Misread) -> bool:
-    """True if restating the trial takes away more than half of what the model gets wrong, by squares beyond noise."""
+    """Return whether restating the trial removes more than half of the squared error of the model above the noise."""
     whole = found.whole
     restated = restated_trials(whole.model, whole.trials, found)
     after = fit_problem(Problem(whole.model, restated, whole.noise), whole.values)
@@ -139,7 +140,7 @@ def takes_most(found: Misread) -> bool:
 
 
 def _sizes(model: Model, trials: Sequence[Trial]) -> dict[str, float]:
-    """A step of each condition that is small and felt."""
+    """Return a small step of each condition that changes the simulation."""
     values: dict[str, list[float]] = {}
     for trial in trials:
         for name, value in model.rig.stated(trial).items():
@@ -149,7 +150,7 @@ def _sizes(model: Model, trials: Sequence[Trial]) -> dict[str, float]:
 
 
 def _is_felt(model: Model, trial: Trial, name: str, size: float) -> bool:
-    """True if the model's answer to a trial depends on what it states."""
+    """Return whether the simulation of a trial depends on a condition."""
     moved = simulated_trial(model, model.rig.restated(trial, name, model.rig.stated(trial)[name] + size))
     plain = simulated_trial(model, trial)
     names = [n for n in model.rig.outputs(trial.kind) if n in trial.columns]
@@ -159,7 +160,7 @@ def _is_felt(model: Model, trial: Trial, name: str, size: float) -> bool:
 def _screen(
     whole: Fit, trials: Sequence[Trial], wanted: Sequence[tuple[int, str]], sizes: dict[str, float]
 ) -> list[tuple[int, str]]:
-    """The conditions of largest score beside everything that the model could move, under white noise."""
+    """Return the conditions of largest score in a model whose parameters are free too, under white noise."""
     noise = as_white(noise_of(whole))
     problem = Problem(whole.model, trials, noise)
     parts = problem.linearize(whole.values, whole.unknowns)
@@ -181,7 +182,7 @@ def _screen(
 
 
 def _column(model: Model, trial: Trial, name: str, fitted: Fit, noise: NoiseModel, step: float) -> np.ndarray:
-    """Whitened derivative of a trial's simulation by what it states, shape (m,)."""
+    """Return the whitened derivative of a trial's simulation by a condition, shape (m,)."""
     there = model.rig.stated(trial)[name]
     low, high = (_residual(model, model.rig.restated(trial, name, there + s), fitted, noise) for s in (-step, step))
     return (low.residual - high.residual) / (2.0 * step)
@@ -199,7 +200,7 @@ def _left_out(
     wanted: Sequence[tuple[int, str]],
     sizes: dict[str, float],
 ) -> Misread | None:
-    """What one trial's condition must have been by a fit of the others; None if it does not stand out."""
+    """Return the misreading of one trial's condition by a fit of the others; None if the trial is no outlier."""
     i, name = pick
     others = [k for k in range(len(trials)) if k != i]
     rest = [trials[k] for k in others]
@@ -237,12 +238,12 @@ def _left_out(
 def _step(
     fitted: Fit, trial: Trial, name: str, noise: NoiseModel, size: float, steps: int = STEPS, half: int | None = None
 ) -> _Step:
-    """Where a trial would have its condition, by Gauss and Newton, as a step from what it states.
+    """Estimate a condition from its own trial by Gauss-Newton steps, as a difference from the stated value.
 
     Parameters
     ----------
     half
-        0 or 1: by the odd or by the even quarters of the trial alone.
+        0 or 1: from the odd or from the even quarters of the trial alone.
     """
     rig, now = fitted.model.rig, trial
     begun = rig.stated(trial)[name]

@@ -1,4 +1,4 @@
-"""A few long trials, each in parts: what a cause adds is then foretold for some by the others."""
+"""A few long trials, each cut into parts, so that some parts can be held out and predicted by fits to the others."""
 
 from __future__ import annotations
 
@@ -14,13 +14,14 @@ from fes_pin.models.compile.layout import WIDTH
 from fes_pin.models.rigs.base import Rig
 
 SHORTEST_S = 10.0 * HORIZON_S
-"""Length of a part at least: as much as an error over the horizon is judged on."""
+"""Least length of a part, s: an error over the horizon is judged on as much."""
 
 
 def in_parts(rig: Rig, trials: Sequence[Trial]) -> list[Trial]:
-    """The trials, cut into as many parts of one length as run side by side where they are half as many or fewer.
+    """Return the trials, cut into parts of equal length if there are fewer than half as many as run in one batch.
 
-    Each part begins at a state of its own, which its first samples tell; where a rig begins at rest, none is cut.
+    Each part begins at a state of its own, which is estimated from its first samples. Trials of a rig that begins at
+    rest are not cut.
     """
     most = WIDTH // max(len(trials), 1)
     return [part for trial in trials for part in _cut(trial, most if rig.unknowns(trial.kind) else 1)]

@@ -1,4 +1,4 @@
-"""What a study's time step and range say against it in the light of its model, before anything is fitted."""
+"""Checks of a study's time step, range and signs against its nominal model, before a fit."""
 
 from __future__ import annotations
 
@@ -16,36 +16,36 @@ from fes_pin.models.rigs.base import RUN_OUT
 from fes_pin.models.simulate import simulated_trial
 
 COARSE = 5.0
-"""Time constants that a sample step may be long: a first-order lag has then settled to less than a hundredth, and
-nothing of it is seen, were the start value wrong by half. Milliseconds under `time_s` make hundreds."""
+"""Longest time step, in time constants of the model: a first-order lag has then settled to less than a hundredth and
+is not observable, even if its start value is wrong by half. Milliseconds in the column `time_s` give hundreds."""
 SLOW_S = 0.1
-"""Time step in s of a trial to predict that is asked about: 10 kHz in ms."""
+"""Time step in s of a trial to predict above which a warning is given: 10 kHz in ms."""
 SLOWEST_S = 1.0
-"""Time step in s that is refused anyway: pulses come 20 to 50 times a second, and a limb swings about once."""
+"""Time step in s that is rejected: pulses come 20 to 50 times a second, and a limb swings about once."""
 TURNS = 4.0
-"""Turns from zero beyond which an angle is likelier in degrees: 4 turns are 25 rad, and 25 degrees a small swing."""
+"""Turns from zero above which an angle is likelier in degrees: 4 turns are 25 rad, and 25 degrees a small swing."""
 LONGEST_M = 10.0
-"""Position in m that no slide of a laboratory reaches, and length of no pendulum in it; millimetres do."""
+"""Largest position and pendulum length in m in a laboratory; values in millimetres are larger."""
 SWING = 2.0 * math.pi
-"""Way in rad between two turning points of a pendulum that is not driven, at most: from upright round to upright."""
+"""Largest angle in rad between two turning points of a pendulum that is not driven: from upright round to upright."""
 STILL = 0.02
 """Share of a trial's range below which its last tenth stands still."""
 ASKEW = 0.5
-"""Angle in rad from hanging at which dry friction hardly holds a pendulum: half of its weight pulls."""
+"""Angle in rad from hanging above which dry friction hardly holds a pendulum: half of its weight acts there."""
 
 
 TURNED = -0.7
-"""Correlation of what is read with what the model says, from which on it would explain half with the sign turned."""
+"""Correlation of reading and simulation at which the model would explain half of the variance with the sign changed."""
 
 
 def check_study(study: Study | ToPredict, model: Model) -> list[str]:
-    """Warnings about a study, or trials to predict, that are known before a fit, one line each.
+    """Return warnings about a study, or about trials to predict, that need no fit, one line each.
 
     Raises
     ------
     InputError
-        For what no verdict could follow from: see `data.plausibility`; or a time step much longer than the time
-        constants of the model's start values.
+        For data that allow no verdict, see `data.plausibility`; and for a time step much longer than the time constants
+        of the model's start values.
     """
     return [
         *implausible(study),
@@ -78,9 +78,9 @@ def _steps(study: Study | ToPredict, model: Model) -> Iterable[str]:
 
 
 def _turned(study: Study | ToPredict, model: Model) -> Iterable[str]:
-    """Readings that fall where the muscle pulls."""
+    """Yield a warning for readings that fall where the muscle pulls."""
     if model.rig.constants.get("torque_sign", 1.0) < 0.0:
-        yield "torque_nm falls where the muscle pulls: it is taken as counted the other way, as what moves the ankle"
+        yield "torque_nm falls where the muscle pulls: it is read with the opposite sign, as the torque on the ankle"
     found: dict[str, list[str]] = {}
     for trial in study.trials:
         name = model.rig.output(trial.kind)
@@ -107,7 +107,7 @@ def _range(study: Study | ToPredict, model: Model) -> Iterable[str]:
 
 
 def _swings(study: Study | ToPredict, model: Model) -> Iterable[str]:
-    """What no pendulum does by itself: swing back from more than a turn away, or rest where it does not hang."""
+    """Yield warnings for motion that no pendulum has by itself: wide swings, or rest off hanging."""
     c = model.rig.constants
     weight = math.hypot(c.get("gravity_cos", 0.0), c.get("gravity_sin", 0.0))
     if not c.get("revolute") or not weight > 0.0 or model.parameters().get("gravity_scale", 1.0) == 0.0:
@@ -133,7 +133,7 @@ def _swings(study: Study | ToPredict, model: Model) -> Iterable[str]:
 
 
 def _widest_swing(position: np.ndarray) -> float:
-    """The longest way between two turning points, rad; small ripples are no turning points."""
+    """Return the largest angle between two turning points, rad; small ripples are no turning points."""
     from scipy.signal import find_peaks  # noqa: PLC0415 - half a second, for rigs under gravity alone
 
     ripple = 0.05 * float(np.ptp(position))

@@ -1,4 +1,4 @@
-"""Parts of a diagnosis as plain values, as `diagnosis.json` has them."""
+"""Parts of a diagnosis as plain values, as they stand in `diagnosis.json`."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ from fes_pin.models.catalogue import Catalogue
 
 
 def left_out_record(left_out: Mapping[str, Mapping[str, Sequence[int]]]) -> dict[str, Any]:
-    """Samples left out as spikes by trial and column; no key where there are none."""
+    """Return the samples left out as spikes by trial and column; no key where there are none."""
     found = {t: {n: len(k) for n, k in columns.items()} for t, columns in left_out.items()}
     return {"left_out_samples": found} if found else {}
 
 
 def library_record(catalogue: Catalogue) -> dict[str, Any]:
-    """Causes and rigs that are not written here, by the file or module that holds them; no key where there are none."""
+    """Return causes and rigs of users' own by the file or module that defines them; no key where there are none."""
     found = {Path(where).name: names for where, names in catalogue.origins().items()}
     return {"library": found} if found else {}
 
 
 def parameters_record(fitted: Fit) -> dict[str, Any]:
-    """What was fitted, with deviations, by name."""
+    """Return fitted parameters with their standard deviations, by name."""
     return {n: ParameterEstimate.of(fitted, n, "").record() for n in fitted.free}
 
 
 def errors_record(
     free: tuple[float | None, float | None], ahead: AheadErrors | None, which: str
 ) -> dict[str, float | None]:
-    """E of one of the two models, by the names of `identify.error_measures`."""
+    """Return E of one of the two models, by the names of `identify.error_measures`."""
     out = {"fit": shown(free[0]), "held_out": shown(free[1])}
     if ahead is not None:
         errors = getattr(ahead, f"{which}_held_out") or getattr(ahead, which)
@@ -41,7 +41,7 @@ def errors_record(
 
 
 def ahead_record(ahead: AheadErrors | None, driven: bool, random: Sequence[RandomPart]) -> dict[str, Any]:
-    """How far ahead a horizon looks, and what acts on a driven rig at random; no key without errors ahead."""
+    """Return the horizon and the process noise of a driven rig; no key without errors over a horizon."""
     if ahead is None:
         return {}
     horizon = {"horizon_s": shown(ahead.horizon_s)}

@@ -1,4 +1,4 @@
-"""Causes of driven rigs that are refused: held-out trials do not speak for them, or no recorded input moves the rig."""
+"""Rejected causes: held-out trials do not support them, or the recorded input does not move the rig."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ UNMOVED = "the motion is as likely without the recorded input, so something else
 
 
 def is_moved_by_what_is_recorded(fitted: LikelihoodFit) -> bool:
-    """False where most of what moves a rig acts at random, and the motion is as likely without what was recorded.
+    """Return False where process noise is large and the motion is as likely without the recorded input.
 
-    A column of another joint, or of another trial, is not what drove the rig; a spring or a friction beside it would
-    stand for the controller that did. A rig without recorded inputs is moved by what it is.
+    Such an input may be the column of another joint or of another trial. A spring or a friction would then be mistaken
+    for the controller that did drive the rig. The answer is True for a rig without recorded inputs.
     """
     inputs = {id(t): [n for n in fitted.model.driven_by(t) if n in t] for t in fitted.trials}
     if not any(inputs.values()) or not are_large(random_parts(fitted)):
@@ -38,12 +38,21 @@ def is_moved_by_what_is_recorded(fitted: LikelihoodFit) -> bool:
 def with_rejected_causes(
     left: Remainder, random: Sequence[RandomPart], rejected: Mapping[str, Rejected], stages: Mapping[str, str]
 ) -> Remainder:
-    """What is left: by the features, or a random effort that is too large, or a cause that was refused.
+    """Return the lack of fit: by its tests, by process noise that is too large, or by a cause that was rejected.
 
-    `stages` says where each cause acts.
+    A rejected cause is no lack of fit if it explains less than an error in the form of another cause may, or if it
+    gains nothing over the horizon: it is then mistaken for noise that is not white, as that of an encoder's counts.
 
-    A cause that explains less than another's error of form leaves to whatever comes near stands for that error; one
-    that gains nothing over the horizon stands for noise that is not white, as that of an encoder's counts.
+    Parameters
+    ----------
+    left
+        The result of the tests of lack of fit.
+    random
+        Process noise of the fit.
+    rejected
+        Rejected causes by name.
+    stages
+        Where each cause acts.
     """
     if left.unexplained:
         return left
@@ -58,12 +67,12 @@ def with_rejected_causes(
 
 
 def no_noise(fitted: LikelihoodFit) -> str | None:
-    """Why the error of a simulation is no noise of a reading; None where it may be, or where there is process noise.
+    """Return why the error of a simulation cannot be measurement noise; None where it may be, or with process noise.
 
-    An autoregression takes any slow error for noise; a missing input would then be noise, too. First-order
-    autoregressive noise is 3.8 times its part from sample to sample at a coefficient of 0.9, 5.5 at 0.95, 12 at 0.99;
-    270 studies without a cause, of three rigs in three kinds of noise, have 8.3 at most:
-    `scripts/benchmarks/adequate.py --count 30`.
+    An autoregression takes any slow error for noise, even that of a missing input. The limit is a ratio of the error to
+    its scatter from sample to sample. First-order autoregressive noise has a ratio of 3.8 at a coefficient of 0.9, 5.5
+    at 0.95 and 12 at 0.99. 270 studies without a cause, of three rigs in three kinds of noise, have 8.3 at most
+    (`scripts/benchmarks/adequate.py --count 30`).
     """
     problem = LikelihoodProblem(fitted.model, fitted.trials, fitted.noise)
     if not problem.is_simulated:
@@ -72,11 +81,11 @@ def no_noise(fitted: LikelihoodFit) -> str | None:
     percent = free_errors(fitted.model, fitted.trials, rough_noise(fitted.model, fitted.trials)).error_percent()
     if SMALL_SHARE * ratio <= 1.0 or percent <= SMALL_PERCENT:
         return None
-    return f"an error of {percent:.3g} %, {ratio:.3g} times the scatter from sample to sample, is no noise of a reading"
+    return f"an error of {percent:.3g} %, {ratio:.3g} times the scatter from sample to sample, is no measurement noise"
 
 
 def slowness(fitted: Fit) -> float:
-    """Largest ratio of a channel's residual in free simulation to the noise from sample to sample of its reading."""
+    """Return the largest ratio of a channel's residual in free simulation to its scatter from sample to sample."""
     rough = rough_noise(fitted.model, fitted.trials)
     errors = {n: free_errors(fitted.model, [t for t in fitted.trials if n in t], {n: m}) for n, m in rough.items()}
     return max((math.sqrt(e.squares.sum() / e.noise.sum()) for e in errors.values()), default=0.0)

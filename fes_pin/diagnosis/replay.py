@@ -1,4 +1,4 @@
-"""Every trial of a study beside what the nominal and the extended model say of it."""
+"""Every trial of a study with the predictions of its nominal and its extended model."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ from fes_pin.infer.noise import NoiseModel
 
 @dataclass(frozen=True)
 class Replay:
-    """One trial, measured and as both models predict it from its inputs.
+    """One trial as measured, and as both models predict it from its inputs.
 
     Attributes
     ----------
     measured, nominal, extended
-        The same time and inputs; `nominal` and `extended` hold the predicted outputs.
+        Trials of the same time and inputs; `nominal` and `extended` hold the predicted outputs.
     outputs
         The measured columns that both models predict.
     nominal_error, extended_error
         E of eq. (2) of this trial alone, percent; all channels in units of their noise.
     has_cause
-        Whether the extended model is to be shown: it has causes that are named.
+        Whether the extended model is shown: it has named causes.
     """
 
     measured: Trial
@@ -44,21 +44,21 @@ class Replay:
 
     @property
     def models(self) -> dict[str, Trial]:
-        """What is to be shown of the models, by name."""
+        """The predictions that are shown, by the name of their model."""
         return {**({"extended": self.extended} if self.has_cause else {}), "nominal": self.nominal}
 
     @property
     def errors(self) -> tuple[float, ...]:
-        """Errors E of the nominal and, if it is to be shown, of the extended model."""
+        """Errors E of the nominal and, if it is shown, of the extended model."""
         return (self.nominal_error, self.extended_error)[: 1 + self.has_cause]
 
     def residuals(self, name: str) -> dict[str, np.ndarray]:
-        """Residuals of an output by model, each of shape (n,)."""
+        """Return the residuals of an output by model, each of shape (n,)."""
         return {of: self.measured.residual(simulated, name) for of, simulated in self.models.items()}
 
 
 def replayed_trials(diagnosis: Diagnosis) -> tuple[Replay, ...]:
-    """Every trial of the study as both models of a diagnosis predict it, in the order of the study."""
+    """Return every trial of the study as both models of a diagnosis predict it, in the order of the study."""
     trials, noise = diagnosis.study.trials, diagnosis.extended.noise
     nominal = _predicted(diagnosis.nominal, trials, noise, diagnosis.over_horizon)
     extended = _predicted(diagnosis.extended, trials, noise, diagnosis.over_horizon)
@@ -73,9 +73,9 @@ def replayed_trials(diagnosis: Diagnosis) -> tuple[Replay, ...]:
 def _predicted(
     fitted: LikelihoodFit, trials: Sequence[Trial], noise: NoiseModel, ahead: AheadErrors | None
 ) -> list[Trial]:
-    """Trials as predicted from their inputs; where the effort answers the reading, over the horizon.
+    """Return trials as predicted from their inputs; for a rig in closed loop, over the horizon.
 
-    A free simulation of such a rig integrates its errors, or falls: it says little of the model, or nothing.
+    A free simulation of such a rig integrates its errors, or falls: it says little or nothing about the model.
     """
     model, out = fitted.model, []
     if ahead is not None:
@@ -89,18 +89,18 @@ def _predicted(
 
 
 def _shown(readings: np.ndarray, trial: Trial, name: str) -> np.ndarray:
-    """A prediction that runs away stays where it counts as lost; see `levels.RUNAWAY`."""
+    """Return a prediction limited where it diverges; see `levels.RUNAWAY`."""
     most = RUNAWAY * float(np.abs(trial[name]).max()) if name in trial else np.inf
     return within(readings, most if most > 0.0 else 1.0)
 
 
 def trial_error_percent(measured: Trial, simulated: Trial, outputs: Sequence[str], noise: NoiseModel) -> float:
-    """E of a prediction of one trial, percent."""
+    """Return E of a prediction of one trial, percent."""
     return percent_of_spread(*squares_of(measured, simulated, outputs, noise))
 
 
 def squares_of(measured: Trial, simulated: Trial, outputs: Sequence[str], noise: NoiseModel) -> tuple[float, float]:
-    """Squared error of a trial, and the measurement's squares about its mean; each output in units of its noise."""
+    """Return the squared error of a trial, and the measurement's squares about its mean, in units of the noise."""
     squares = spread = 0.0
     for name in outputs:
         variance = noise[name].std ** 2 if name in noise else 1.0

@@ -1,4 +1,4 @@
-"""A diagnosis of a study of which one trial's condition was misread."""
+"""Diagnosis of a study in which the condition of one trial was misread."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from fes_pin.models.model import Model
 from fes_pin.models.stage import Stage
 
 Run = Callable[[list[Trial]], tuple[LikelihoodSearch, Found]]
-"""Searches trials."""
+"""Search of trials: returns the search and its result."""
 Made = Restated[LikelihoodSearch, Found]
 
 
@@ -35,40 +35,40 @@ class StudyConditions(Conditions[LikelihoodSearch, Found]):
     """Conditions of the trials of a diagnosis."""
 
     def misread(self, trials: Sequence[Trial], searched: Found | None) -> Misread | None:
-        """The trial that stands out under what was found, or under the nominal model."""
+        """Return the trial that is an outlier under the causes found, or under the nominal model."""
         return find_misread(Model(self.nominal.rig) if searched is None else searched.best.model, trials)
 
     def has_causes(self, searched: Found) -> bool:
-        """Whether any cause was found."""
+        """Return whether any cause was found."""
         return bool(searched.best.model.effects)
 
     def leaves_noise(self, made: Made) -> bool:
-        """Whether the restated trials have no lack of fit."""
+        """Return whether the restated trials have no lack of fit."""
         return not made.search.was_stopped and made.search.models.leaves_noise(made.searched.best)
 
     def is_explained(self, made: Made) -> bool:
-        """Whether no test finds a lack of fit in the restated trials."""
+        """Return whether no test finds a lack of fit in the restated trials."""
         return not lack_of_fit(made.searched.best).unexplained
 
     def saved(self, searched: Found, trials: Sequence[Trial], made: Made) -> float:
-        """By how much the price falls."""
+        """Return by how much the criterion falls."""
         return searched.best.criterion - made.searched.best.criterion
 
 
 def restated_study(study: Study, nominal: Model, misread: Misread) -> Study:
-    """The study with the trial's value in the place of what it states."""
+    """Return the study with the estimated value in the place of the stated one."""
     return replace(study, trials=tuple(restated_trials(nominal, study.trials, misread)))
 
 
 def with_misread(
     diagnosis: Diagnosis, made: Made, trials: Sequence[Trial], test: Sequence[Trial], seed: int
 ) -> Diagnosis:
-    """The diagnosis of the restated study with the misreading as its first cause.
+    """Return the diagnosis of the restated study with the misreading as its first cause.
 
     Parameters
     ----------
     trials, test
-        As they were stated: the errors of the nominal model are those on these.
+        Trials as stated, on which the errors of the nominal model are found.
     """
     before, best = made.misread.whole, made.searched.best
     if before.model.effects:
@@ -92,7 +92,7 @@ def with_misread(
 def _without(
     fitted: LikelihoodFit, floor: LikelihoodFit, out: Sequence[int]
 ) -> tuple[LikelihoodFit, LikelihoodFit, list[Trial]]:
-    """A fit without some of its trials, the fit whose noise is the unit of its errors, and those trials."""
+    """Return a fit without some of its trials, the fit whose noise is the unit of its errors, and those trials."""
     others = [t for i, t in enumerate(fitted.trials) if i not in out]
     return refit(fitted, others), floor, [fitted.trials[i] for i in out]
 
@@ -118,7 +118,7 @@ def _cause(made: Made, gain_fit: float, trials: Sequence[Trial], seed: int) -> C
 
 
 def _errors_of_halves(made: Made, trial: Trial) -> tuple[Errors, Errors]:
-    """Errors on the trial of the model that was fitted to the others: as stated, and as its other half tells it."""
+    """Return errors on a trial of the model fitted to the others: as stated, and at the estimate of its other half."""
     misread, others = made.misread, made.misread.others
     plain = free_errors(others.model, [trial], others.noise)
     by_half = [

@@ -1,4 +1,4 @@
-"""The answer of a diagnosis: which causes are named, how sure, with what gain, what stays open; and it in words."""
+"""The result of a diagnosis: named causes with their significance and gain, lack of fit, errors; and it in words."""
 
 from __future__ import annotations
 
@@ -25,36 +25,36 @@ from fes_pin.models.stage import Effect
 from fes_pin.models.store import model_toml
 
 EACH_TRIAL = (
-    "size and phase are each trial's own; in a held-out trial its other parts tell them, and a prediction from inputs "
-    "alone leaves the effect out"
+    "size and phase are each trial's own; in a held-out trial they are estimated from its other parts, and a "
+    "prediction from inputs alone leaves the effect out"
 )
-"""What is said of effects whose amplitudes are each trial's own."""
+"""Note for effects whose amplitudes are each trial's own."""
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Diagnosis(Result):
-    """What a simulation gets wrong: "adequate", "causes_found", "unexplained" or "stopped".
+    """Verdict of a study: "adequate", "causes_found", "unexplained" or "stopped", with the causes that are named.
 
     Attributes
     ----------
     model
         The extended model: it can be simulated, fitted and diagnosed again.
     absorbed
-        Causes that these data could not show.
+        Causes that are not identifiable from these data.
     nominal_error, extended_error
-        E of free simulations in percent: on the fitted trials, and on trials that took no part.
+        E of free simulations in percent: on the fitted trials, and on held-out trials.
     ranking
         For each cause, its rivals by shortfall in twice the log-likelihood.
     held_out_by
-        What data gains and errors are found on: a key of `infer.result.ON`.
+        The data on which gains and errors are found: a key of `infer.result.ON`.
     left_out
-        Samples taken for spikes, by trial and column; in `study` they hold what their neighbours say.
+        Samples taken for spikes, by trial and column; in `study` they are interpolated.
     catalogue
-        The causes that were looked for, of which the rig can have some.
+        The causes that were searched, as far as the rig can have them.
     random, ahead
-        Of a rig that a recorded effort drives: what acts on it at random, and its errors over time.
+        Of a driven rig: its process noise, and its errors by horizon.
     log
-        What was found that the log of the study does to its trials; in `study` it is undone, where it can be.
+        Faults of the log that were found; in `study` they are corrected where that is possible.
     is_driven
         Whether a controller answers the reading, or imposes the motion: then errors are judged over the horizon, else
         those of free simulations.
@@ -79,12 +79,12 @@ class Diagnosis(Result):
 
     @property
     def is_falling(self) -> bool:
-        """True of a driven rig that falls over by itself: a free simulation of it says nothing of the model."""
+        """Whether a driven rig falls over by itself, so that a free simulation says nothing about the model."""
         return self.is_driven and self.ahead is not None and self.ahead.extended.free is None
 
     @property
     def over_horizon(self) -> AheadErrors | None:
-        """Errors that a driven rig is judged by; None of one that is simulated freely."""
+        """Errors by which a rig in closed loop is judged; None of one that is simulated freely."""
         return self.ahead if self.is_driven else None
 
     @property
@@ -94,11 +94,11 @@ class Diagnosis(Result):
 
     @property
     def judged_on(self) -> str:
-        """Of which predictions the errors count: of a driven rig those over the horizon."""
+        """The predictions whose errors count: over the horizon for a rig in closed loop, else free simulations."""
         return FREE if (ahead := self.over_horizon) is None else ahead.words
 
     def errors(self) -> list[Explained]:
-        """Errors of every kind of prediction, on data that were fitted and, last, on data that took no part."""
+        """Errors of every kind of prediction, on fitted data and, last, on held-out data."""
         out, ahead, none = [], self.ahead, (None, None)
         fitted = (ahead.nominal, ahead.extended) if ahead else none
         held_out = (ahead.nominal_held_out, ahead.extended_held_out) if ahead else none
@@ -113,11 +113,11 @@ class Diagnosis(Result):
         return out
 
     def effect(self, name: str) -> type[Effect] | None:
-        """The class that describes a cause; None of a trial that was misread."""
+        """Return the class of a cause; None of a misread condition."""
         return next((e for e in self.catalogue.effects if e.name == name), None)
 
     def notes(self) -> list[tuple[str, str]]:
-        """What is said besides the table, by topic."""
+        """Return notes in addition to the table, by topic."""
         left, unit = self.remainder, self.model.rig.units().get("effort", "")
         state = "more than noise" if left.unexplained else "none found"
         where = f", most on {left.where}" if left.where else ""
@@ -143,14 +143,14 @@ class Diagnosis(Result):
         return [(topic, words) for topic, words in topics if words] + super().notes()
 
     def files(self) -> dict[str, str | bytes]:
-        """Content of every file of the diagnosis but the report, by name: with the extended model."""
+        """Return the content of every file of the diagnosis but the report, by name: with the extended model."""
         files = super().files() | {"model.toml": model_toml(self.model, stored_tables(self.extended, self.log))}
         if self.next_experiment and self.next_experiment.trial is not None:
             files[NEXT_FILE] = trial_csv(self.next_experiment.trial)
         return files
 
     def own_record(self) -> dict[str, Any]:
-        """What `diagnosis.json` has of a rig."""
+        """Return the part of `diagnosis.json` that only a rig has."""
         return {
             "absorbed": list(self.absorbed),
             "nominal": self._model("nominal"),

@@ -16,7 +16,7 @@ from fes_pin.models.model import Model
 
 
 def unfitted(study: Study, nominal: LikelihoodFit, reason: str, test: Sequence[Trial]) -> Diagnosis:
-    """The diagnosis where fits did not converge: that the search stopped, and why."""
+    """Return the diagnosis where fits did not converge: the verdict is "stopped", with the reason."""
     floor = rough_noise(Model(nominal.model.rig), nominal.trials)
     inside = free_errors(nominal.model, nominal.trials, floor)
     outside = free_errors(nominal.model, test, floor).error_percent() if test else None

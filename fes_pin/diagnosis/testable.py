@@ -1,7 +1,7 @@
-"""What a study's trials can show and what they cannot, before any cause is looked for; and what a fit gives away.
+"""Identifiability of the causes of a library from a study's trials, and checks that need a fit of the nominal model.
 
-A cause is linearized beside the fitted nominal model, as the search does: what of its sensitivity the nominal
-parameters and the initial states take up, these trials cannot show, whatever its size.
+A cause is linearized at the fitted nominal model, as in the search. It is not identifiable, whatever its size, if the
+nominal parameters and the initial states can reproduce its sensitivity.
 """
 
 from __future__ import annotations
@@ -30,32 +30,32 @@ from fes_pin.models.simulate import simulated_trial
 from fes_pin.workers import OutOfTime, one_thread_each
 
 LONGEST_SHIFT = 0.25
-"""Share of a trial that it is tried to be shifted by, either way."""
+"""Largest shift of a trial in time that is tried, either way, as a share of its length."""
 FEWEST = 3
-"""Trials that a shifted one is told by: two others."""
+"""Least number of trials: a shifted one is found by two others."""
 MOST_LOOKED_AT = 8
-"""Trials that are looked at for a shift, the worst fitted first: each takes a fit of the others."""
+"""Trials that are tested for a shift, the worst fitted first; each takes a fit of the others."""
 
 
 @dataclass(frozen=True, eq=False)
 class Testable(ReadOnly):
-    """What trials can show.
+    """Causes that trials can and cannot identify.
 
     Attributes
     ----------
     shown
-        Causes that would show, by name, with the share of their sensitivity that nothing else takes up.
+        Identifiable causes by name, with the share of their sensitivity that no other parameter reproduces.
     absorbed
-        Causes that the nominal parameters take up.
+        Causes that are not identifiable, as the nominal parameters can take their place.
     silent
-        Causes that act in none of the trials.
+        Causes that are not identifiable, as they act in none of the trials.
     alike
         Groups of causes that look alike on these trials.
     unexplained
-        Share of the readings' variance that the fitted nominal model leaves: where it is most of it, the causes are
-        linearized far from what was measured.
+        Share of the readings' variance that the fitted nominal model leaves. Where it is large, the causes are
+        linearized far from the data.
     warnings
-        What the fitted nominal model gives away: a trial shifted in time, an effort that counts the other way.
+        Checks of the fitted nominal model: a trial that is shifted in time, an effort of the opposite sign.
     """
 
     shown: Mapping[str, float]
@@ -67,11 +67,12 @@ class Testable(ReadOnly):
 
 
 def testable_causes(study: Study, catalogue: Catalogue | None = None) -> Testable | str:
-    """What the trials of a study can show, of the causes that its rig can have.
+    """Find the causes of a study's rig that its trials can identify.
 
     Returns
     -------
-    Testable, or why it cannot be told before a diagnosis, in words
+    Testable or str
+        The causes, or the reason why they are not known before a diagnosis.
     """
     nominal, trials = _to_fit(study)
     effects = (catalogue or installed()).effects_for(nominal.rig)
@@ -79,7 +80,7 @@ def testable_causes(study: Study, catalogue: Catalogue | None = None) -> Testabl
         try:
             fitted = _fitted(nominal, trials)
             if not math.isfinite(fitted.sse):
-                return "the nominal model runs away when it is simulated from its start values"
+                return "the nominal model diverges when it is simulated from its start values"
             library = Library(nominal, trials, effects)
             scores = score_test(fitted.parts, library.probes(fitted, fitted.noise))
             warnings = _given_away(nominal, trials, fitted)
@@ -99,9 +100,9 @@ def testable_causes(study: Study, catalogue: Catalogue | None = None) -> Testabl
 
 
 def given_away(study: Study) -> list[str]:
-    """What a fit of the nominal model gives away of a study, the warnings of `Testable`; nothing where time is over.
+    """Return warnings about a study from a fit of its nominal model, as in `Testable`; none where time is over.
 
-    Of a rig whose effort answers its reading nothing either: its diagnosis asks for late efforts by the likelihood.
+    There are none for a rig in closed loop: its diagnosis estimates the delay of efforts by the likelihood.
     """
     nominal, trials = _to_fit(study)
     if is_fed_back(nominal.rig, trials):
@@ -128,7 +129,7 @@ def _fitted(model: Model, trials: Sequence[Trial]) -> Fit:
 
 
 def _unexplained(fitted: Fit) -> float:
-    """The largest share of a column's variance that a fit leaves."""
+    """Return the largest share of a column's variance that a fit leaves."""
     left: dict[str, float] = {}
     there: dict[str, float] = {}
     residuals = Problem(fitted.model, fitted.trials, fitted.noise).residuals(fitted.values, fitted.unknowns)
@@ -140,7 +141,7 @@ def _unexplained(fitted: Fit) -> float:
 
 
 def _alike(scores: Scores, kept: Mapping[str, float]) -> tuple[tuple[str, ...], ...]:
-    """Causes of one amplitude, joined where shapes of them can be found whose sensitivities point the same way."""
+    """Return groups of causes of one amplitude that have, for some of their shapes, nearly parallel sensitivities."""
     single = [
         (one.probe.name, block.start)
         for one, block in zip(scores.scored, scores.blocks, strict=False)
@@ -159,7 +160,7 @@ def _alike(scores: Scores, kept: Mapping[str, float]) -> tuple[tuple[str, ...], 
 
 
 def _reversed(model: Model, trials: Sequence[Trial], fitted: Fit) -> list[str]:
-    """An effort that explains the motion far better the other way round."""
+    """Return a warning for an effort that explains the motion far better with the opposite sign."""
     if not any("effort" in t and "position" in t for t in trials):
         return []
     turned = [t.with_columns(effort=-t["effort"]) if "effort" in t else t for t in trials]
@@ -170,13 +171,13 @@ def _reversed(model: Model, trials: Sequence[Trial], fitted: Fit) -> list[str]:
         return []  # a rig whose effort answers its reading is explained by neither
     share = 100.0 * other.sse / fitted.sse
     return [
-        f"with the effort the other way round the nominal model is left with {share:.2g} % of its squared error: "
+        f"with the opposite sign of the effort the nominal model has {share:.2g} % of its squared error: "
         "does a positive effort push towards positive positions?"
     ]
 
 
 def _shifted(model: Model, trials: Sequence[Trial], fitted: Fit) -> list[str]:
-    """Trials whose readings the model of the others foretells far better a while earlier or later than the others'."""
+    """Return warnings for trials whose readings a model of the others predicts far better at another time."""
     if len(trials) < FEWEST:
         return []
     sums = [float(p.residual @ p.residual) / len(p.residual) for p in fitted.parts]
@@ -194,7 +195,7 @@ def _shifted(model: Model, trials: Sequence[Trial], fitted: Fit) -> list[str]:
 
 
 def _shift(model: Model, trial: Trial) -> tuple[float, float]:
-    """By how many seconds a trial's reading lags behind its simulation, and the share of its error left with that."""
+    """Return the lag in s of a trial's reading behind its simulation, and the share of its error at that lag."""
     name = model.rig.output(trial.kind)
     if name not in trial or not model.rig.input_columns(trial):
         return 0.0, 1.0
@@ -206,6 +207,6 @@ def _shift(model: Model, trial: Trial) -> tuple[float, float]:
     if not np.isfinite(errors).all():
         return 0.0, 1.0
     best, none = int(np.argmin(errors)), int(np.argmin(np.abs(lags)))
-    if errors[best] > SMALL_SHARE * np.var(measured):  # a rig that falls over is foretold at no time
+    if errors[best] > SMALL_SHARE * np.var(measured):  # no shift predicts a rig that falls over
         return 0.0, 1.0
     return float(lags[best] * trial.dt), float(errors[best] / max(errors[none], 1e-300))

@@ -9,13 +9,13 @@ from fes_pin.diagnosis.errors_ahead import RandomPart
 
 
 def in_words(random: RandomPart, unit: str) -> str:
-    """What acts on a rig at random; `unit` is that of the effort."""
+    """Return process noise in words; `unit` is that of the effort."""
     share = f"{100.0 * random.share:.2g} % of what drives the rig"
     return f"{random.std:.3g} {unit}, {share}, changing within {random.time_constant_s:.2g} s"
 
 
 def left_out_text(left_out: Mapping[str, Mapping[str, Sequence[int]]], trials: Sequence[Trial]) -> str:
-    """How many samples of which column were taken for spikes, and in which trials if they are few."""
+    """Return in words how many samples of each column were taken for spikes, and in which trials if they are few."""
     lengths = {t.name: len(t) for t in trials}
     found: dict[str, dict[str, int]] = {}
     for trial, columns in left_out.items():

@@ -1,4 +1,4 @@
-"""Every sample of a study beside both models of its diagnosis, as one long table for other programs."""
+"""Every sample of a study with the predictions of both models, as one long table for other programs."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fes_pin.diagnosis.result import Diagnosis
 
 
 def trajectories(diagnosis: Diagnosis) -> tuple[list[str], dict[str, np.ndarray]]:
-    """Measured, predicted and residual samples of all trials.
+    """Return measured, predicted and residual samples of all trials.
 
     Returns
     -------
@@ -20,8 +20,8 @@ def trajectories(diagnosis: Diagnosis) -> tuple[list[str], dict[str, np.ndarray]
         The trial of each row.
     columns : dict of ndarray, shape (n,)
         `time_s`; the inputs; for each output its reading, `<output>_nominal`, `<output>_extended`, and
-        `<output>_residual`: the reading minus the extended model. NaN where a trial has no such column. Where the
-        effort answers the reading, predictions are those over the horizon of the diagnosis.
+        `<output>_residual`: the reading minus the extended model. NaN where a trial has no such column. For a rig in
+        closed loop, predictions are those over the horizon of the diagnosis.
     """
     trials: list[Trial] = []
     rows: list[dict[str, np.ndarray]] = []
@@ -39,7 +39,7 @@ def trajectories(diagnosis: Diagnosis) -> tuple[list[str], dict[str, np.ndarray]
 def trial_table(
     trials: Sequence[Trial], rows: Sequence[Mapping[str, np.ndarray]]
 ) -> tuple[list[str], dict[str, np.ndarray]]:
-    """Columns of several trials as one long table: the trial of each row, and columns, NaN where a trial has none."""
+    """Return several trials as one long table: the trial of each row, and columns, NaN where a trial has none."""
     names = dict.fromkeys(n for columns in rows for n in columns)
     absent = [np.full(len(columns["time_s"]), np.nan) for columns in rows]
     words = [trial.name for trial, columns in zip(trials, rows, strict=True) for _ in columns["time_s"]]

@@ -70,7 +70,7 @@ RigState = State[LikelihoodFit, LikelihoodModels, RigWeighed]
 class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
     """How it is judged what a search by the likelihood found.
 
-    Trials that took no part support a cause, or not, by `speaks_for`, with errors over the horizon: several forms
+    Trials that took no part support a cause, or not, by `is_supported`, with errors over the horizon: several forms
     together, none of them quite right, come near to anything one sample ahead.
 
     Parameters

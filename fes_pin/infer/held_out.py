@@ -132,7 +132,7 @@ def marginal_cost(fitted: Optimum, scales: Mapping[str, float]) -> float:
     return fitted.sse + float(np.linalg.slogdet(np.eye(len(widths)) + scaled)[1])
 
 
-def speaks_for(evidence: Evidence | None, gain: Gain, alone: bool) -> bool:
+def is_supported(evidence: Evidence | None, gain: Gain, alone: bool) -> bool:
     """Whether trials that took no part speak for a cause.
 
     By their likelihood where the model leaves only noise, by their errors over time where it does not; where other

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Generic, Protocol, TypeVar
 
-from fes_pin.infer.held_out import speaks_for
+from fes_pin.infer.held_out import is_supported
 from fes_pin.infer.result import Evidence, Gain
 from fes_pin.infer.search import Fitted, M, Search, SearchResult
 
@@ -150,7 +150,7 @@ class Verdict(ABC, Generic[F, M, W]):
             return [n for n in names if len(names) > 1 and not weighed.gains[n].is_material]
         open_ = weighed.lack_of_fit.unexplained
         known = {n: None if open_ else weighed.evidence[n] for n in names}
-        return [n for n, e in known.items() if not speaks_for(e, weighed.gains[n], alone=len(names) == 1)]
+        return [n for n, e in known.items() if not is_supported(e, weighed.gains[n], alone=len(names) == 1)]
 
     def is_rarely_chosen(self, state: State[F, M, W], name: str) -> bool:
         """Whether most folds of the data choose a set without a candidate."""

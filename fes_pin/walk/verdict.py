@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from fes_pin.infer.distributions import chi2_tail, normal_quantile
-from fes_pin.infer.held_out import speaks_for
+from fes_pin.infer.held_out import is_supported
 from fes_pin.infer.levels import CERTAIN_LEVEL, CLAIM_LEVEL, WALK_LEVEL
 from fes_pin.infer.result import FITTED, NO_GAIN, Cause, Evidence, ParameterEstimate, Remainder
 from fes_pin.infer.search import SearchResult
@@ -76,7 +76,7 @@ class WalkVerdict(Verdict[WalkFit, WalkModels, WalkWeighed]):
         other = weighed.other_leg[name]
         if p_value >= (WALK_LEVEL if weighed.evidence else CERTAIN_LEVEL) or (other is not None and other <= 0.0):
             return False
-        return not weighed.evidence or speaks_for(weighed.evidence[name], weighed.gains[name], alone)
+        return not weighed.evidence or is_supported(weighed.evidence[name], weighed.gains[name], alone)
 
     def _is_of_either(self, name: str) -> bool:
         """Whether a form is of neither leg alone; a clock is of no leg."""

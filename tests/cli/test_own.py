@@ -80,7 +80,7 @@ def test_one_command_makes_a_study_of_german_exports(monkeypatch, capsys, record
     assert tomllib.loads((recordings / "study.toml").read_text())["columns"]["ignored"] == ["Temp_C"]
     assert run(monkeypatch, "check", recordings) == 0
     said = capsys.readouterr().out
-    assert "nothing is odd" in said and "shifted" not in said and "other way round" not in said
+    assert "nothing is odd" in said and "shifted" not in said and "opposite sign" not in said
     shown = next(line for line in said.splitlines() if line.startswith("these trials can show"))
     assert "coulomb_friction" in shown
     assert fails(monkeypatch, capsys, "new-study", recordings / "m0.csv", "--rod", 1, 1).endswith("writes over it")

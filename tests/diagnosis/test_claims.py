@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fes_pin.infer.held_out import added_likelihood, speaks_for
+from fes_pin.infer.held_out import added_likelihood, is_supported
 from fes_pin.infer.result import Evidence, Gain
 
 
@@ -37,16 +37,16 @@ def test_evidence_adds_up_over_folds():
 def test_held_out_trials_speak_by_likelihood_only_where_noise_is_all_that_is_left():
     sure, unsure = Evidence(100.0, 100.0), Evidence(10.0, 100.0)
     harmful, harmless, useless = Gain(50.0, -5.0, 90.0), Gain(50.0, 5.0, 90.0), Gain(-1.0, -5.0, 90.0)
-    assert speaks_for(sure, harmful, alone=True) and not speaks_for(sure, harmful, alone=False)
-    assert speaks_for(sure, harmless, alone=False)
-    assert not speaks_for(unsure, harmless, alone=True)
-    assert speaks_for(sure, useless, alone=True) and not speaks_for(unsure, useless, alone=True)
-    assert speaks_for(None, harmless, alone=True) and not speaks_for(None, harmful, alone=True)
-    assert speaks_for(None, harmless, alone=False)
+    assert is_supported(sure, harmful, alone=True) and not is_supported(sure, harmful, alone=False)
+    assert is_supported(sure, harmless, alone=False)
+    assert not is_supported(unsure, harmless, alone=True)
+    assert is_supported(sure, useless, alone=True) and not is_supported(unsure, useless, alone=True)
+    assert is_supported(None, harmless, alone=True) and not is_supported(None, harmful, alone=True)
+    assert is_supported(None, harmless, alone=False)
 
 
 def test_no_cause_is_named_that_is_sure_to_do_harm():
     """Over the horizon, a reading of an upright pendulum that was told early made errors larger by 8 to 32 %."""
     sure = Evidence(100.0, 100.0)
-    assert speaks_for(sure, Gain(-20.0, -32.0, 1.0), alone=True)
-    assert not speaks_for(sure, Gain(-20.0, -32.0, -8.0), alone=True)
+    assert is_supported(sure, Gain(-20.0, -32.0, 1.0), alone=True)
+    assert not is_supported(sure, Gain(-20.0, -32.0, -8.0), alone=True)

@@ -101,7 +101,7 @@ def test_a_proposed_trial_stays_near_what_was_measured(rivals):
     room = ROOM * np.ptp(seen)
     assert seen.min() - room <= y.min() and y.max() <= seen.max() + room
     fixed = [p.worth for p in discriminations(best, rival, list(candidates(study)), study) if p is not None]
-    assert min(plan.promised) >= max(fixed)  # refined from the best of them
+    assert min(plan.expected) >= max(fixed)  # refined from the best of them
 
 
 def test_the_next_experiment_can_be_read_back_and_predicted(tmp_path):

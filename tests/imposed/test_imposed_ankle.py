@@ -85,7 +85,7 @@ def test_a_muscle_pulls_whichever_way_the_dynamometer_counts(tmp_path):
     assert sorted(signs) == [-1.0, 1.0]
     answers = [simulate(nominal_model(s), one.trials[1])["torque_nm"] for s in (one, other)]
     assert np.array_equal(answers[0], -answers[1])
-    told = [any("counted the other way" in w for w in check_study(s, nominal_model(s))) for s in (one, other)]
+    told = [any("the opposite sign" in w for w in check_study(s, nominal_model(s))) for s in (one, other)]
     assert told == [s < 0.0 for s in signs]
 
 

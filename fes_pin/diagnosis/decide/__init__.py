@@ -1,1 +1,1 @@
-"""What is claimed, and on what evidence."""
+"""Decisions about the causes that are named, and their evidence."""

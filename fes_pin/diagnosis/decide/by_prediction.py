@@ -1,7 +1,7 @@
-"""The set of causes that predicts best, where no set leaves only noise.
+"""Choice of the set of causes that predicts best, where every set has a lack of fit.
 
-Likelihoods then compare wrong models, and a flexible one can win by what it does to single trials; a cause must help on
-trials that it was not fitted to.
+Likelihoods then compare wrong models, and a flexible one may win by overfitting single trials. A cause must improve the
+prediction of trials that it was not fitted to.
 """
 
 from __future__ import annotations
@@ -30,18 +30,19 @@ from fes_pin.workers import in_parallel
 POOL = 6
 """Sets of each size that are compared by prediction."""
 FEWEST = 3
-"""Trials that sets are compared by."""
+"""Least number of trials by which sets are compared."""
 
 
 def best_predicting(search: LikelihoodSearch, names: Names) -> Names:
-    """The smallest set whose errors on trials left out are within an error of form of the least.
+    """Return the smallest set whose error on trials left out exceeds the least by no more than an error of form.
 
-    A set that does worse on the trials that it is fitted to than another does on trials left out is not tried.
+    A set is not tried if its error on the trials that it is fitted to is larger than that of another on trials left
+    out.
 
     Parameters
     ----------
     search
-        That has run without process noise.
+        A search that has run without process noise.
     names
         The set that it found.
     """
@@ -62,16 +63,16 @@ def best_predicting(search: LikelihoodSearch, names: Names) -> Names:
 
 
 def prediction_error(fitted: LikelihoodFit, noise: StateSpaceNoise) -> float:
-    """Logarithm of the mean squared error of simulations of trials left out in turn, averaged over trials.
+    """Return the logarithm of the mean squared error of simulations of trials left out in turn, averaged over trials.
 
-    The logarithm keeps one large motion from deciding alone. Without some trials parameters are where one Gauss-Newton
-    step leads from their fit to all, as in `chosen_again`; what each trial has of its own, as its start, is estimated
-    from it.
+    The logarithm keeps one large motion from deciding alone. The fit without some trials is approximated by one
+    Gauss-Newton step from the fit to all, as in `chosen_again`. Unknowns of a trial, as its initial state, are
+    estimated from that trial.
 
     Parameters
     ----------
     noise
-        In whose deviations errors are counted.
+        Its standard deviations are the unit of errors.
     """
 
     def left_out(held: Sequence[int]) -> tuple[float, int]:
@@ -82,7 +83,7 @@ def prediction_error(fitted: LikelihoodFit, noise: StateSpaceNoise) -> float:
 
 
 def _without(fitted: LikelihoodFit, held: Sequence[int]) -> Model:
-    """A model where one Gauss-Newton step leads without some trials."""
+    """Return the model without some trials, by one Gauss-Newton step from the fit to all."""
     system = normal_equations([p for i, p in enumerate(fitted.parts) if i not in held])
     moving = [k for k, n in enumerate(fitted.free) if n not in fitted.at_bound]
     size = np.sqrt(np.maximum(np.diag(system.hessian)[moving], 1e-300))
@@ -94,7 +95,7 @@ def _without(fitted: LikelihoodFit, held: Sequence[int]) -> Model:
 
 
 def _error(model: Model, trials: Sequence[Trial], noise: StateSpaceNoise) -> float:
-    """Mean over trials of the logarithm of the mean squared error of a simulation."""
+    """Return the mean over trials of the logarithm of the mean squared error of a simulation."""
     if model.own_unknowns():
         residuals = [np.concatenate(_in_deviations(model, t, noise)) for t in trials]
     else:

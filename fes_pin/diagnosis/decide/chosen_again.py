@@ -1,15 +1,15 @@
-"""Which set of causes would have been chosen without some of the trials, of all that were fitted to all.
+"""Stability of the choice: the set of causes that would have been chosen without some of the trials.
 
-Of each set that was fitted the cost of the other trials is known to second order about its fit. With g and H the slope
+For each set the cost of the other trials is known to second order about its fit to all trials. With g and H the slope
 and the curvature of half that cost, each trial's own unknowns eliminated,
 
     cost(others) = |r|^2 - g' H^-1 g
 
-is where one Gauss-Newton step ends. Of a fit by the likelihood, whose slopes are those for gains as they are, what
-others gain by the step that all trials promise together is none: no step has kept that. Sets are compared by the rule
-that the search goes by: the cheapest of a size takes the place of the best smaller one if what it adds earns its place.
-No trial that is held out has a say in it. What the others tell counts as if there were as many of them as of all: asked
-is whether they say the same, not whether fewer say as much.
+is the cost after one Gauss-Newton step. A fit by the likelihood takes filter gains as constant in its slopes. The gain
+that these predict even for all trials together is therefore subtracted: no step of the fit reached it. Sets are
+compared by the rule of the search: the set of lowest criterion of a size replaces the best smaller one if it improves
+the likelihood significantly. The held-out trials are not used. The cost of the others is scaled to the number of all
+trials, since the question is whether they favour the same set, not whether fewer trials are as significant.
 
 Source: Stone, Cross-validatory choice and assessment of statistical predictions, J. R. Stat. Soc. B 36 (1974);
 Giordano, Stephenson, Liu, Jordan and Broderick, A Swiss army infinitesimal jackknife, AISTATS 2019.
@@ -37,7 +37,7 @@ F = TypeVar("F", bound=Fit)
 
 @dataclass(frozen=True)
 class _Trial:
-    """How many readings a trial has, and what it adds to a fit's cost, to half its slope and to half its curvature."""
+    """Number of readings of a trial, and its part of a fit's cost, of half its slope and of half its curvature."""
 
     readings: int
     cost: float
@@ -46,15 +46,15 @@ class _Trial:
 
 
 class ChosenAgain(Generic[F]):
-    """Sets to choose among, each fitted to the same trials.
+    """Choice among sets that are fitted to the same trials.
 
     Parameters
     ----------
     fits
-        By names; the nominal model by none.
-    earns
-        The rule of the search: whether a set is worth more than a smaller one where it gains so much in twice the
-        log-likelihood, and all its causes together so much.
+        Fits by the names of their causes; the nominal model has none.
+    improves
+        Rule of the search: whether a set improves on a smaller one by a gain in twice the log-likelihood, where all its
+        causes together have another gain.
     """
 
     def __init__(self, fits: Mapping[Names, F], improves: Callable[[F, F, float, float], bool]) -> None:
@@ -63,7 +63,7 @@ class ChosenAgain(Generic[F]):
         self._trials = {n: _by_trial(f) for n, f in self._fits.items()}
 
     def without(self, held: Sequence[int]) -> F:
-        """The fit, to all trials, of the set that is chosen without some of them."""
+        """Return the fit to all trials of the set that is chosen without some of them."""
         costs = {n: self._cost(n, held) for n in self._fits}
         best: Names = ()
         for size in sorted({len(n) for n in costs} - {0}):
@@ -76,26 +76,26 @@ class ChosenAgain(Generic[F]):
         return self._fits[best]
 
     def _cost(self, names: Names, held: Sequence[int]) -> float:
-        """The cost of the other trials at the end of one step, as if there were as many of them as of all."""
+        """Return the cost of the other trials after one step, scaled to the number of all trials."""
         every = self._trials[names]
         others = [t for i, t in enumerate(every) if i not in held]
         many = sum(t.readings for t in every) / sum(t.readings for t in others)
         slope, curvature, step = _step(others)
         gained = float(slope @ step)
-        if isinstance(self._fits[names], LikelihoodFit):  # what all promise together no step has kept
+        if isinstance(self._fits[names], LikelihoodFit):  # no step reached the gain that slopes predict of all
             _, _, kept = _step(every)
             gained -= float(2.0 * slope @ kept - kept @ curvature @ kept)
         return many * (sum(t.cost for t in others) - gained)
 
 
 def _step(trials: Sequence[_Trial]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Slope and curvature of half the cost of some trials, and the Gauss-Newton step to take away to its minimum."""
+    """Return slope and curvature of half the cost of some trials, and the Gauss-Newton step to subtract."""
     slope, curvature = np.sum([t.slope for t in trials], axis=0), np.sum([t.curvature for t in trials], axis=0)
     return slope, curvature, np.linalg.lstsq(curvature, slope, rcond=1e-12)[0]
 
 
 def _by_trial(fitted: Fit) -> list[_Trial]:
-    """Each trial's part; of parameters that do not lie at a bound, which would not move, scaled to the size of each."""
+    """Return each trial's part, of the parameters that are not at a bound, scaled to the size of each."""
     moving = [k for k, n in enumerate(fitted.free) if n not in fitted.at_bound]
     has_ended = fitted.together and fitted.gradient_norm < LITTLE
     each = [(p, normal_equations([p])) for p in (at_rest(fitted.parts) if has_ended else fitted.parts)]
@@ -112,13 +112,13 @@ def _by_trial(fitted: Fit) -> list[_Trial]:
 
 
 def share_of(chosen: Sequence[Fit], names: Sequence[str]) -> tuple[int, int] | None:
-    """In how many folds a cause was chosen, or what cannot be told from it, and of how many; None without folds."""
+    """Return in how many folds a cause or an equivalent of it was chosen, and the number of folds; None without."""
     found = sum(any(e.name in names for e in fitted.model.effects) for fitted in chosen)
     return (found, len(chosen)) if chosen else None
 
 
 def is_chosen(share: tuple[int, int] | None) -> bool:
-    """False if most folds choose something else: what is chosen is then an accident of a few trials.
+    """Return False if most folds choose another set: the choice then rests on a few trials.
 
     Source: Meinshausen and Buehlmann, Stability selection, J. R. Stat. Soc. B 72 (2010).
     """

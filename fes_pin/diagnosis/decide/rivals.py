@@ -1,4 +1,4 @@
-"""What is told of a set of causes beside its rivals: values, what could stand in their place, what would tell."""
+"""Reports on a set of causes and its rivals: estimates, equivalents, ranking and the next experiment."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ F = TypeVar("F", bound=Fit)
 
 
 def estimates(fitted: Fit, name: str) -> dict[str, ParameterEstimate]:
-    """Values of a cause's parameters, by name; of amplitudes that each trial has its own their size."""
+    """Return the estimates of a cause's parameters, by name; for amplitudes of each trial's own, their size."""
     info, out = fitted.model.parameter_info(), {}
     (one,) = (e for e in fitted.model.effects if e.name == name)
     refined = one.refined()
@@ -35,21 +35,21 @@ def estimates(fitted: Fit, name: str) -> dict[str, ParameterEstimate]:
 
 
 def alternatives(best: Fit, rivals: Sequence[Fit], name: str) -> tuple[str, ...]:
-    """Causes that could stand in the place of one: the price chooses which is named, the likelihood what is told apart.
+    """Return the equivalents of a cause: the criterion chooses which is named, the likelihood which are equivalent.
 
-    A rival that fits as well with more parameters, as a spring does in the place of a constant torque, is not excluded.
+    A rival that fits as well with more parameters, as a spring in the place of a constant torque, is not excluded.
     """
     others = {e.name for e in best.model.effects} - {name}
     return tuple(sorted({e.name for f in not_excluded(best, rivals) for e in f.model.effects} - others - {name}))
 
 
 def not_excluded(best: Fit, rivals: Sequence[F]) -> list[F]:
-    """The rivals that are as cheap, or as likely, as far as data tell."""
+    """Return the rivals whose criterion or cost is not significantly larger than that of the best set."""
     return [f for f in rivals if min(f.criterion - best.criterion, f.sse - best.sse) < least_apart(best, f)]
 
 
 def not_identifiable(best: Fit, scored: Sequence[Scored], not_excited: Sequence[str]) -> tuple[str, ...]:
-    """Causes that these data could not show: taken up by the nominal parameters, or without effect in any trial."""
+    """Return the causes that are not identifiable: nominal parameters take their place, or they act in no trial."""
     found = {e.name for e in best.model.effects}
     by_effect = best_by_effect(scored)
     taken = {n for n, many in by_effect.items() if n not in found and max(s.kept for s in many) < IDENTIFIABLE_SHARE}
@@ -57,7 +57,7 @@ def not_identifiable(best: Fit, scored: Sequence[Scored], not_excited: Sequence[
 
 
 def ranking(best: Fit, rivals: Mapping[str, Sequence[Fit]]) -> dict[str, tuple[Ranked, ...]]:
-    """For each cause the sets that stand in its place, and how far each falls short."""
+    """Return for each cause the sets with another cause in its place, and the shortfall of each."""
     return {
         name: tuple(Ranked(tuple(e.name for e in f.model.effects), f.sse - best.sse) for f in fits)
         for name, fits in rivals.items()
@@ -67,7 +67,7 @@ def ranking(best: Fit, rivals: Mapping[str, Sequence[Fit]]) -> dict[str, tuple[R
 def experiment(
     best: LikelihoodFit, rivals: Mapping[str, Sequence[LikelihoodFit]], causes: Sequence[Cause], study: Study
 ) -> NextExperiment | None:
-    """The experiment that would tell the first cause that is confounded from its equivalents."""
+    """Return the experiment that distinguishes the first confounded cause from its equivalents."""
     for cause in causes:
         others = {e.name for e in best.model.effects} - {cause.name}
         confounded: dict[str, LikelihoodFit] = {}

@@ -1,4 +1,4 @@
-"""The level at which something is claimed of a fit by the likelihood."""
+"""The level of a claim about a fit by the likelihood."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from fes_pin.infer.levels import CLAIM_LEVEL, DRIVEN_LEVEL
 
 
 def level_of(fitted: LikelihoodFit) -> float:
-    """Family-wise level of a claim in a fit by the likelihood, or of a lack of fit that it has.
+    """Return the family-wise level of a claim in a fit by the likelihood, or of its lack of fit.
 
-    A random effort is of the first order in the model, and as it may be in the rig: noise that is known by less.
+    The level is stricter with process noise: it is of first order in the model, while that of the rig is not known.
     """
     return DRIVEN_LEVEL if fitted.noise.acting else CLAIM_LEVEL

@@ -1,1 +1,1 @@
-"""What is left after the causes: one test a file."""
+"""Tests of lack of fit, one a file."""

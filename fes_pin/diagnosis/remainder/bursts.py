@@ -1,4 +1,4 @@
-"""Bursts: deviations that come at times of their own, as spasms or a slipping sensor, seen in the innovations."""
+"""Test for bursts in the innovations: deviations at irregular times, as spasms or a slipping sensor."""
 
 from __future__ import annotations
 
@@ -11,34 +11,33 @@ from fes_pin.infer.distributions import pearson3_tail
 from fes_pin.infer.noise import Noise
 
 HUMPS_S = (0.06, 0.12, 0.25, 0.5, 1.0)
-"""Lengths of a passing deviation, s: from a twitch to a slow pull."""
+"""Lengths of a transient deviation, s: from a twitch to a slow pull."""
 TORQUES_S = (0.05, 0.15, 0.4)
-"""Lengths of a passing cause of noise, s: where the noise model has learned how the joint swings after a push."""
+"""Lengths of a transient effort, s: the noise model has learned how the joint responds to it."""
 STEPS_S = (0.25, 1.0)
-"""Lengths over which a lasting deviation is compared with what was before, s."""
+"""Lengths over which the reading after a step is compared with the reading before it, s."""
 
 
 def burst_p_value(innovations: Sequence[np.ndarray], noise: Noise, dt: float) -> float:
-    """p-value of the innovations of one channel being as even in time as Gaussian noise is.
+    """Return the p-value of the null that the innovations of one channel are as even in time as Gaussian noise.
 
-    A hump or step of a given length in the reading leaves its whitened shape g in the innovations e; a push that the
-    reading answers as it answers the noise leaves g as it is. With
-    z_t = sum_s g_s e_(t+s) / |g|, Gaussian noise has excess kurtosis 0 in z, whatever its spectrum; deviations at times
-    of their own raise it. The statistic sum_t H4(z_t), H4 the fourth Hermite polynomial, has under the null the
-    variance 24 n sum_s rho_s^4 and the third cumulant 1728 n sum_st (rho_s rho_t rho_(s-t))^2, with rho the
-    autocorrelation of z as it is: the innovations need not be white, and a low order of the noise leaves it less room
-    to learn the bursts. Its tail is that of a gamma distribution of these moments. The smallest p-value of all shapes
-    is corrected for their number.
+    A hump or step of a given length in the reading has the whitened shape g in the innovations e. An effort to which
+    the reading responds as it does to the noise has the shape g itself. With z_t = sum_s g_s e_(t+s) / |g|, Gaussian
+    noise has excess kurtosis 0 in z, whatever its spectrum; deviations at irregular times raise it. The statistic
+    sum_t H4(z_t), H4 the fourth Hermite polynomial, has under the null the variance 24 n sum_s rho_s^4 and the third
+    cumulant 1728 n sum_st (rho_s rho_t rho_(s-t))^2, with rho the sample autocorrelation of z. The innovations need
+    therefore not be white, and a low order of the noise model cannot learn the bursts. The tail is that of a gamma
+    distribution of these moments. The smallest p-value of all shapes is corrected for their number.
 
-    The innovations are taken by rank (van der Waerden's normal scores): independent ones of any distribution, as heavy
-    in its tails as may be, then are Gaussian, and a few bad samples are no burst.
+    The innovations are replaced by van der Waerden's normal scores of their ranks. Independent innovations of any
+    distribution, however heavy its tails, are then Gaussian, so that a few outliers are no burst.
 
     Parameters
     ----------
     innovations
         One array for each trial.
     noise
-        What whitened them.
+        The noise model that whitened them.
     dt
         Their time step, s.
     """
@@ -48,7 +47,7 @@ def burst_p_value(innovations: Sequence[np.ndarray], noise: Noise, dt: float) ->
 
 
 def _templates(noise: Noise, dt: float) -> list[np.ndarray]:
-    """What deviations leave in the innovations, each of norm 1."""
+    """Return the shapes of deviations in the innovations, each of norm 1."""
     ar = np.r_[1.0, -np.array(noise.ar)]
     out = [np.convolve(_hump(length, dt), ar) for length in HUMPS_S]
     out += [_hump(length, dt) for length in TORQUES_S]
@@ -64,7 +63,7 @@ def _hump(length: float, dt: float) -> np.ndarray:
 
 
 def _one(scores: Sequence[np.ndarray], g: np.ndarray) -> float | None:
-    """p-value of one shape; None where no trial is long enough for it."""
+    """Return the p-value of one shape; None where no trial is long enough for it."""
     z = [np.convolve(e, g[::-1], "valid") for e in scores if len(e) >= 2 * len(g)]
     if not z:
         return None

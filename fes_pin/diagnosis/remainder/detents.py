@@ -1,4 +1,4 @@
-"""Torque that repeats with the angle over short distances, as of detents: a scan over its wave number."""
+"""Test for torque that is periodic in the angle over short distances, as of detents: a scan over its wave number."""
 
 from __future__ import annotations
 
@@ -63,10 +63,10 @@ class Ripple(Effect):
 
 
 def detent_p_value(fitted: Fit, projection: Projection) -> float:
-    """p-value of the strongest short wave of torque in the angle; 1 where no joint moves.
+    """Return the p-value of the strongest short wave of torque in the angle; 1 where no joint moves.
 
-    Each wave number has a chi-square of two degrees beside what the fit takes up. All of them are divided by
-    what half of them stay below, since noise that is not quite whitened raises them all.
+    The score of each wave number, in a model whose fitted parameters are free too, is chi-square of two degrees. All
+    are divided by their median over its expectation, since noise that is not quite whitened raises them all.
     """
     rig = fitted.model.rig
     moving = ["torque" in rig.signals(t.kind) for t in fitted.trials]
@@ -97,7 +97,7 @@ def _range(fitted: Fit, moving: list[bool]) -> tuple[float, float]:
 
 
 def _two(columns: np.ndarray, residual: np.ndarray) -> float:
-    """Drop in the sum of squares by two columns together."""
+    """Return the drop in the sum of squares by two columns together."""
     norms = np.linalg.norm(columns, axis=0)
     if not (np.isfinite(norms).all() and norms.min() > 0):
         return 0.0

@@ -1,4 +1,4 @@
-"""Uneven noise: a residual that is larger while the muscle is active is not a sensor's noise."""
+"""Test for heteroscedastic residuals: those of a sensor are not larger while the muscle is active."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from fes_pin.diagnosis.remainder.innovations import autocorrelation, convolved, 
 from fes_pin.infer.distributions import f_tail
 
 SCALES_S = (0.0, 0.08, 0.3, 1.0)
-"""Lengths that the innovations are averaged over, s; 0 takes them as they are."""
+"""Lengths over which the innovations are averaged, s; 0 averages nothing."""
 FEWEST = 4
-"""Lengths in a trial, at least."""
+"""Least number of such lengths in a trial."""
 
 
 def heteroscedastic_p_value(innovations: Sequence[np.ndarray], driver: Sequence[np.ndarray], dt: float) -> float:
-    """p-value of the innovations being no larger where a driver is large than where it is small.
+    """Return the p-value of the null that the innovations are no larger where a driver is large than where it is small.
 
     With z the innovations and d the driver averaged over a length, d from 0 to 1, the ratio of the means of z^2 with
     the weights w = d^2 and w = (1 - d)^2 is compared with Fisher's F, each mean with
@@ -28,7 +28,7 @@ def heteroscedastic_p_value(innovations: Sequence[np.ndarray], driver: Sequence[
     innovations
         One array for each trial.
     driver
-        The same shapes; what the size of the innovations may depend on.
+        Arrays of the same shapes, on which the size of the innovations may depend.
     dt
         Time step, s.
     """
@@ -53,7 +53,7 @@ def _one(scores: Sequence[np.ndarray], driver: Sequence[np.ndarray], count: int)
 
 
 def _mean_square(z: Sequence[np.ndarray], weights: Sequence[np.ndarray], alike: np.ndarray) -> tuple[float, float]:
-    """Weighted mean square, and its degrees of freedom."""
+    """Return the weighted mean square and its degrees of freedom."""
     whole = sum(float(w.sum()) for w in weights)
     total = sum(float(w @ v**2) for v, w in zip(z, weights, strict=True))
     pairs = sum(float(w @ convolved(w, alike)) for w in weights)

@@ -1,4 +1,4 @@
-"""A fit's innovations channel by channel, under the noise that its residuals show, and what tests take of them."""
+"""Innovations of a fit by channel, under the noise of its residuals, for the tests of lack of fit."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fes_pin.identify.problem import Problem
 from fes_pin.infer.noise import ORDERS, Noise, first_order_low_pass, thin, thinning
 
 CLIP = 4.0
-"""Innovations beyond this, in standard deviations, count as this."""
+"""Innovations are limited to this, in standard deviations."""
 ACTIVATION_S = 0.05
 """Time constant from stimulus to force, s: Dombre, Fournier and Coiffet's ankle, section II of their paper."""
 
@@ -42,7 +42,7 @@ class Innovations:
 
 @dataclass(frozen=True)
 class Stretch:
-    """Where one channel of one trial lies among the whitened residuals of all, end to end.
+    """Place of one channel of one trial among the whitened residuals of all, end to end.
 
     Attributes
     ----------
@@ -62,14 +62,14 @@ class Stretch:
 
 
 def under_own_noise(fitted: Fit, longest: int = ORDERS[-1], least: int = 0) -> Fit:
-    """The same model, linearized where it is under the noise that its residuals show, of orders as in `noise_of`."""
+    """Return the same fit, linearized under the noise of its residuals, of orders as in `noise_of`."""
     noise = noise_of(fitted, longest, least)
     parts = Problem(fitted.model, fitted.trials, noise, fitted.free).linearize(fitted.values, fitted.unknowns)
     return replace(fitted, noise=noise, parts=tuple(parts))
 
 
 def stretches(fitted: Fit) -> list[Stretch]:
-    """Each channel of each trial, in the order of the whitened residuals."""
+    """Return each channel of each trial, in the order of the whitened residuals."""
     out, at = [], 0
     for number, trial in enumerate(fitted.trials):
         for output, name in enumerate(fitted.model.rig.outputs(trial.kind)):
@@ -84,7 +84,7 @@ def stretches(fitted: Fit) -> list[Stretch]:
 
 
 def channels(fitted: Fit) -> list[tuple[Noise, list[Innovations]]]:
-    """Innovations by channel and time step, with the noise that whitened them."""
+    """Return innovations by channel and time step, with the noise that whitened them."""
     values = np.concatenate([p.residual for p in fitted.parts])
     found: dict[tuple[str, float], list[Innovations]] = {}
     for one in stretches(fitted):
@@ -110,7 +110,7 @@ def normal_scores(values: Sequence[np.ndarray]) -> list[np.ndarray]:
 
 
 def autocorrelation(z: Sequence[np.ndarray]) -> np.ndarray:
-    """Of a channel of mean 0, shape (2 k + 1,), up to a quarter of its shortest trial either way."""
+    """Return the autocorrelation of a channel of mean 0, shape (2 k + 1,), up to a quarter of its shortest trial."""
     most = min(map(len, z)) // 4
     size = scipy.fft.next_fast_len(max(map(len, z)) + most, real=True)
     power = np.sum([np.abs(np.fft.rfft(one, size)) ** 2 for one in z], axis=0)
@@ -119,7 +119,7 @@ def autocorrelation(z: Sequence[np.ndarray]) -> np.ndarray:
 
 
 def convolved(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """The middle of a convolution by Fourier transforms, as long as `a`; shapes (n,) and (2 k + 1,)."""
+    """Return the middle of a convolution by Fourier transforms, as long as `a`; shapes (n,) and (2 k + 1,)."""
     count = len(a) + len(b) - 1
     size = scipy.fft.next_fast_len(count, real=True)
     whole = np.fft.irfft(np.fft.rfft(a, size) * np.fft.rfft(b, size), size)
@@ -127,6 +127,6 @@ def convolved(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def _ranks(values: np.ndarray) -> np.ndarray:
-    """From 1 on; equal values share the mean of theirs."""
+    """Return ranks from 1; equal values share the mean of their ranks."""
     _, which, counts = np.unique(values, return_inverse=True, return_counts=True)
     return (np.cumsum(counts) - 0.5 * (counts - 1))[which]

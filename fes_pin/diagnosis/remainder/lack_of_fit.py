@@ -1,8 +1,8 @@
-"""Lack of fit: whether a fit by the likelihood leaves more than noise, and what that depends on.
+"""Test of lack of fit: whether a fit by the likelihood leaves more than noise, and on what the residual depends.
 
-The innovations of the predictor are white where the model is right. Some forty functions of state, input and time, each
-as an effort at the joint (or a force), and some as a part of the reading, are scored against them together with
-everything that was fitted. The process noise that was found is part of the model: a lack of fit must exceed it.
+The innovations of the predictor are white where the model is right. Score tests ask whether they depend on some forty
+features: functions of state, input and time that act as an effort at the joint (or a force), or on the reading. The
+fitted parameters are free in these tests. Estimated process noise is part of the model: a lack of fit must exceed it.
 """
 
 from __future__ import annotations
@@ -29,21 +29,21 @@ from fes_pin.models.features import EffortFeatures, ForceFeatures, ReadingFeatur
 from fes_pin.models.stage import Effect
 
 TRIED = (1.0, 0.5, 0.25, 0.1)
-"""Shares of the step to where slopes promise the most at which the cost is looked at."""
+"""Shares of the Gauss-Newton step at which the cost is evaluated."""
 KEPT = 1e-3
-"""Share of its norm that a feature must keep, once what was fitted is projected off."""
+"""Share of its norm that a feature must keep once the sensitivities to fitted parameters are projected off."""
 FEWEST_SIGNS = 4
-"""Trials whose signs are drawn, at least."""
+"""Least number of trials whose signs are drawn."""
 SIGN_DRAWS = 400
-"""Random signs of trials that a statistic's inflation is averaged over."""
+"""Draws of random signs of the trials over which the inflation of a statistic is averaged."""
 
 
 def lack_of_fit(fitted: Fit, seed: int = 0) -> Remainder:
-    """Test whether a fit leaves anything but noise; one by simulation is first fitted by the likelihood as well.
+    """Test whether a fit leaves anything but noise; a fit by simulation is first fitted by the likelihood as well.
 
-    Where measurement noise may be autoregressive the rig is simulated freely as well, and the residuals of that are
-    tested, see `remainder.open_set`: a random effort would take bursts, detents and slips. The p-value is that of the
-    most significant of the tests, times their number.
+    Where measurement noise may be autoregressive, the residuals of a free simulation are tested too, see
+    `remainder.open_set`: process noise would take bursts, detents and slips for its own. The p-value is that of the
+    most significant test, times the number of tests.
     """
     if isinstance(fitted, LikelihoodFit):
         likeliest, free = fitted, fit(fitted.model, fitted.trials) if fitted.noise.ar else None
@@ -60,13 +60,12 @@ def lack_of_fit(fitted: Fit, seed: int = 0) -> Remainder:
 
 
 def _features_left(fitted: LikelihoodFit, seed: int) -> Remainder:
-    """Test whether any feature stands out of what a fit leaves.
+    """Test whether the residuals of a fit depend on any feature.
 
-    A remainder is claimed at the level that a cause is. Half of it goes to the largest single feature, half to all
-    together. The chi-square is divided by its inflation under random signs of the trials, where there are enough.
-    What slopes promise counts as far as the likelihood keeps it: those of a filter are an approximation, worst of
-    what bends sharply. Not where effort is read: there fits follow such slopes to their end, and leave promises that
-    none keeps.
+    The level is that of a cause: half of it for the largest single feature, half for all features together. The
+    chi-square is divided by its inflation under random signs of the trials, where there are enough. Slopes of a filter
+    are approximate, worst for features with kinks. A score counts therefore only as far as the likelihood improves by
+    it. This does not hold where effort is read: there fits follow such slopes to their end.
     """
     featured = _Featured(fitted)
     projection = Projection(fitted.parts)
@@ -99,13 +98,13 @@ def _features_left(fitted: LikelihoodFit, seed: int) -> Remainder:
 
 
 def _trial_shares(columns: np.ndarray, residual: np.ndarray, fitted: LikelihoodFit) -> np.ndarray:
-    """Each trial's part of the inner products of columns and residual, shape (trials, columns)."""
+    """Return each trial's part of the inner products of columns and residual, shape (trials, columns)."""
     ends = np.cumsum([0, *(len(p.residual) for p in fitted.parts)])
     return np.array([columns[a:b].T @ residual[a:b] for a, b in itertools.pairwise(ends)])
 
 
 def _inflation_by_signs(shares: np.ndarray, rank: int, seed: int) -> float:
-    """How much larger than its rank the statistic is with random signs of the trials; 1 with fewer than 4 trials."""
+    """Return the ratio of the statistic under random signs of the trials to its rank; 1 with fewer than 4 trials."""
     if len(shares) < FEWEST_SIGNS or not rank:
         return 1.0
     signs = np.random.default_rng(seed).choice((-1.0, 1.0), size=(SIGN_DRAWS, len(shares)))
@@ -113,16 +112,16 @@ def _inflation_by_signs(shares: np.ndarray, rank: int, seed: int) -> float:
 
 
 class _Featured:
-    """A fit beside the features.
+    """A fit extended by the features.
 
     Attributes
     ----------
     names
         Of the features.
     columns
-        The innovations' sensitivities to them in their deviations, all trials end to end, shape (m, features).
+        Whitened sensitivities of the innovations to them, all trials end to end, shape (m, features).
     can_keep
-        False where fits followed slopes for gains as they are to the end.
+        False where the fit took filter gains as constant to its end.
     """
 
     def __init__(self, fitted: LikelihoodFit) -> None:
@@ -141,7 +140,7 @@ class _Featured:
         self.columns = np.nan_to_num(np.concatenate(columns))
 
     def gained(self, amplitudes: np.ndarray) -> float:
-        """By how much the cost falls along a step of the features, and of what was fitted with them; 0 where it rises.
+        """Return by how much the cost falls along a step of features and fitted parameters; 0 where it rises.
 
         Parameters
         ----------
@@ -160,7 +159,7 @@ class _Featured:
 
 
 def _scaled(effect: Effect, fitted: LikelihoodFit) -> Effect:
-    """Features whose variables run from about -1 to 1 in these trials."""
+    """Return features whose variables run from about -1 to 1 in these trials."""
     rig, trials = fitted.model.rig, fitted.trials
     moved = [t[(*rig.schema.motion(t.kind), rig.output(t.kind))[0]] for t in trials]
     low, high = float(np.nanmin(np.concatenate(moved))), float(np.nanmax(np.concatenate(moved)))

@@ -1,4 +1,4 @@
-"""Spectral lines: ripple at the rate of the pulses, hum, a fan; steady, or as strong as the muscle is active."""
+"""Test for spectral lines: ripple at the rate of the pulses, hum, a fan; steady, or in proportion to activation."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from fes_pin.diagnosis.remainder.innovations import CLIP, Innovations, driven
 from fes_pin.infer.distributions import chi2_quantile, f_tail
 
 LOWEST_HZ = 2.0
-"""Slower oscillations are the smooth features' and the library's."""
+"""Lowest frequency: slower oscillations are found by the smooth features and by the causes of the library."""
 HIGHEST = 0.96
 """Highest frequency, as a share of half the sampling rate."""
 NEIGHBOURS = 201
-"""Frequencies, half a resolution apart, whose median is the level that a line stands out from; half as many at the ends
-of the spectrum, where they are mirrored."""
+"""Frequencies, half a resolution apart, whose median is the level with which a line is compared; half as many at the
+ends of the spectrum, where they are mirrored."""
 LONGEST_NOISE = 4
-"""Order of the noise that lines are looked for under: enough that its slope does not matter between neighbouring
-frequencies, and too little to take a line for noise."""
+"""Order of the noise model: enough for a level spectrum between neighbouring frequencies, and too low to take a line
+for noise."""
 MEDIAN_EFFICIENCY = 0.64
-"""Of a median against a mean as a measure of level: 2 / pi."""
+"""Efficiency of a median against a mean: 2 / pi."""
 
 
 def line_p_value(pieces: Sequence[Innovations]) -> tuple[float, str]:
-    """p-value of the strongest line in one channel, and what it goes with: "time" or "stimulus".
+    """Return the p-value of the strongest line in one channel, and what its phase follows: "time" or "stimulus".
 
     A line of frequency f and amplitude g_t (1, or the activation) has in the innovations e of trial i the Fourier
     coefficient F_i(f) = sum_t g_t e_t exp(-2 pi i f t). Under the null 2 |sum F_i|^2 / sum g^2, for lines of the same
@@ -51,7 +51,7 @@ def _amplitude(one: Innovations, where: str) -> np.ndarray | None:
 
 
 def _lines(rows: Sequence[tuple[Innovations, np.ndarray | None]]) -> tuple[float, ...]:
-    """p-values of the strongest line of one phase, and of the strongest of any phase in each trial."""
+    """Return p-values of the strongest line of one phase, and of the strongest of any phase in each trial."""
     used = [(e, g) for e, g in rows if g is not None and len(e.values) > NEIGHBOURS and g @ g > 0]
     if not used:
         return ()
@@ -77,6 +77,6 @@ def _lines(rows: Sequence[tuple[Innovations, np.ndarray | None]]) -> tuple[float
 
 
 def _fullness(amplitudes: Sequence[np.ndarray]) -> float:
-    """Share of the samples that carry the power; neighbouring frequencies are as much fewer."""
+    """Return the share of the samples that carry the power, by which independent frequencies are fewer."""
     g = np.concatenate(amplitudes) ** 2
     return float(g.sum() ** 2 / (len(g) * (g @ g)))

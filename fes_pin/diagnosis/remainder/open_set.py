@@ -1,8 +1,8 @@
-"""Tests of the residuals of a free simulation, for what features of state and input do not see.
+"""Tests of the residuals of a free simulation, for deviations that are no function of state and input.
 
-Bursts at times of their own; spectral lines; torque that repeats with the angle over short distances; deviations that
-come again at the same time of every trial; deviations that grow with the stimulus; readings that slip once within a
-trial; readings that lag where the motion turns. An autoregressive noise model takes each of them for noise.
+They find bursts at irregular times, spectral lines, torque that is periodic in the angle over short distances,
+deviations at the same time of every trial, deviations that grow with the stimulus, readings that slip once within a
+trial, and readings that lag where the motion reverses. An autoregressive noise model takes each of them for noise.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from fes_pin.infer.projection import Projection
 
 
 def residual_tests(fitted: Fit, seed: int) -> list[tuple[float, str]]:
-    """The p-value of each test of residuals, and what its deviation depends on."""
+    """Return the p-value of each test of residuals, and the variable on which its deviation depends."""
     own = under_own_noise(fitted)
     full = under_own_noise(fitted, FULL_NOISE, FULL_NOISE)
     projection = Projection(full.parts)

@@ -1,4 +1,4 @@
-"""Play in a sensor: a reading that depends on the side from which it was reached."""
+"""Test for play in a sensor: a reading that depends on the side from which it was reached."""
 
 from __future__ import annotations
 
@@ -14,22 +14,23 @@ from fes_pin.infer.projection import Projection
 from fes_pin.models.simulate import Simulator
 
 WIDTHS = (0.003, 0.01, 0.03, 0.1)
-"""Half widths of the play that are tried, as shares of the largest range of a trial's reading. Below the least of them
-only the direction of the last motion counts."""
+"""Half widths of the play that are tried, as shares of the largest range of a trial's reading. Below the smallest, only
+the direction of the last motion counts."""
 UNITS = 32
-"""Pieces of trials that the spread of the evidence is judged on, at least."""
+"""Least number of pieces of trials from which the spread of the evidence is estimated."""
 
 
 def play_p_value(fitted: Fit, projection: Projection) -> float:
-    """p-value of readings not lagging behind where the motion turns; corrected for widths and channels.
+    """Return the p-value of readings without a lag where the motion reverses; corrected for widths and channels.
 
     The deviation that a play of half width w makes in the simulated reading y, p_t - y_t with
-    p_t = min(max(p_(t-1), y_t - w), y_t + w), is whitened as the residual and freed of what the fit takes up. With c_i
-    and r_i its part and the residual's in one piece of a trial, x_i = c_i' r_i, n_i = c_i' c_i and a = sum x / sum n,
-    the gain (sum x)^2 / sum n is compared with the spread between pieces, sum (x_i - a n_i)^2 / n_i / k, by Fisher's F
-    of 1 and k degrees: noise that is not quite whitened, or another deviation, is in both. With b_i the orthonormal
-    vectors that the fit takes up, cut to the piece, k = sum (1 - |b_i' c_i|^2 / n_i) - 1 is what the spread is of white
-    noise: fewer than pieces less one, for the fit has taken its part out of each.
+    p_t = min(max(p_(t-1), y_t - w), y_t + w), is whitened as the residual is, and the fitted parameters are projected
+    off. With c_i and r_i its part and the residual's in one piece of a trial, x_i = c_i' r_i, n_i = c_i' c_i and
+    a = sum x / sum n, the gain (sum x)^2 / sum n is compared with the spread between pieces,
+    sum (x_i - a n_i)^2 / n_i / k, by Fisher's F of 1 and k degrees: noise that is not quite whitened, or another
+    deviation, enters both. With b_i the orthonormal vectors of the projection, cut to the piece,
+    k = sum (1 - |b_i' c_i|^2 / n_i) - 1 is the expectation of the spread for white noise. It is less than the number of
+    pieces less one, since the projection removes a part of each piece.
 
     Source of the operator: Krasnosel'skii and Pokrovskii, Systems with Hysteresis, Springer 1989.
     """
@@ -50,7 +51,7 @@ def play_p_value(fitted: Fit, projection: Projection) -> float:
 
 
 def _deviations(readings: list[np.ndarray]) -> list[np.ndarray]:
-    """What a play of each width does to each trial's reading, in half widths, shapes (n, widths)."""
+    """Return the deviation of each trial's reading by a play of each width, in half widths, shapes (n, widths)."""
     half = max(float(np.ptp(y)) for y in readings) * np.array(WIDTHS)
     if not half[0] > 0:
         return [np.zeros((len(y), len(WIDTHS))) for y in readings]
@@ -66,7 +67,7 @@ def _deviations(readings: list[np.ndarray]) -> list[np.ndarray]:
 
 
 def _one(column: np.ndarray, projection: Projection, group: list[Stretch]) -> float:
-    """p-value of one width in one channel."""
+    """Return the p-value of one width in one channel."""
     units = []
     for rows in _pieces(group):
         c = column[rows]
@@ -84,7 +85,7 @@ def _one(column: np.ndarray, projection: Projection, group: list[Stretch]) -> fl
 
 
 def _pieces(group: list[Stretch]) -> list[slice]:
-    """Rows of each trial, cut into equal pieces."""
+    """Return the rows of each trial, cut into equal pieces."""
     count = -(-UNITS // len(group))
     edges = [np.linspace(s.rows.start, s.rows.stop, count + 1).round().astype(int) for s in group]
     return [slice(a, b) for one in edges for a, b in itertools.pairwise(one.tolist())]

@@ -1,4 +1,4 @@
-"""What comes again at the same time of every trial, whatever the stimulus, judged by how trials differ."""
+"""Test for deviations at the same time of every trial, whatever the stimulus, against differences between trials."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from fes_pin.diagnosis.remainder.innovations import CLIP, autocorrelation
 from fes_pin.infer.distributions import f_tail
 
 SCALES_S = (0.0, 0.03, 0.08, 0.2, 0.5)
-"""Lengths that the innovations are averaged over, s; 0 takes them as they are."""
+"""Lengths over which the innovations are averaged, s; 0 averages nothing."""
 LENGTHS = 16
-"""Lengths in a trial, at least."""
+"""Least number of such lengths in a trial."""
 FEWEST = 3
-"""Trials that differences are judged from."""
+"""Least number of trials from which differences are estimated."""
 
 
 def repeated_p_value(innovations: Sequence[np.ndarray], dt: float) -> float:
-    """p-value of the mean of the innovations over trials being no larger than differences between trials make it.
+    """Return the p-value of the mean of the innovations over trials, against differences between trials.
 
     With z_i the innovations of trial i averaged over a length and m their mean over T trials,
     T sum_t m_t^2 / (sum_it (z_it - m_t)^2 / (T - 1)) is compared with Fisher's F of k and k (T - 1) degrees,

@@ -1,4 +1,4 @@
-"""Slips: a reading that jumps once within a trial, to a zero that it keeps until the trial ends."""
+"""Test for slips: a reading that jumps once within a trial, to a zero that it keeps until the trial ends."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from fes_pin.infer.noise import Noise
 from fes_pin.infer.projection import Projection
 
 TRIM = 0.15
-"""Share of a trial at either end that no jump is looked for in: Andrews, Tests for parameter instability and structural
+"""Share of a trial at either end in which no jump is sought: Andrews, Tests for parameter instability and structural
 change with unknown change point, Econometrica 61 (1993)."""
 DRAWS = 16
 """Simulated innovations of all trials; the scatter of their mean is allowed for."""
 
 
 def slip_p_value(fitted: Fit, projection: Projection, seed: int = 0) -> float:
-    """p-value of no reading having jumped, at a time of each trial's own; corrected for the number of channels.
+    """Return the p-value of the null that no reading jumps, at a time of each trial's own; corrected for channels.
 
-    With e the innovations and s_t what a step of the reading at time t leaves in them beside the fit's parameters and
-    the trial's unknowns, z_t = s_t' e / |s_t| is the root of what the best step at t gains. The statistic is the sum
-    over trials of the largest z_t^2, the generalised likelihood ratio of one step in each trial. White Gaussian
-    innovations, projected in the same way, give its mean and the second and third cumulant of a trial's part; its tail
-    is that of a gamma distribution of these moments, the scatter of the simulated mean included.
+    With e the innovations and s_t the whitened shape of a step of the reading at time t, the fitted parameters and the
+    trial's unknowns projected off, z_t = s_t' e / |s_t| is the square root of the gain of the best step at t. The
+    statistic is the sum over trials of the largest z_t^2, the generalised likelihood ratio of one step in each trial.
+    White Gaussian innovations, projected in the same way, give its mean and the second and third cumulant of a trial's
+    part; its tail is that of a gamma distribution of these moments, the scatter of the simulated mean included.
 
     A deviation that is slow without a jump raises the statistic as well, if less.
 
@@ -50,7 +50,7 @@ def slip_p_value(fitted: Fit, projection: Projection, seed: int = 0) -> float:
 
 
 def _one(scans: list[_Scan], measured: np.ndarray, noise: np.ndarray) -> float:
-    """p-value of one channel."""
+    """Return the p-value of one channel."""
     statistic = sum(float(s.largest(measured)[0]) for s in scans)
     null = np.stack([s.largest(noise) for s in scans])
     trials, draws = null.shape
@@ -82,12 +82,12 @@ class _Scan:
         self.scale = np.where(self.felt, 1.0 / np.sqrt(np.where(self.felt, left, 1.0)), 0.0)
 
     def largest(self, columns: np.ndarray) -> np.ndarray:
-        """Largest z_t^2 of each column of shape (m, k), all trials end to end."""
+        """Return the largest z_t^2 of each column of shape (m, k), all trials end to end."""
         z = self._along(columns[self.rows])[self.inside] * self.scale[:, None]
         return np.asarray((z**2).max(axis=0))
 
     def _along(self, columns: np.ndarray) -> np.ndarray:
-        """Inner products of the columns, shape (n, k), with steps at each of the n times."""
+        """Return inner products of the columns, shape (n, k), with steps at each of the n times."""
         taps = _filter(self.noise)
         size = scipy.fft.next_fast_len(len(columns) + len(taps), real=True)
         spectrum = np.fft.rfft(columns, size, axis=0) * np.fft.rfft(taps, size).conj()[:, None]
@@ -96,5 +96,5 @@ class _Scan:
 
 
 def _filter(noise: Noise) -> np.ndarray:
-    """What whitens, for innovations of unit variance; scale falls out."""
+    """Return the whitening filter, up to scale."""
     return np.r_[1.0, -np.array(noise.ar)]

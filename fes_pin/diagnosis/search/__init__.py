@@ -1,1 +1,1 @@
-"""Which sets of causes are fitted, and how."""
+"""Sets of causes: their candidates, their score tests and their fits."""

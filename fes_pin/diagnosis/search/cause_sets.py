@@ -7,5 +7,5 @@ from fes_pin.infer.search import Names
 
 
 def names_of(fitted: Fit) -> Names:
-    """The causes in a fit."""
+    """Return the names of the causes in a fit, in alphabetical order."""
     return tuple(sorted(e.name for e in fitted.model.effects))

@@ -1,4 +1,4 @@
-"""The candidate causes near a fitted model: sensitivities to each effect at its null, over its shapes."""
+"""Candidate causes of a fitted model: sensitivities to each effect at its null, over its shapes."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Probe:
 
     @property
     def name(self) -> str:
-        """Of the cause."""
+        """Name of the cause."""
         return self.effect.name
 
 
@@ -47,9 +47,9 @@ class Library:
     Parameters
     ----------
     effects
-        Those that are looked for; by default all that are known of the rig.
+        The causes that are searched; by default all that are known for the rig.
     answered
-        Whether an effort, if there is one, answers what is read; see `answered_columns`.
+        Whether the rig is in closed loop: its effort follows its reading; see `answered_columns`.
     """
 
     def __init__(
@@ -65,7 +65,7 @@ class Library:
         self._problems: dict[tuple, Problem] = {}
 
     def grid(self, effect: type[Effect]) -> list[Effect]:
-        """The effect at its null with every combination of its shapes, in every form that a screen tries."""
+        """Return the effect at its null with every combination of its shapes, in every form that a screen tries."""
         grids = effect.grids(self.measured)
         shapes = effect.shapes()
         start: dict[str, Any] = {n: near_null(effect, n) for n in effect.amplitudes()}
@@ -76,7 +76,7 @@ class Library:
         ]
 
     def probes(self, fitted: Fit, noise: NoiseModel, exclude: Sequence[str] = ()) -> list[Probe]:
-        """Every effect, linearized at the nominal parameters of a fit.
+        """Return every effect, linearized at the nominal parameters of a fit.
 
         The effects that the fit has already are left out of the linearization, as `exclude` is of the result: their
         influence on another effect's sensitivity is of second order.
@@ -86,16 +86,16 @@ class Library:
         return [p for group in in_parallel(lambda e: self._probe(e, nominal, fitted, noise), wanted) for p in group]
 
     def not_excited(self) -> tuple[str, ...]:
-        """Names of the effects that act in none of the trials: of a joint, where all are isometric."""
+        """Return the effects that act in none of the trials, as those of a joint where all trials are isometric."""
         return tuple(e.name for e in self.effects if not self.felt(e))
 
     def felt(self, effect: type[Effect]) -> list[int]:
-        """The trials in which an effect acts."""
+        """Return the trials in which an effect acts."""
         rig = self.model.rig
         return [i for i, t in enumerate(self.trials) if effect.signal in rig.changeable(t.kind, rig.input_columns(t))]
 
     def _probe(self, effect: type[Effect], nominal: Model, fitted: Fit, noise: NoiseModel) -> list[Probe]:
-        """The effect with every choice of its shapes; only the trials in which it acts are simulated."""
+        """Return the effect with every choice of its shapes; only the trials in which it acts are simulated."""
         felt, out = self.felt(effect), []
         for one in self.grid(effect):
             problem = self._problem(nominal + one, noise)
@@ -108,7 +108,7 @@ class Library:
         return out
 
     def _problem(self, model: Model, noise: NoiseModel) -> Problem:
-        """The problem of one effect beside the nominal model, in its form, on the trials that feel it."""
+        """Return the problem of the nominal model with one effect, on the trials in which it acts."""
         (one,) = model.effects
         key = (one.name, tuple(one.unused().items()))
         if key not in self._problems:

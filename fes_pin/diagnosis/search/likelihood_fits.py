@@ -1,4 +1,4 @@
-"""Sets of causes, each fitted with everything that is random about the rig: one score for a set, whatever led to it."""
+"""Fits of sets of causes by the likelihood, each with its process and measurement noise."""
 
 from __future__ import annotations
 
@@ -34,20 +34,21 @@ from fes_pin.models.stage import Effect
 from fes_pin.workers import in_parallel
 
 FIRST_NOISE_SCALES = (1.0, 30.0)
-"""Sizes of random effort that the nominal fit begins with, in units of the smallest: a likelihood can have two optima,
-one in which the model explains and one in which randomness does. Beside a fit whose random effort is beyond the larger,
-further causes begin also with the smallest."""
+"""Sizes of process noise at which the nominal fit starts, in units of the smallest. A likelihood can have two maxima:
+in one the model explains the data, in the other process noise does. Where the process noise of a fit exceeds the larger
+size, further causes are also started at the smallest."""
 PROCESS, MEASUREMENT, WHITE = "process noise", "measurement noise", "white measurement noise"
-"""What noise fits have: where they have no process noise predictions are free simulations; white measurement noise
-weighs every error alike, as least squares do."""
+"""Noise of the fits. Without process noise, predictions are free simulations; white measurement noise weighs every
+error alike, as least squares do."""
 RESTART_ROUNDS = 3
-"""Turns of parameters and randomness of such a fit, before the best sets converge."""
+"""Alternations between parameters and noise in a fit that starts with little process noise."""
 RESTART_SETS = 3
-"""Sets that go on from little randomness: the lowest of all that begin there, once what is random has had a turn.
-Before, a muscle's best cause, by 20 000 in twice the log-likelihood, was not among the first eight of twenty."""
+"""Sets that are fitted further from little process noise: those of lowest criterion after one alternation. Without that
+alternation the best cause of a muscle, by 20 000 in twice the log-likelihood, was not among the first eight of
+twenty."""
 
 Starts = list[tuple[Scored, ...]]
-"""Causes that a set is extended by, with their linear estimates; of one cause several shapes, best first."""
+"""Causes by which a set is extended, with their linear estimates; one cause may have several shapes, best first."""
 
 
 class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
@@ -58,24 +59,24 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
     model
         The nominal model with its start values.
     trials
-        What was measured.
+        Measured trials.
     effects
-        The causes that are looked for; by default all that are known of the rig.
+        The causes that are searched; by default all that are known for the rig.
     answered
-        Whether an effort, if there is one, answers what is read; a property of the trials, not of the likelihood.
+        Whether the rig is in closed loop; a property of the trials, not of the likelihood.
     noise
-        Which noise fits have: `PROCESS`, `MEASUREMENT` or `WHITE`.
+        Noise of the fits: `PROCESS`, `MEASUREMENT` or `WHITE`.
     calm
-        Fits of sets to the same trials without process noise, where there are such.
+        Fits of sets to the same trials without process noise, where there are any.
 
     Attributes
     ----------
     fits
-        By names in alphabetical order.
+        Fits by names in alphabetical order.
     screen
-        What every cause promises beside a fit.
+        Score tests of every cause in a fit.
     forms
-        Other forms of a set that is fitted.
+        Other forms of a fitted set.
     """
 
     def __init__(
@@ -98,14 +99,14 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         self.forms = LikelihoodForms(self._maxima, self.library.measured)
 
     def begun_with(self, fits: Sequence[LikelihoodFit]) -> Self:
-        """The same trials and causes, with some fits to begin with; what is random is timed as in them."""
+        """Return the same trials and causes with some fits to start from; the process noise is timed as in these."""
         other = copy.copy(self)
         other.fits = {names_of(f): f for f in fits}
         other._converged, other._begun, other._compared = set(), set(), {}
         return other
 
     def nominal(self) -> LikelihoodFit:
-        """Fit the nominal model, from several sizes of what is random; as it is where the fits began with one."""
+        """Fit the nominal model from several sizes of process noise; return the given fit where there is one."""
         if () in self.fits:
             return self.fits[()]
         from_rest = all(t.kind != IMPOSED and not self.model.rig.unknowns(t.kind) for t in self.trials)
@@ -116,7 +117,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         return self.fits[()]
 
     def _without_process_noise_first(self) -> LikelihoodFit:
-        """The nominal fit without process noise; with it, if that improves the penalised likelihood."""
+        """Return the nominal fit without process noise, or with it if that improves the penalised likelihood."""
         guess = first_guess(self.model, self.trials)
         none = stilled(self.model, self.trials, guess) if self.answered else replace(guess, std={}, time={})
         calm = self.calm.get(()) or self._maxima.from_afar(self.model, none)
@@ -125,9 +126,9 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         return min(calm, self.with_process_noise(calm), key=lambda f: f.criterion) if self.noise == PROCESS else calm
 
     def with_process_noise(self, calm: LikelihoodFit) -> LikelihoodFit:
-        """A fit without process noise again, with it: from that of several sizes that is likeliest at once."""
+        """Return a fit without process noise again with it, from the likeliest of several sizes of process noise."""
         guess = first_guess(self.model, self.trials)
-        if not guess.std or any(t.low_pass_hz for t in self.trials):  # no filter passes a state on
+        if not guess.std or any(t.low_pass_hz for t in self.trials):  # no filter takes a low pass of trials
             return calm
         white = {n: (0.0,) * len(own) for n, own in calm.noise.ar.items()}
         begun = [replace(calm.noise, std=guess.std, time=guess.time, still=())]
@@ -138,25 +139,25 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         return self._with_orders(self._maxima.from_start(calm.model, self._maxima.likeliest(calm, begun)))
 
     def by_likelihood(self, fitted: Fit) -> LikelihoodFit:
-        """A fit by simulation again, by the likelihood; with process noise, if that improves the penalised one."""
+        """Return a fit by simulation again by the likelihood; with process noise if that improves the criterion."""
         white = replace(first_guess(fitted.model, self.trials), std={}, time={})
         calm = self._with_orders(self._maxima.from_start(fitted.model, white, fitted.unknowns))
         return min(calm, self.with_process_noise(calm), key=lambda f: f.criterion)
 
     def _with_orders(self, fitted: LikelihoodFit) -> LikelihoodFit:
-        """A fit again, with autoregressions of the orders that what its filter leaves shows."""
+        """Return a fit again, with autoregressive noise of the orders that its innovations support."""
         problem = LikelihoodProblem(fitted.model, self.trials, fitted.noise)
         noise = problem.with_orders(fitted.values, fitted.unknowns)
         return self._maxima.from_start(fitted.model, noise, fitted.unknowns)
 
     def _nominal(self, correlation_s: float) -> LikelihoodFit:
-        """The nominal fit where the noise of a reading lasts so long."""
+        """Return the nominal fit at a correlation time of the measurement noise."""
         guess = first_guess(self.model, self.trials, correlation_s)
         starts = [replace(guess, std={n: k * v for n, v in guess.std.items()}) for k in FIRST_NOISE_SCALES]
         return min(in_parallel(lambda d: self._maxima.from_start(self.model, d), starts), key=lambda f: f.sse)
 
     def _guess(self) -> StateSpaceNoise:
-        """Little that is random, or nothing where noise foretells itself, with noise that lasts as it does."""
+        """Return start values with little process noise, or with none where measurement noise is autoregressive."""
         if self._calm is not None:
             return self._calm
         known = self.fits[()].noise
@@ -164,17 +165,17 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         return without_memory(guess, self.trials) if known and known.timed else guess
 
     def candidates(self, base: LikelihoodFit) -> dict[str, Candidate[Starts]]:
-        """Causes that a fit does not have, each with its shapes of largest score."""
+        """Return the causes that a fit does not have, each with its shapes of largest score."""
         by_effect = best_by_effect(self.screen.scores(base).scored)
         return {n: Candidate(many[0].gain, [(s,) for s in _of_much(many)]) for n, many in by_effect.items()}
 
     def pairs(self, most: int) -> dict[Names, Starts]:
-        """Starts of the pairs of causes of largest joint score in the nominal model."""
+        """Return starts of the pairs of causes of largest joint score in the nominal model."""
         found = best_pairs(self.screen.scores(self.fits[()]), most)
         return {tuple(sorted((a.probe.name, b.probe.name))): [(a, b)] for a, b in found}
 
     def begin(self, base: LikelihoodFit, starts: Mapping[Names, Starts]) -> dict[Names, LikelihoodFit]:
-        """The best of several first fits of each set: at what is random in the base, with little of that, from afar."""
+        """Return the best first fit of each set: at the noise of the base, with little process noise, and from afar."""
         begun = {k: [_extended(base.model, one) for one in many] for k, many in starts.items()}
         looks = in_parallel(lambda k: self._first_fits(base, starts[k], begun[k]), list(starts))
         restarted = {k: [f] for k, f in self.calm.items()}
@@ -188,10 +189,10 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         return [*(self._maxima.look(one, base) for one in models), *others]
 
     def _elsewhere(self, effect: Effect) -> list[LikelihoodFit]:
-        """Fits from sizes of a cause that no line from its null leads to, beside the rig as it was believed.
+        """Return fits of one cause alone from far sizes, with the start values of the nominal model.
 
-        Beside nothing alone: an effort with the wrong sign shows there, or nowhere. By least squares also from each of
-        its forms: the nominal fit to what is missed may lie far from where a cause in its right form leads.
+        No descent from the null leads to such sizes: an effort of the wrong sign is found here or nowhere. By least
+        squares fits start from each form of the cause too, since the nominal fit may be far from the fit of that form.
         """
         guess, measured = self._guess(), self.library.measured
         begun = [self.model + one for one in from_afar(effect, measured)]
@@ -199,9 +200,9 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         return in_parallel(lambda one: self._maxima.from_start(one, guess, rounds=RESTART_ROUNDS), begun)
 
     def _restarted(self, starts: Mapping[Names, Model], base: LikelihoodFit) -> dict[Names, list[LikelihoodFit]]:
-        """Fits that begin with little that is random, where another's random effort takes what a model should.
+        """Return fits that start with little process noise, where that of the base takes what a cause should explain.
 
-        All take a turn there; those that explain most then go on.
+        All sets are fitted for one alternation; those of lowest criterion are fitted further.
         """
         guess, least = self._guess(), first_guess(self.model, self.trials, base.noise.correlation_s).std
         if all(base.noise.std[n] <= FIRST_NOISE_SCALES[-1] * least[n] for n in base.noise.acting):
@@ -212,27 +213,27 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         return {names: [fitted] for (names, _), fitted in zip(lowest, gone_on, strict=True)}
 
     def converged(self, fits: Sequence[LikelihoodFit]) -> list[LikelihoodFit]:
-        """Fits once they have converged."""
+        """Return the converged fits."""
         return in_parallel(self._maxima.go_on, fits)
 
     def step_gain(self, fitted: LikelihoodFit) -> float:
-        """What a further step of a fit gains, by its slope and curvature; 0 where it has converged."""
+        """Return the gain of a further step of a fit by its slope and curvature; 0 where it has converged."""
         if fitted.gradient_norm < LITTLE or not math.isfinite(fitted.sse):
             return 0.0
         return step_gain(normal_equations(fitted.parts), [n not in fitted.at_bound for n in fitted.free])
 
     def form_of(self, fitted: LikelihoodFit) -> frozenset[tuple[str, tuple[str, ...]]]:
-        """Of each cause of a fit its name, and which refinements it has."""
+        """Return for each cause of a fit its name and its refinements."""
         return frozenset((e.name, e.refined()) for e in fitted.model.effects)
 
     def without(self, names: Names, name: str) -> LikelihoodFit:
-        """The fit of a set less one cause, from the set's own values where that is better."""
+        """Return the fit of a set without one cause, from the values of the set where that is better."""
         rest, whole = tuple(n for n in names if n != name), self.fits[names]
         if self._compared.get((names, name)) is not whole:
             effect = next(e for e in whole.model.effects if e.name == name)
             begun = self._maxima.less(whole, effect.amplitudes(), effect)
             own = self._maxima.from_start(begun, whole.noise, whole.unknowns)
-            if any(own.sse > f.sse + WORTH for f in self._parts(rest)):  # it ran away, or a part of it explains more
+            if any(own.sse > f.sse + WORTH for f in self._parts(rest)):  # it diverged, or a subset explains more
                 own = self._grown(rest, begun.effects)
             if rest not in self.fits or own.criterion < self.fits[rest].criterion:
                 self.fits[rest] = own
@@ -240,13 +241,13 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         return self.fits[rest]
 
     def _parts(self, names: Names) -> list[LikelihoodFit]:
-        """The fits of a set and of its parts, best first."""
+        """Return the fits of a set and of its subsets, best first."""
         return sorted((f for k, f in self.fits.items() if set(k) <= set(names)), key=lambda f: f.sse)
 
     def _grown(self, names: Names, effects: Sequence[Effect]) -> LikelihoodFit:
-        """The fit of a set from the best fit of a part of it, with one more of its effects after another.
+        """Return the fit of a set from the best fit of a subset, extended by one effect after another.
 
-        Each begins at nothing, in its own form.
+        Each effect starts at its null, in its own form.
         """
         fitted = self._parts(names)[0]
         for one in effects:
@@ -256,17 +257,17 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         return fitted
 
     def is_possible(self, fitted: LikelihoodFit) -> bool:
-        """False if the size of a cause is nothing that it can be; see `possible.is_possible`."""
+        """Return False if the size of a cause is physically impossible; see `possible.is_possible`."""
         return is_possible(fitted, self.library.measured)
 
 
 def _of_much(shapes: Sequence[Scored]) -> list[Scored]:
-    """The shapes of a cause of largest score."""
+    """Return the shapes of a cause of largest score."""
     return [s for s in shapes[:STARTS] if s.gain >= 0.5 * shapes[0].gain]
 
 
 def _extended(model: Model, scored: Sequence[Scored]) -> Model:
-    """A model with further causes, at their linear estimates."""
+    """Return a model with further causes at their linear estimates."""
     for one in scored:
         model = model + started(one.probe.effect, one.amplitudes)
     return model

@@ -1,4 +1,4 @@
-"""Forms of the causes of a set that is fitted: one refinement more, one fewer, all of one begun anew."""
+"""Forms of the causes of a fitted set: one refinement more, one fewer, or all refinements of a cause restarted."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ F = TypeVar("F", bound=Fitted)
 
 
 class LikelihoodForms:
-    """Fits of a set in other forms than it has.
+    """Fits of a set in other forms.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ class LikelihoodForms:
         self._maxima, self._measured = maxima, measured
 
     def refined(self, base: LikelihoodFit, barred: str | None = None) -> LikelihoodFit | None:
-        """The best fit of a set with the form of one of its effects refined; None where the data demand no form.
+        """Return the best fit of a set with one more refinement; None where none is significant.
 
         Parameters
         ----------
@@ -54,9 +54,10 @@ class LikelihoodForms:
         return demanded_form(base, looks, level, finished)
 
     def otherwise(self, base: LikelihoodFit) -> LikelihoodFit | None:
-        """The best fit of a set whose form lacks one of several refinements, grown from none; None if none is cheaper.
+        """Return the best fit of a set with one of its refinements barred; None if no criterion is lower.
 
-        Refinements are adopted one after another, the one that explains most first; two others may explain more.
+        The form is grown from no refinement. Refinements are adopted one after another, the one that explains most
+        first; two others together may explain more.
         """
         each = [(e, [n for n, *_ in e.refinements() if n in e.refined()]) for e in base.model.effects]
         found = (self._grown(base, e, n) for e, adopted in each if len(adopted) > 1 for n in adopted)
@@ -64,7 +65,7 @@ class LikelihoodForms:
         return best if best.criterion < base.criterion - WORTH else None
 
     def _grown(self, base: LikelihoodFit, effect: Effect, barred: str) -> LikelihoodFit:
-        """A set with one of its effects in the form that the data demand if one refinement of it is barred."""
+        """Return a set with one effect in the form that is significant if one refinement of it is barred."""
         adopted = [n for n, *_ in effect.refinements() if n in effect.refined()]
         fitted = self._maxima.go_on(self._maxima.look(self._maxima.less(base, adopted, effect), base))
         while (better := self.refined(fitted, barred)) is not None:
@@ -72,18 +73,18 @@ class LikelihoodForms:
         return fitted
 
     def simplified(self, base: LikelihoodFit) -> LikelihoodFit | None:
-        """The best fit of a set with one refinement of a form fewer; None where none is cheaper.
+        """Return the best fit of a set with one refinement fewer; None where no criterion is lower.
 
-        A form that was demanded beside fewer causes may have stood for one that has been found since.
+        A refinement that was adopted with fewer causes may have been mistaken for a cause that was found later.
         """
         both = ((e, n) for e in base.model.effects for n, *_ in e.refinements() if n in e.refined())
         starts = in_parallel(lambda one: self._maxima.less(base, one[1:], one[0]), list(both))
         return self._maxima.better(starts, base, base.criterion)
 
     def reformed(self, base: LikelihoodFit) -> LikelihoodFit | None:
-        """A set with several refinements of a form, all begun anew at once; None where that is no better.
+        """Return a set with all refinements of a cause restarted together; None where the criterion is no lower.
 
-        They were adopted one after another, and the first may have bent to what a later one says.
+        They were adopted one after another, so that the first may be distorted by what a later one explains.
         """
         starts = [s for effect in base.model.effects for s in restarted_forms(base.model, effect, self._measured)]
         return self._maxima.better(starts, base, base.criterion - WORTH)
@@ -92,19 +93,18 @@ class LikelihoodForms:
 def demanded_form(
     base: F, looks: Sequence[F], level: float, finished: Callable[[Sequence[F]], Sequence[F]]
 ) -> F | None:
-    """The best fit of a set in another form that the data demand; None where they demand none.
+    """Return the best fit of a set in another form that is significant; None where none is.
 
-    What does not gain half of what is demanded once its parameters were fitted, under noise as it was, is not gone on
-    with.
+    A form is fitted further only if its first fit, at the noise of the base, gains half of what is required.
 
     Parameters
     ----------
     looks
         First fits of the set in other forms.
     level
-        Of each form by itself.
+        Level of the test of each form.
     finished
-        Lets fits converge; returns those that are possible.
+        Returns converged fits, without those that are physically impossible.
     """
     looks = sorted(looks, key=lambda f: f.criterion)
     demanded = chi2_quantile(1.0 - level, 1)

@@ -1,4 +1,4 @@
-"""The likelihood's maximum of one model on the trials of a search: from anywhere, from another fit, in a few steps."""
+"""Maximum of the likelihood of one model on the trials of a search: from start values, from a fit, in a few steps."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from fes_pin.models.stage import Effect
 from fes_pin.workers import in_parallel
 
 SCREEN_ITERATIONS = 4
-"""Steps of a first fit of a set, at what is random in a smaller one."""
+"""Steps of a first fit of a set, at the noise of a smaller one."""
 
 
 class LikelihoodMaxima:
@@ -42,13 +42,13 @@ class LikelihoodMaxima:
         rounds: int = ROUNDS,
         near: bool = False,
     ) -> LikelihoodFit:
-        """The maximum from a model's own values and from what is taken for random; see `maximise`."""
+        """Return the maximum from the values of a model and start values of noise; see `maximise`."""
         return maximise(LikelihoodProblem(model, self.trials, noise), model.parameters(), unknowns, rounds, near)
 
     def from_afar(self, model: Model, noise: StateSpaceNoise) -> LikelihoodFit:
-        """The maximum from a model's own values; where it leaves a gross misfit, also from fits to ever longer trials.
+        """Return the maximum from the values of a model; after a gross misfit, also from fits to ever longer trials.
 
-        Where there is process noise nothing is gross: a filter follows what a wrong model does to the state.
+        With process noise no misfit is gross: a filter follows the state even of a wrong model.
         """
         plain, rough = self.from_start(model, noise), LikelihoodProblem(model, self.trials, noise)
         if not rough.is_simulated or _reduced(rough, plain) < GROSS:
@@ -60,7 +60,7 @@ class LikelihoodMaxima:
         return grown if grown.sse < plain.sse or not math.isfinite(plain.sse) else plain
 
     def likeliest(self, fitted: LikelihoodFit, begun: Sequence[StateSpaceNoise]) -> StateSpaceNoise:
-        """The noise, of several to begin with, that is likeliest with a fit's parameters after a first step."""
+        """Return the noise, of several start values, that is likeliest after one step at the parameters of a fit."""
         tried = []
         for noise in begun:
             problem = LikelihoodProblem(fitted.model, self.trials, noise)
@@ -70,19 +70,20 @@ class LikelihoodMaxima:
         return min(tried, key=lambda one: one[0])[1]
 
     def go_on(self, fitted: LikelihoodFit, rounds: int = ROUNDS) -> LikelihoodFit:
-        """The maximum from where a fit has come to."""
+        """Return the maximum from the values of a fit."""
         return self.from_start(fitted.model, fitted.noise, fitted.unknowns, rounds, fitted.together)
 
     def look(self, start: Model, base: LikelihoodFit) -> LikelihoodFit:
-        """A few steps from a start, at what is random in another fit."""
+        """Return the fit after a few steps from a start, at the noise of another fit."""
         problem = LikelihoodProblem(start, self.trials, base.noise)
         found = minimise(problem, start.parameters(), base.unknowns, SCREEN_ITERATIONS)
         return replace(fit_of(problem, found), together=base.together)
 
     def better(self, starts: Sequence[Model], base: LikelihoodFit, criterion: float) -> LikelihoodFit | None:
-        """The best fit from some starts; None where none is below a price.
+        """Return the best fit from some starts; None where none has a criterion below the given one.
 
-        Those that look best go on, if what they cost beside randomness as it was is within a parameter's price.
+        The best first fits are fitted further if their criterion, at the noise of the base, exceeds that of the base by
+        less than the penalty of a parameter.
         """
         looks = sorted(in_parallel(lambda s: self.look(s, base), starts), key=lambda f: f.criterion)
         worth = [f for f in looks[:STARTS] if f.criterion < base.criterion + PARAMETER_PENALTY]
@@ -90,10 +91,10 @@ class LikelihoodMaxima:
         return best if best is not None and best.criterion < criterion else None
 
     def less(self, whole: LikelihoodFit, gone: Sequence[str], effect: Effect) -> Model:
-        """The model of a fit with some parameters of an effect at their nulls; without the effect if these are all.
+        """Return the model of a fit with some parameters of an effect at their nulls, without it if these are all.
 
-        The others are where the fit's covariance takes them, or where they were: whichever is likelier. An effort's
-        gain stands for an inertia that is another without it.
+        The other parameters are moved along the fit's covariance or stay, whichever is likelier: without the gain of an
+        effort, for example, the estimate of inertia is another.
         """
         nulls = {f"{effect.name}.{n}": effect.nulls()[n] for n in gone if n in effect.common()}
         moving = [n for n in nulls if n in whole.free]
@@ -112,7 +113,7 @@ class LikelihoodMaxima:
 
 
 def _reduced(problem: LikelihoodProblem, fitted: LikelihoodFit) -> float:
-    """Mean square of the residuals that a fit leaves, under the noise of a problem; infinite where it runs away."""
+    """Return the mean square of a fit's whitened residuals under the noise of a problem; infinite where it diverges."""
     residuals = [p.residual for p in problem.linearize(fitted.values, fitted.unknowns)]
     with np.errstate(all="ignore"):
         mean = float(sum(r @ r for r in residuals)) / max(sum(map(len, residuals)), 1)

@@ -1,4 +1,4 @@
-"""Sets of causes of one study as the search of `infer` sees them: fits by the likelihood, and how they are judged."""
+"""Sets of causes of one study for the search of `infer`: fits by the likelihood, and the rules that judge them."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ from fes_pin.models.stage import Effect
 
 
 class NominalFitError(Exception):
-    """A study to which not even the nominal model can be fitted.
+    """Error for a study to which not even the nominal model can be fitted.
 
     Parameters
     ----------
     why
-        One line.
+        The reason, in one line.
     nominal
-        As far as its fit came.
+        The nominal fit where it ended.
     """
 
     def __init__(self, why: str, nominal: LikelihoodFit) -> None:
@@ -42,16 +42,16 @@ class NominalFitError(Exception):
 
 
 class LikelihoodModels(LikelihoodFits):
-    """Fits of sets of causes to one set of trials, and how a search judges them.
+    """Fits of sets of causes to one set of trials, and the rules by which a search judges them.
 
     Parameters
     ----------
     model, trials, effects, answered, noise, calm
-        As of `LikelihoodFits`.
+        As in `LikelihoodFits`.
     seed
         Of critical values.
     horizon_s
-        How far ahead errors over a horizon look, s; by default as `default_horizon` says.
+        Horizon of errors, s; by default as `default_horizon` says.
     """
 
     def __init__(
@@ -67,25 +67,25 @@ class LikelihoodModels(LikelihoodFits):
     ) -> None:
         super().__init__(model, trials, effects, answered, noise, calm)
         self.seed, self._horizon_s = seed, horizon_s
-        # no bound where motion is imposed: that excites a rig as nothing else does, and a muscle is a set of causes
+        # no bound where motion is imposed: it excites a rig most, and a muscle is a set of causes
         self.most_candidates = None if any(t.kind == IMPOSED for t in self.trials) else MOST_CAUSES
 
     def with_noise(self, noise: str) -> LikelihoodModels:
-        """The same trials and causes, to be fitted with another noise."""
+        """Return the same trials and causes, to be fitted with another noise."""
         calm = self.fits if (self.noise, noise) == (MEASUREMENT, PROCESS) else None
         own = (self.library.effects, self.answered, self.seed, self._horizon_s, noise, calm)
         return LikelihoodModels(self.model, self.trials, *own)
 
     @property
     def horizon_s(self) -> float:
-        """How far ahead errors over a horizon look, s."""
+        """Horizon of errors, s."""
         return self._horizon_s or default_horizon(self.trials)
 
     @property
     def judged_s(self) -> float | None:
-        """How far ahead errors are judged: over the horizon where a controller answers or motion is imposed, else free.
+        """Horizon by which causes are judged, s: in closed loop or of imposed motion; None for free simulation.
 
-        Errors come back as input where a controller answers, and a free simulation of the best of models runs away.
+        In closed loop errors come back as an input, and a free simulation of even the best model diverges.
         """
         return self.horizon_s if self.answered or any(t.kind == IMPOSED for t in self.trials) else None
 
@@ -99,20 +99,20 @@ class LikelihoodModels(LikelihoodFits):
         """
         fitted = super().nominal()
         if not math.isfinite(fitted.sse):
-            free = "the nominal model's simulation leaves the floating-point numbers from its start values on"
-            filtered = "the nominal model predicts nothing finite from its start values on"
+            free = "the simulation of the nominal model is not finite at its start values"
+            filtered = "the one-step predictions of the nominal model are not finite at its start values"
             raise NominalFitError(free if is_simulated(fitted.noise, fitted.trials) else filtered, fitted)
         self.family = self.screen.scores(fitted).family(self.seed)
         return fitted
 
     def extension_p_value(self, fitted: LikelihoodFit) -> float:
-        """Family-wise p-value of the largest score of a further cause."""
+        """Return the family-wise p-value of the largest score of a further cause."""
         scored = [s for s in self.screen.scores(fitted).scored if s.gain > 0.0]
         single = min((float(chi2_tail(s.gain, max(len(s.amplitudes), 1))) for s in scored), default=1.0)
         return self.family.adjusted(single)
 
     def scored(self, found: Found) -> list[Scored]:
-        """Score of every cause in the nominal model, and of those that the best set lacks in that."""
+        """Return the score of every cause in the nominal model, and in the best set of those that it lacks."""
         more = self.screen.scores(found.best).scored if found.best.model.effects else []
         return self.screen.scores(found.nominal).scored + more
 
@@ -125,22 +125,22 @@ class LikelihoodModels(LikelihoodFits):
         return level_of(fitted)
 
     def is_error_of_form(self, larger: LikelihoodFit, gain: float, explained: float) -> bool:
-        """Whether a gain is no more than errors of form leave, and no random effort takes these up."""
+        """Return whether a gain is no more than an error of form may leave, and no process noise takes that up."""
         return not larger.noise.acting and gain < FORM_SHARE * explained
 
     def predicts_better(self, larger: LikelihoodFit, smaller: LikelihoodFit) -> bool:
-        """Whether what a set adds lessens the errors that it is judged by, of the very trials that it was fitted to."""
+        """Return whether a larger set has the smaller error by which it is judged, on the trials it was fitted to."""
         fold = Fold(self.fits[()], larger, {"": smaller}, self.trials)
         return gains_of([fold], fold.without, self.judged_s, self.seed)[""].is_material
 
     def leaves_noise(self, fitted: LikelihoodFit) -> bool:
-        """Whether a fit has no lack of fit, and its random effort is small."""
+        """Return whether a fit has no lack of fit, and little process noise."""
         return not (are_large(random_parts(fitted)) or lack_of_fit(fitted, self.seed).unexplained)
 
     def better_form(self, fitted: LikelihoodFit) -> LikelihoodFit | None:
-        """A set with one refinement of a form fewer, one more, or all begun again, where that is better.
+        """Return a set with one refinement fewer, one more, or all restarted, where that is better; else None.
 
-        None by least squares: where a model is not right every further parameter is significant.
+        It is None by least squares: where a model is wrong every further parameter is significant.
         """
         if self.noise == WHITE:
             return None

@@ -1,4 +1,4 @@
-"""What every cause promises beside a fit by the likelihood, from one linearization of each."""
+"""Score tests of every cause in a fit by the likelihood, from one linearization of each cause."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class LikelihoodScreen:
         self._probing: dict[tuple, LikelihoodProblem] = {}
 
     def scores(self, base: LikelihoodFit) -> Scores:
-        """Promise of every effect that a fit does not have, at what is random in it; none beside one that runs away."""
+        """Return score tests of every effect that a fit does not have, at its noise; none in a fit that diverges."""
         if not math.isfinite(base.sse):
             return Scores([], np.zeros((0, 0)), np.zeros(0), [])
         if id(base) not in self._scores:
@@ -36,10 +36,10 @@ class LikelihoodScreen:
         return self._scores[id(base)][1]
 
     def _probes(self, effect: type[Effect], base: LikelihoodFit) -> list[Probe]:
-        """The effect with every choice of its shapes beside the nominal parameters of a fit.
+        """Return the effect with every choice of its shapes, linearized at the nominal parameters of a fit.
 
-        Causes that the fit has are left out, but those that the effect shows beside: the predictor follows what was
-        measured with them or without.
+        Causes of the fit are left out, except those of `screened_with`: the predictor follows the readings with or
+        without them.
         """
         nominal = Model(base.model.rig, tuple(e for e in base.model.effects if e.name in effect.screened_with))
         out, simulated = [], is_simulated(base.noise, self._library.trials)

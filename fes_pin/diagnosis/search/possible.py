@@ -1,4 +1,4 @@
-"""What a cause cannot be, however well it fits."""
+"""Sizes of causes that are physically impossible, however well they fit."""
 
 from __future__ import annotations
 
@@ -10,15 +10,14 @@ from fes_pin.identify.fit import Fit
 
 
 def is_possible(fitted: Fit, measured: Mapping[str, np.ndarray]) -> bool:
-    """False if the size of a cause of a fit is nothing that it can be: another cause is mistaken for it.
+    """Return False if the size of a cause in a fit is impossible: another cause is then mistaken for it.
 
-    The size ended at its bound, other than at nothing, or is less than the readings can resolve.
+    A size is impossible if it ended at a bound other than its null, or if it is less than the readings can resolve.
 
     Parameters
     ----------
     measured
-        Columns of the trials; see `identify.problem.measured_columns`, and `answered_columns` where a controller
-        answers the reading.
+        Columns of the trials; see `identify.problem.measured_columns`, and `answered_columns` for a rig in closed loop.
     """
     for effect in fitted.model.effects:
         info, smallest = effect.parameters(), effect.smallest(measured)

@@ -1,4 +1,4 @@
-"""Whether the data tell what a refinement of the form of a model's effect adds."""
+"""Identifiability of the refinements of a model's effects."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from fes_pin.infer.levels import CONFIDENCE_95
 
 
 def is_identified(fitted: Fit, before: Fit | None = None) -> bool:
-    """True if the data tell every parameter that has a null from it, within its bounds, in all refined effects.
+    """Return whether every parameter of all refined effects differs significantly from its null, within its bounds.
 
     Parameters
     ----------
     before
-        The fit that was refined: what stood at its bound there already speaks not against another form.
+        The fit that was refined: a parameter that was at its bound there is no objection to another form.
     """
     there = before.at_bound if before is not None else ()
     for one in fitted.model.effects:

@@ -1,4 +1,4 @@
-"""Score tests of causes beside a fit, one at a time and in pairs: what each would gain if it were linear.
+"""Score tests of causes in a fit, one at a time and in pairs: the gain of each if the model were linear in it.
 
 C. R. Rao, Math. Proc. Camb. Phil. Soc. 44:50 (1948).
 """
@@ -19,22 +19,22 @@ from fes_pin.infer.problem import Linearized
 from fes_pin.infer.projection import Projection
 
 RIDGE = 1e-8
-"""Added to the scaled Gram matrix of two probes, which may be the same."""
+"""Ridge of the scaled Gram matrix of two probes, which may be parallel."""
 
 
 @dataclass(frozen=True)
 class Scored:
-    """A probe, measured against a fit.
+    """The score test of a probe in a fit.
 
     Attributes
     ----------
     gain
-        Score: drop in the sum of squares by the linearized effect; where its amplitudes are each trial's own, less
-        the price of each that it has beyond those of a common effect.
+        Score statistic: drop in the sum of squares by the linearized effect. Where its amplitudes are each trial's own,
+        the penalty of those beyond the amplitudes of a common effect is subtracted.
     amplitudes
         The linear estimate of its amplitudes.
     kept
-        Share of the sensitivity's norm that the fitted parameters do not take up.
+        Share of the sensitivity's norm that the fitted parameters cannot reproduce.
     """
 
     probe: Probe
@@ -44,9 +44,9 @@ class Scored:
 
 
 def score_test(parts: Sequence[Linearized], probes: Sequence[Probe]) -> Scores:
-    """The scores of probes in a fit, and the Gram matrix of what the fit leaves of them.
+    """Return the scores of probes in a fit, and their Gram matrix with the fitted parameters projected off.
 
-    Those that can be other in each trial are scored both ways.
+    Probes whose amplitudes can differ between trials are scored both ways.
     """
     if not probes:
         return Scores([], np.zeros((0, 0)), np.zeros(0), [])
@@ -65,10 +65,10 @@ def score_test(parts: Sequence[Linearized], probes: Sequence[Probe]) -> Scores:
 
 
 def _each(projection: Projection, probe: Probe, partly: Sequence[np.ndarray], before: float) -> Scored:
-    """A probe with amplitudes of each trial's own: its columns, cut into trials, side by side.
+    """Return the score of a probe with amplitudes of each trial's own: its columns, cut into trials, side by side.
 
-    With c_i the columns of trial i beside its own unknowns and B the basis of what all trials share, the Gram
-    matrix of what is left is diag(c_i' c_i) - (c_i' B_i) (c_j' B_j)'.
+    With c_i the columns of trial i, its own unknowns projected off, and B a basis of the parameters that all trials
+    share, the Gram matrix of the projected columns is diag(c_i' c_i) - (c_i' B_i) (c_j' B_j)'.
     """
     count = probe.columns.shape[1]
     gram = np.zeros((count * len(partly),) * 2)
@@ -92,14 +92,14 @@ def _each(projection: Projection, probe: Probe, partly: Sequence[np.ndarray], be
 
 @dataclass(frozen=True)
 class Scores:
-    """Probes, scored together.
+    """Score tests of several probes.
 
     Attributes
     ----------
     scored
-        One for each probe, whose columns are dropped, and after those one for each that can be other in each trial.
+        One for each probe, without its columns, followed by one for each probe that can differ between trials.
     gram
-        Shape (k, k): inner products of what the fit leaves of all columns.
+        Shape (k, k): inner products of all columns, the fitted parameters projected off.
     along
         Shape (k,): their inner products with the residual.
     blocks
@@ -112,7 +112,7 @@ class Scores:
     blocks: list[slice]
 
     def family(self, seed: int) -> Family:
-        """The family of these tests; a form with amplitudes of each trial's own is one test more, at most."""
+        """Return the family of these tests; a form with amplitudes of each trial's own counts as one more test."""
         return Family(self.gram, self.blocks, seed, sum(s.probe.effect.each_trial for s in self.scored))
 
 
@@ -130,7 +130,7 @@ def _score(probe: Probe, gram: np.ndarray, along: np.ndarray, before: float) -> 
 
 
 def best_by_effect(scored: Sequence[Scored]) -> Mapping[str, list[Scored]]:
-    """For each effect its scored shapes, best first."""
+    """Return the scored shapes of each effect, best first."""
     out: dict[str, list[Scored]] = {}
     for s in scored:
         out.setdefault(s.probe.name, []).append(s)
@@ -138,7 +138,7 @@ def best_by_effect(scored: Sequence[Scored]) -> Mapping[str, list[Scored]]:
 
 
 def best_pairs(scores: Scores, count: int) -> list[tuple[Scored, Scored]]:
-    """Pairs of effects of largest score together, best first, each pair of names once."""
+    """Return the pairs of effects of largest joint score, best first, each pair of names once."""
     found: dict[tuple[str, str], tuple[Scored, Scored]] = {}
     first, second, gains = _pair_gains(scores)
     for k in np.argsort(-gains, kind="stable"):
@@ -156,9 +156,9 @@ def best_pairs(scores: Scores, count: int) -> list[tuple[Scored, Scored]]:
 
 
 def _pair_gains(scores: Scores) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Every pair of probes and what both gain together, bounds aside; each of shape (pairs,).
+    """Return every pair of probes and its joint gain without bounds; each of shape (pairs,).
 
-    Blocks are filled up to one size with rows of the identity, which gain nothing.
+    Blocks are padded to one size with rows of the identity, which gain nothing.
     """
     size, rows = max(b.stop - b.start for b in scores.blocks), len(scores.along)
     gram = np.eye(rows + 2 * size)
@@ -176,7 +176,7 @@ def _pair_gains(scores: Scores) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _inside(scores: Scores, i: int, j: int) -> tuple[dict[str, float], dict[str, float]] | None:
-    """Amplitudes at which two probes together explain most; None if they lie outside their bounds."""
+    """Return the amplitudes at which two probes together explain most; None if they are out of bounds."""
     rows = np.r_[scores.blocks[i], scores.blocks[j]]
     gram, along = scores.gram[np.ix_(rows, rows)], scores.along[rows]
     keys = [(k, n) for k in (i, j) for n in scores.scored[k].probe.effect.amplitudes()]
