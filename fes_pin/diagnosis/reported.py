@@ -26,7 +26,7 @@ from fes_pin.models.stage import Effect
 
 
 def _ceiling(fitted: LikelihoodFit) -> float:
-    """E of the reading noise alone, percent: of a simulation where there is no process noise."""
+    """Return E of the measurement noise alone, percent; without process noise, that of a free simulation."""
     if is_simulated(fitted.noise, fitted.trials):
         return free_errors(fitted.model, fitted.trials, noise_that_is_small(fitted)).ceiling_percent()
     rig = fitted.model.rig
@@ -38,7 +38,7 @@ def _ceiling(fitted: LikelihoodFit) -> float:
 def diagnosis_of(
     study: Study, search: LikelihoodSearch, found: Found, trials: tuple[list[Trial], list[Trial]], seed: int
 ) -> Diagnosis:
-    """The diagnosis of a rig by the likelihood, from a search that has run."""
+    """Return the diagnosis of a rig from a search by the likelihood that has run."""
     verdict = RigVerdict(search, trials[1], seed)
     state = verdict.of(found)
     found, (left, reason) = state.found, verdict.remainder(state)
@@ -75,15 +75,15 @@ def diagnosis_of(
 
 
 def _words(fitted: LikelihoodFit, trials: Sequence[Trial]) -> tuple[str, ...]:
-    """What is to be said of what is random in a fit."""
+    """Return warnings about the noise of a fit."""
     said = words_of_reading(fitted.noise, fitted.model.rig, trials)
     return (*said, WHITE_PROCESS_NOISE) if fitted.noise.timed else said
 
 
 def _cause(verdict: RigVerdict, state: RigState, one: Effect, best: LikelihoodFit, on: str) -> Cause:
-    """What is reported of one cause; `best` has intervals as wide as its scores scatter.
+    """Return the report of one cause; `best` has the intervals of the sandwich estimator.
 
-    Its gains are found `on` such data. A likelihood is no evidence where the model leaves more than noise.
+    Its gains are found `on` such data. A likelihood is no evidence where the model has a lack of fit.
     """
     found, name, weighed = state.found, one.name, state.weighed
     evidence = None if weighed.lack_of_fit.unexplained else weighed.evidence.get(name)

@@ -1,8 +1,9 @@
 """The verdict on what a search among the causes of a rig found.
 
 Every set of causes is judged by the likelihood of its one-step predictions (`identify.likelihood`), and by its errors
-on trials held out: over a horizon where a controller answers, as errors come back as input there (`identify.feedback`)
-and a free simulation of the best of models runs away; else of free simulations.
+on held-out trials. For a rig in closed loop these are errors over a horizon: errors come back as an input
+(`identify.feedback`), and a free simulation of even the best model diverges. For others they are those of free
+simulations.
 """
 
 from __future__ import annotations
@@ -46,16 +47,16 @@ from fes_pin.infer.verdict import State, Verdict, Weighed
 
 @dataclass(frozen=True)
 class RigWeighed(Weighed):
-    """What trials say of a set of causes; gains are over the horizon.
+    """Evidence of trials on a set of causes.
 
     Attributes
     ----------
     folds
         Trials that are held out, and fits without them; none where none can be.
     random
-        What acts at random beside the set.
+        Process noise in the fit of the set.
     no_noise
-        Why the error of a simulation is no noise of a reading, if it is none.
+        Why the error of a simulation cannot be measurement noise; None where it may be.
     """
 
     lack_of_fit: Remainder
@@ -68,10 +69,10 @@ RigState = State[LikelihoodFit, LikelihoodModels, RigWeighed]
 
 
 class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
-    """How it is judged what a search by the likelihood found.
+    """The verdict on what a search by the likelihood found.
 
-    Trials that took no part support a cause, or not, by `is_supported`, with errors over the horizon: several forms
-    together, none of them quite right, come near to anything one sample ahead.
+    Held-out trials support a cause by `is_supported`, with errors over the horizon or of free simulations: one sample
+    ahead several wrong forms together predict nearly anything.
 
     Parameters
     ----------
@@ -92,7 +93,7 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
         self._with_white_noise: LikelihoodFit | None = None
 
     def weigh(self, found: Found) -> RigWeighed:
-        """What held-out trials, and the tests of lack of fit, say of a set."""
+        """Return the evidence of held-out trials and of the tests of lack of fit on a set."""
         folds = make_folds(found, self.models.trials, self.test, self.refitted)
         within = folds or [Fold(found.nominal, found.best, found.without, self.models.trials)]
         return RigWeighed(
@@ -105,7 +106,7 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
         )
 
     def of(self, found: Found, search: LikelihoodSearch | None = None, replaced: RigState | None = None) -> RigState:
-        """The state that no claim objects to; one without causes where something else moves the rig."""
+        """Return the state to which no claim objects; one without causes where the input does not move the rig."""
         search = search or self.search
         if not is_moved_by_what_is_recorded(found.best):
             self._unmoved.add(id(search))
@@ -113,9 +114,9 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
         return super().of(found, search, replaced)
 
     def unsupported(self, state: RigState) -> list[str]:
-        """Causes that trials which took no part do not support.
+        """Return the causes that held-out trials do not support.
 
-        Where something acts that no cause explains, one that explains no more than an error of form may be of that.
+        Where process noise is large, a cause that explains no more than an error of form is not supported either.
         """
         gains = state.weighed.gains
         if are_large(state.weighed.random) and (form := [n for n in gains if gains[n].low < 100.0 * FORM_SHARE]):
@@ -123,18 +124,18 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
         return super().unsupported(state)
 
     def lack_of_fit(self, state: RigState) -> Remainder:
-        """Lack of fit: by the features, or a random effort that is too large, or a cause that was rejected."""
+        """Return the lack of fit: by its tests, process noise that is too large, or a cause that was rejected."""
         stages = {e.name: str(e.stage) for e in self.models.library.effects}
         left = with_rejected_causes(state.weighed.lack_of_fit, state.weighed.random, state.rejected, stages)
         wrong = not left.unexplained and state.weighed.no_noise is not None
         return replace(left, unexplained=True, where="time") if wrong else left
 
     def is_rarely_chosen(self, state: RigState, name: str) -> bool:
-        """Whether most folds choose neither a cause nor what cannot be told from it."""
+        """Return whether most folds choose neither a cause nor one of its equivalents."""
         return not is_chosen(share_of(self.chosen(state), alike_in(state.found, name)))
 
     def by_another_estimator(self, state: RigState) -> RigState | None:
-        """The verdict with efforts that are new in every sample, or by the least error where a lack of fit remains."""
+        """Return the verdict with white process noise, or by least squares where there is a lack of fit; else None."""
         self._with_white_noise = white = found_with_white_process_noise(state.search, state.found)
         other = None if white is None else judged_again(state.search, state.found, white)
         if other is None and self.lack_of_fit(state).unexplained:
@@ -145,10 +146,10 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
         return self.of(found, search, replaced=state)
 
     def prediction_error(self, state: RigState) -> float:
-        """E of a set on the fitted trials, percent, each predicted by a fit to the others.
+        """Return E of a set on the fitted trials by cross-validation, percent.
 
-        Of a single trial, E of the fit itself. A rig that a controller drives is judged by errors over the horizon,
-        others by those of free simulations.
+        For a single trial it is E of the fit itself. A rig in closed loop is judged by errors over the horizon, others
+        by those of free simulations.
         """
         best, train = state.found.best, self.models.trials
         folds = self.folds(state)
@@ -162,7 +163,7 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
         return error.horizon if error.free is None or self.models.judged_s is not None else error.free
 
     def chosen(self, state: RigState) -> list[LikelihoodFit]:
-        """For each fold, the fit to all trials of the set that is chosen without its own; none where none are made."""
+        """Return for each fold the fit to all trials of the set that is chosen without its own; none without folds."""
         found, folds = state.found, state.weighed.folds
         if not folds or not folds[0].within or id(state.search) in self._unmoved:
             return []
@@ -173,12 +174,12 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
         return self._chosen[id(found)][1]
 
     def folds(self, state: RigState) -> Sequence[Fold]:
-        """Trials that are held out, with fits without them, and what each fold chooses again."""
+        """Return the held-out trials, with fits without them, and the set that each fold chooses again."""
         chosen, folds = self.chosen(state), state.weighed.folds
         return with_choices(folds, chosen, self.refitted) if chosen and state.names else folds
 
     def errors(self, state: RigState) -> tuple[Ahead, Ahead]:
-        """Errors of the nominal and of the extended model on the trials that were fitted."""
+        """Return errors of the nominal and of the extended model on the fitted trials."""
         found, train = state.found, self.models.trials
         nominal, best = (
             errors_ahead([(f, found.best, train)], self.models.horizon_s, self._falls(state))
@@ -187,13 +188,14 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
         return nominal, best
 
     def held_out_errors(self, state: RigState) -> tuple[Ahead, Ahead] | None:
-        """The same on trials held out; None where none could be."""
+        """Return the same on held-out trials; None where there are none."""
         return held_errors_ahead(self.folds(state), self.models.horizon_s, self._falls(state))
 
     def remainder(self, state: RigState) -> tuple[Remainder, str | None]:
-        """Lack of fit of a set, and its reason if no test says so; else of that by the estimator that was replaced.
+        """Return the lack of fit of a set, and its reason where no test finds it.
 
-        With efforts that are new in every sample little lack of fit stands out: it is not what these say is random.
+        A set without one has that of the estimator that was replaced: with white process noise tests of lack of fit
+        have little power.
         """
         left = self.lack_of_fit(state)
         if state.replaced is not None and not left.unexplained:
@@ -204,7 +206,7 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
         return left, state.weighed.no_noise if untested else None
 
     def by_the_other(self, state: RigState) -> LikelihoodFit | None:
-        """The same set fitted by another estimator; None where none was asked, or where that has another set."""
+        """Return the same set fitted by the other estimator; None without another, or where that found another set."""
         other = self._with_white_noise if state.replaced is None else state.replaced.found.best
         return other if other is not None and names_of(other) == names_of(state.found.best) else None
 
@@ -213,5 +215,5 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
 
 
 def alike_in(found: Found, name: str) -> tuple[str, ...]:
-    """A cause, and what cannot be told from it."""
+    """Return a cause and its equivalents."""
     return (name, *alternatives(found.best, found.rivals[name], name))
