@@ -129,10 +129,12 @@ def _named(result: Result) -> list[Markup]:
     _, head, rows, _ = result.as_table()
     gains = [(c.name, c.gain_held_out, c.stage) for c in result.causes if isinstance(c, Cause)]
     table = html_table(head, [[element("code", row[0]), *row[1:]] for row in rows])
+    cards = [_card(result, one) for one in result.causes]
+    if not gains:
+        return [table, *cards]
     drawn = intervals_drawing([(n, g.percent, g.low, g.high, s) for n, g, s in gains], f"{head[3]} (%)", (0.0, 100.0))
     caption = "Gain with its 95 % interval: percent of the nominal model's squared error above the noise."
-    cards = [_card(result, one) for one in result.causes]
-    return [table, *([figure(drawn, caption, "narrow", "gains")] if gains else []), *cards]
+    return [table, figure(drawn, caption, "narrow", "gains"), *cards]
 
 
 def _card(result: Result, one: Named) -> Markup:
