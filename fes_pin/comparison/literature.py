@@ -103,35 +103,6 @@ def is_felt(model: Model, effect: Effect, trials: Sequence[Trial]) -> bool:
     return rig.takes(effect) and any(effect.signal in rig.changeable(t.kind, rig.input_columns(t)) for t in trials)
 
 
-def _second_order(_: Sequence[Trial]) -> tuple[Effect, ...]:
-    return (SecondOrderActivation(second_s=0.02),)
-
-
-def _hammerstein(_: Sequence[Trial]) -> tuple[Effect, ...]:
-    return (RecruitmentCurvature(), SecondOrderActivation(second_s=0.02))
-
-
-def _hill(trials: Sequence[Trial]) -> tuple[Effect, ...]:
-    return (RiseFallAsymmetry(), *_contractile(trials))
-
-
-def _riener(trials: Sequence[Trial]) -> tuple[Effect, ...]:
-    return (
-        ElectromechanicalDelay(delay_s=DELAY_S),
-        SecondOrderActivation(second_s=CALCIUM_S),
-        *(e for e in _contractile(trials) if e.name != SeriesElasticity.name),
-        Fatigue(recovery_s=RECOVERY_S),
-    )
-
-
-def _bobet_stein(_: Sequence[Trial]) -> tuple[Effect, ...]:
-    return (PulseSummation(saturation=1.0, cooperation=1.0), SecondOrderActivation(second_s=0.03))
-
-
-def _ding(_: Sequence[Trial]) -> tuple[Effect, ...]:
-    return (Ding2003(),)
-
-
 def _contractile(trials: Sequence[Trial]) -> tuple[Effect, ...]:
     """Force over length and velocity and the tendon; of a lever in sizes that its way and the force suggest."""
     levered = [t for t in trials if t.kind == IMPOSED and "length_m" in t]
@@ -154,37 +125,42 @@ LITERATURE: tuple[Published, ...] = (
         "second_order",
         "two lags in series",
         "Baratta and Solomonow, IEEE Trans. Biomed. Eng. 37 (1990) 109",
-        _second_order,
+        lambda _: (SecondOrderActivation(second_s=0.02),),
     ),
     Published(
         "hammerstein",
         "a curve of recruitment before two lags in series",
         "Durfee and MacLean, IEEE Trans. Biomed. Eng. 36 (1989) 292",
-        _hammerstein,
+        lambda _: (RecruitmentCurvature(), SecondOrderActivation(second_s=0.02)),
     ),
     Published(
         "hill",
         "activation that rises and falls with different times; force-length, force-velocity, tendon",
         "Zajac, Crit. Rev. Biomed. Eng. 17 (1989) 359; Hill, Proc. R. Soc. B 126 (1938) 136",
-        _hill,
+        lambda trials: (RiseFallAsymmetry(), *_contractile(trials)),
     ),
     Published(
         "riener",
         "delay, two lags of calcium, force-length, force-velocity, fatigue that recovers; the nominal recruitment",
         "Riener and Fuhr, IEEE Trans. Rehab. Eng. 6 (1998) 113",
-        _riener,
+        lambda trials: (
+            ElectromechanicalDelay(delay_s=DELAY_S),
+            SecondOrderActivation(second_s=CALCIUM_S),
+            *(e for e in _contractile(trials) if e.name != SeriesElasticity.name),
+            Fatigue(recovery_s=RECOVERY_S),
+        ),
     ),
     Published(
         "bobet_stein",
         "a lag, a saturating power of it, a second lag whose rate here does not depend on the force",
         "Bobet and Stein, IEEE Trans. Biomed. Eng. 45 (1998) 1010",
-        _bobet_stein,
+        lambda _: (PulseSummation(saturation=1.0, cooperation=1.0), SecondOrderActivation(second_s=0.03)),
     ),
     Published(
         "ding2003",
         "calcium of each pulse, troponin, a force whose decay it slows; without its fatigue between trains",
         "Ding, Wexler and Binder-Macleod, J. Electromyogr. Kinesiol. 13 (2003) 575",
-        _ding,
+        lambda _: (Ding2003(),),
         pulses=True,
         fixed=(("time_constant_s", 0.02),),
     ),
