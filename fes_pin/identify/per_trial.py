@@ -15,14 +15,13 @@ import numpy as np
 from fes_pin.data.trial import Trial, derived_trial
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood import LikelihoodProblem, unknown_names
-from fes_pin.identify.problem import Problem
 from fes_pin.identify.process_noise import spread_of_start
-from fes_pin.infer.noise import Noise, NoiseModel
-from fes_pin.infer.problem import Linearized, Unknowns, normal_equations
+from fes_pin.infer.noise import NoiseModel
+from fes_pin.infer.problem import Linearized, normal_equations
 from fes_pin.models.least_squares import least_squares
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import StateSpaceNoise
-from fes_pin.models.simulate import Simulated, Simulator
+from fes_pin.models.simulate import Simulator
 from fes_pin.models.stage import Effect
 
 SEGMENTS = 4
@@ -43,15 +42,12 @@ def predictions(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> lis
     start = simulator.start(values)
     if not model.own_unknowns():
         return [s.readings for s in simulator.run(values, start)]
-    cut = [halves(len(t)) for t in trials]
-    even, odd = (
-        simulator.run(values, _estimated(model, trials, noise, start, [half[k] for half in cut])) for k in (1, 0)
-    )
-    return [_merged(a, b, first) for a, b, (first, _) in zip(even, odd, cut, strict=True)]
-
-
-def _merged(here: Simulated, there: Simulated, first: np.ndarray) -> np.ndarray:
-    return np.where(first[:, None], here.readings, there.readings)
+    outputs = {n for t in trials for n in model.rig.outputs(t.kind)}
+    white = StateSpaceNoise({n: max(noise[n].std, 1e-12) if n in noise else math.inf for n in outputs})
+    each = [cross_fitted_unknowns(model, t, white, s) for t, s in zip(trials, start, strict=True)]
+    own = [[{**s, **one[k][1]} for s, one in zip(start, each, strict=True)] for k in (0, 1)]
+    runs = [simulator.run(values, unknowns) for unknowns in own]
+    return [np.where(one[0][0][:, None], a.readings, b.readings) for one, a, b in zip(each, *runs, strict=True)]
 
 
 def halves(count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -60,36 +56,19 @@ def halves(count: int) -> tuple[np.ndarray, np.ndarray]:
     return first, ~first
 
 
-def _estimated(
-    model: Model, trials: Sequence[Trial], noise: NoiseModel, start: Unknowns, seen: Sequence[np.ndarray]
-) -> Unknowns:
-    """The start with the effects' unknowns as the samples that are seen say, by least squares beside the initial state.
-
-    Sinusoids are estimated as well by ordinary least squares as with the right weights (Grenander 1954). An initial
-    state, which what is seen may have forgotten, is no farther from the start than `spread_of_start` has it.
-    """
-    white = {n: Noise(max(m.std, 1e-12)) for n, m in noise.items()}
-    problem = Problem(model, trials, white, ())
-    names, now = problem.unknown_names, start
-    spreads = [spread_of_start(model, t) for t in trials]
-    reaches = [{n: (s[n] - d, s[n] + d) for n, d in spread.items()} for spread, s in zip(spreads, start, strict=True)]
-    for _ in range(STEPS):
-        moved = []
-        parts = problem.linearize(model.parameters(), now)
-        for part, rows, one, reach in zip(parts, seen, now, reaches, strict=True):
-            chosen = np.resize(rows, len(part.residual))  # channel after channel
-            moved.append(_moved(part, chosen, names, one, reach))
-        now = moved
-    own = set(model.own_unknowns())
-    return [{n: (new[n] if n in own else old[n]) for n in old} for old, new in zip(start, now, strict=True)]
-
-
 def cross_fitted_unknowns(
-    model: Model, trial: Trial, noise: StateSpaceNoise
+    model: Model, trial: Trial, noise: StateSpaceNoise, start: Mapping[str, float] | None = None
 ) -> list[tuple[np.ndarray, dict[str, float]]]:
     """What effects have of a trial's own by the likelihood, and the samples, shape (n,), that it is to foretell.
 
-    Of an effect without such amplitudes that is all of the trial.
+    Of an effect without such amplitudes that is all of the trial. Where the rig is simulated the initial state is
+    estimated beside them, no farther from the start than `spread_of_start` has it: what is seen may have forgotten it.
+    Sinusoids are estimated as well by white noise as by the right one (Grenander 1954).
+
+    Parameters
+    ----------
+    start
+        Where the trial's unknowns begin, by default as its first samples say.
     """
     if not model.own_unknowns():
         return [(np.ones(len(trial), dtype=bool), {})]
@@ -99,29 +78,26 @@ def cross_fitted_unknowns(
         masked = {n: np.where(half, np.nan, trial[n]) for n in outputs}
         shown = derived_trial(trial, columns={**trial.columns, **masked})
         problem = LikelihoodProblem(model, [shown], noise, (), starts=[trial])
-        now = problem.start_unknowns()
+        (now,) = [dict(start)] if start else problem.start_unknowns()
+        spread = {n: d for n, d in spread_of_start(model, trial).items() if n in problem.unknown_names}
+        reach = {n: (now[n] - d, now[n] + d) for n, d in spread.items()}
         for _ in range(STEPS):
-            (part,) = problem.linearize(values, now)
-            now = [_moved(part, np.ones(len(part.residual), dtype=bool), problem.unknown_names, now[0])]
-        out.append((half, {n: now[0][n] for n in model.own_unknowns()}))
+            (part,) = problem.linearize(values, [now])
+            now = _moved(part, problem.unknown_names, now, reach)
+        out.append((half, {n: now[n] for n in model.own_unknowns()}))
     return out
 
 
 def _moved(
-    part: Linearized,
-    rows: np.ndarray,
-    names: Sequence[str],
-    now: dict[str, float],
-    reach: Mapping[str, tuple[float, float]] | None = None,
+    part: Linearized, names: Sequence[str], now: Mapping[str, float], reach: Mapping[str, tuple[float, float]]
 ) -> dict[str, float]:
     """A step of least squares from where unknowns are now; where some would leave their reach, the others follow."""
-    local, residual = part.local[rows], part.residual[rows]
-    step = dict(zip(names, least_squares(local, residual, rcond=1e-6), strict=True))
-    kept = {n: float(np.clip(step[n], low - now[n], high - now[n])) for n, (low, high) in (reach or {}).items()}
+    step = dict(zip(names, least_squares(part.local, part.residual, rcond=1e-6), strict=True))
+    kept = {n: float(np.clip(step[n], low - now[n], high - now[n])) for n, (low, high) in reach.items()}
     if any(kept[n] != step[n] for n in kept):
         others = [k for k, n in enumerate(names) if n not in kept]
-        left = residual - local @ [kept.get(n, 0.0) for n in names]
-        free = least_squares(local[:, others], left, rcond=1e-6)
+        left = part.residual - part.local @ [kept.get(n, 0.0) for n in names]
+        free = least_squares(part.local[:, others], left, rcond=1e-6)
         step = {**kept, **{names[k]: d for k, d in zip(others, free, strict=True)}}
     return {**now, **{n: now[n] + float(d) for n, d in step.items()}}
 
