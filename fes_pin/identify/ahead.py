@@ -1,7 +1,7 @@
-"""Errors of a model one sample ahead, over a horizon, and free: three answers to one question.
+"""Predictions of a model one sample ahead, over a horizon, and in free simulation.
 
-One sample ahead any model is right where sampling is fast; free simulation goes astray where a rig integrates or falls,
-with the best of models; over a horizon in between a model is tried for what it is used for.
+One sample ahead nearly any model is accurate where sampling is fast. A free simulation of even the best model diverges
+where a rig integrates or falls. Errors over a horizon in between test a model at the time scale of its use.
 
 A Kalman filter estimates the state from what was measured where process noise acts (`StateSpaceNoise`), and noise by
 its autoregression (`NoiseModel`) where a rig is simulated freely:
@@ -31,24 +31,24 @@ from fes_pin.models.predictor import StateSpaceNoise, masked
 from fes_pin.models.simulate import Simulator
 
 Random = StateSpaceNoise | NoiseModel
-"""What is random about a rig: in its effort and readings, or in its readings alone."""
+"""Noise of a rig: process and measurement noise, or measurement noise alone."""
 
 STRIDE = 0.25
-"""Of the horizon: how much older than asked the newest sample that a prediction uses may be."""
+"""Share of the horizon by which the newest sample that a prediction uses may be older than the horizon."""
 SEEN_AGAIN = 3
-"""A prediction goes on from all that was measured, but for what earlier ones along the same run were not shown: between
-two of them this many times as long is seen as is not. A filter that remembers less than that loses nothing."""
+"""Ratio of shown to hidden samples along a run that makes several predictions. A prediction starts from all readings
+but those that were hidden for earlier predictions of the same run. A filter with a shorter memory loses nothing."""
 
 
 def default_horizon(trials: Sequence[Trial]) -> float:
-    """`HORIZON_S`, or a tenth of the shortest trial; all of the longest where every motion is imposed."""
+    """Return `HORIZON_S` or a tenth of the shortest trial; the longest trial where every motion is imposed."""
     if all(t.kind == IMPOSED for t in trials):
         return max(t.duration for t in trials)
     return min(HORIZON_S, 0.1 * min(t.duration for t in trials))
 
 
 def own_noise(fitted: Fit) -> NoiseModel:
-    """The noise that the residuals of a fit show: what it gets wrong foretells itself as well."""
+    """Return the autoregressive noise of a fit's residuals: errors of the model are correlated as well."""
     try:
         return noise_of(fitted)
     except (FloatingPointError, np.linalg.LinAlgError):  # a fit that does not stay finite
@@ -56,10 +56,10 @@ def own_noise(fitted: Fit) -> NoiseModel:
 
 
 def forecast(residual: np.ndarray, noise: Noise, dt: float, ahead_s: float) -> np.ndarray:
-    """What autoregressive noise foretells of a residual, shape (n,), from what was seen `ahead_s` before or earlier.
+    """Return the prediction of a residual by autoregressive noise, shape (n,), from samples `ahead_s` older or more.
 
-    With `ahead_s` zero, one sample ahead; of noise that is known at a longer step, one such step. Such a step is
-    foretold as a whole: its first sample, too, uses nothing newer than asked.
+    With `ahead_s` zero it is one sample ahead; for noise that is known at a longer step, one such step. Such a step is
+    predicted as a whole: its first sample, too, uses no newer sample.
     """
     every = thinning(dt, noise.step_s)
     seen, order = thin(residual, every), len(noise.ar)
@@ -72,16 +72,16 @@ def forecast(residual: np.ndarray, noise: Noise, dt: float, ahead_s: float) -> n
 
 
 def predict_ahead(model: Model, trial: Trial, random: Random, horizon_s: float) -> dict[str, np.ndarray]:
-    """What a model foretells of each sample of a trial from what was measured `horizon_s` before it or earlier.
+    """Predict each sample of a trial from readings that are older by `horizon_s` or more.
 
     Parameters
     ----------
     trial
-        With its outputs; what it has not is not foretold.
+        A trial with outputs; outputs that it does not have are not predicted.
     random
-        What is random about the rig: see `identify.stored.load_random`.
+        Noise of the rig: see `identify.stored.load_random`.
     horizon_s
-        s.
+        The horizon, s.
 
     Returns
     -------
@@ -91,7 +91,7 @@ def predict_ahead(model: Model, trial: Trial, random: Random, horizon_s: float) 
     Raises
     ------
     InputError
-        If the trial has no output that the model foretells.
+        If the trial has no output that the model predicts.
     """
     outputs = [n for n in model.rig.outputs(trial.kind) if n in trial.columns]
     if not outputs:
@@ -111,9 +111,9 @@ def predict_ahead(model: Model, trial: Trial, random: Random, horizon_s: float) 
 
 
 def one_step(model: Model, trial: Trial, noise: StateSpaceNoise) -> dict[str, np.ndarray]:
-    """Measured minus foretold one sample ahead, shape (n,), by output column.
+    """Return innovations, measured minus predicted one sample ahead, shape (n,), by output column.
 
-    It is 0 where nothing was measured, and at the first sample, before which nothing was.
+    They are 0 where nothing was measured, and at the first sample.
     """
     problem = LikelihoodProblem(model, [trial], noise, ())
     judged = model.rig.follows(trial) & (np.arange(len(trial)) > 0)
@@ -127,23 +127,23 @@ def one_step(model: Model, trial: Trial, noise: StateSpaceNoise) -> dict[str, np
 
 
 def over_horizon(model: Model, trial: Trial, noise: StateSpaceNoise, horizon_s: float) -> dict[str, np.ndarray]:
-    """The values of `forecasts`, shape (n,), by output column that the trial has."""
+    """Return the values of `forecasts`, shape (n,), by output column that the trial has."""
     return {n: one.values for n, one in forecasts(model, trial, noise, horizon_s).items()}
 
 
 def forecasts(model: Model, trial: Trial, noise: StateSpaceNoise, horizon_s: float) -> dict[str, PredictedOutput]:
-    """What a model foretells of each sample from what was measured up to `horizon_s` before it.
+    """Predict each sample of a trial from readings up to `horizon_s` before it.
 
     Parameters
     ----------
     horizon_s
-        s; the newest sample that is used may be older by a quarter of it. Before that much time has passed, predictions
-        begin at the first sample.
+        The horizon, s; the newest sample that is used may be older by a quarter of it. Until that time has passed,
+        predictions start from the first sample.
 
     Returns
     -------
     dict of str to PredictedOutput
-        By output column that the trial has. The first sample, before which nothing was measured, is as measured.
+        By output column that the trial has. The first sample is as measured, since there is none before it.
     """
     ahead, stride = reach_of(trial, horizon_s)
     outputs = tuple(n for n in model.rig.outputs(trial.kind) if n in trial.columns)
@@ -165,18 +165,18 @@ def forecasts(model: Model, trial: Trial, noise: StateSpaceNoise, horizon_s: flo
 
 
 def reach_of(trial: Trial, horizon_s: float) -> tuple[int, int]:
-    """Samples that a horizon is long, and by how many more the newest that is used may be older."""
+    """Return the samples of a horizon, and the samples by which the newest one that is used may be older."""
     ahead = max(1, round(horizon_s / trial.dt))
     return ahead, max(1, round(STRIDE * ahead))
 
 
 def _lanes(ahead: int, stride: int) -> int:
-    """Runs that share the predictions of a trial, so that each sees enough between two of them."""
+    """Return the number of runs that share the predictions of a trial, so that each sees enough between two of them."""
     return math.ceil((1 + SEEN_AGAIN) * (ahead + stride) / stride)
 
 
 def falls(model: Model, trials: Sequence[Trial]) -> bool:
-    """True if a free simulation enlarges an error of its beginning by more than `RUNAWAY`: the rig falls by itself."""
+    """Return whether a free simulation enlarges an initial error by more than `RUNAWAY`: the rig falls by itself."""
     unknowns = tuple(dict.fromkeys(n for t in trials for n in model.rig.unknowns(t.kind)))
     if not unknowns:
         return False

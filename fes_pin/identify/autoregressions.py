@@ -1,8 +1,8 @@
-"""Measurement noise in what a filter leaves of readings: its autoregression and its variance; `models.autoregression`.
+"""Autoregression and variance of measurement noise from the innovations of a filter; see `models.autoregression`.
 
-All trials together give the coefficients of every order (`infer.noise.likeliest_autoregression`), without any share
-that is taken for white: coefficients that took 0.3 % of the noise for white left 2 to 9 % more of noise that lasts than
-need be, and a random effort that nothing exerted made up for it.
+All trials together give the coefficients of every order (`infer.noise.likeliest_autoregression`). No white share is
+assumed: with a white share of 0.3 % the innovations of coloured noise were 2 to 9 % larger, and the fit made up for
+that by process noise that did not exist.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from fes_pin.infer.noise import SAMPLES_EACH, likeliest_autoregression
 from fes_pin.models.predictions import PredictedTrial
 
 MOST = 8
-"""Highest order. A sensor's noise is white beside a few coefficients; the tens that a random torque's would need
-(`infer.noise.ORDERS`) stand for a random effort, which is known by itself here. They would learn a hum, too, whose
-phase is each trial's own, before it is looked for; beside these few it is found (`tests/driven/test_stimulated.py`)."""
+"""Highest order. A few coefficients whiten the noise of a sensor. Tens of coefficients (`infer.noise.ORDERS`) would
+also model process noise, which is a part of the model here, and a hum with a phase of each trial's own, which is a
+cause of the library and is found with these few (`tests/driven/test_stimulated.py`)."""
 
 
 def autoregressions(run: Sequence[PredictedTrial], orders: Mapping[str, Sequence[int]]) -> dict[str, tuple[float, ...]]:
-    """That of each output that is measured in some trial, of one of its orders."""
+    """Return the likeliest autoregression of each measured output, of one of its orders."""
     out = {}
     for name, own in orders.items():
         left = [_left(one, name) for one in run if name in one.outputs]
@@ -33,9 +33,9 @@ def autoregressions(run: Sequence[PredictedTrial], orders: Mapping[str, Sequence
 
 
 def residual_powers(run: Sequence[PredictedTrial]) -> dict[str, float]:
-    """By output, the factor on the variance of its noise that makes what is left of it likeliest.
+    """Return, by output, the factor on the variance of its noise that maximises the likelihood of its innovations.
 
-    A count that was read n times in a row is one reading: its errors count as one.
+    A count that was read n times in a row is one reading, with one error.
     """
     out = {}
     for name in dict.fromkeys(n for one in run for n in one.outputs):
@@ -51,7 +51,7 @@ def residual_powers(run: Sequence[PredictedTrial]) -> dict[str, float]:
 
 
 def _left(one: PredictedTrial, name: str) -> np.ndarray:
-    """Innovations of an output over their deviations, shape (n,); 0 where none was seen."""
+    """Return the standardised innovations of an output, shape (n,); 0 where nothing was measured."""
     k = one.outputs.index(name)
     with np.errstate(all="ignore"):
         return np.where(one.seen[:, k], one.values[:, k] / np.sqrt(one.variances[:, k]), 0.0)

@@ -1,15 +1,14 @@
-"""How long the noise of a reading lasts: over samples, where a record was smoothed or interpolated.
+"""Correlation time of measurement noise: longer than a sample where a record was smoothed or interpolated.
 
-The filter takes the noise of each reading for new. Noise that lasts it follows as it does motion, by a random effort
-that nothing exerts, and inertia is what that effort makes of it. Readings as far apart as their noise is new have
-innovations that are white; and every second of them tells of the same noise, the same random effort and the same rig as
-all do. Where they do not, readings are taken twice as far apart.
+The filter assumes that the noise of each reading is independent. It would follow correlated noise as it follows motion,
+by process noise that does not exist, and inertia would be biased. Readings that are a correlation time apart have white
+innovations, and every second of them gives the same noise and the same model as all. Where that does not hold, the
+spacing of readings is doubled.
 
 Innovations are white if they correlate little with the next two. A model that misses a cause brings a correlation of
 0.02 at the steps of a recording; noise that was averaged over ten samples brings 0.5
-(`tests/driven/test_correlation_time.py`).
-A correlation of `SMALL_SHARE` is worth its square in twice the log-likelihood of a reading: by no more may every second
-reading fit better by itself.
+(`tests/driven/test_correlation_time.py`). A correlation of `SMALL_SHARE` changes twice the log-likelihood of a reading
+by its square: every second reading by itself may fit better by no more.
 """
 
 from __future__ import annotations
@@ -28,22 +27,22 @@ from fes_pin.models.predictor import StateSpaceNoise
 from fes_pin.models.rigs.base import Rig
 
 FEWEST = 30
-"""Readings that every trial keeps."""
+"""Least number of readings that every trial keeps."""
 
 
 def with_new_noise(trials: Sequence[Trial], nominal: Callable[[float], LikelihoodFit]) -> LikelihoodFit:
-    """The nominal fit with readings as near to each other as their noise is new.
+    """Return the nominal fit at the smallest spacing of readings at which measurement noise is white.
 
     Parameters
     ----------
     nominal
-        The nominal model's fit where the noise of a reading is taken to last so long, s.
+        Returns the nominal fit at a correlation time, s.
 
     Returns
     -------
     Fit
-        Its `noise.correlation_s` is the correlation time; 0 where the noise of every sample is new. Where it is new at
-        no spacing, the fit whose innovations correlate least with the next.
+        Its `noise.correlation_s` is the correlation time; 0 where the noise of all samples is white. Where it is white
+        at no spacing, the fit whose innovations correlate least with the next.
     """
     now = nominal(0.0)
     if not all(now.model.rig.unknowns(t.kind) for t in trials):  # a force may be as smooth as its reading
@@ -60,7 +59,7 @@ def with_new_noise(trials: Sequence[Trial], nominal: Callable[[float], Likelihoo
 
 
 def _shared(fitted: LikelihoodFit) -> float:
-    """The larger correlation of an innovation with one of the next two; trials weigh as they are long."""
+    """Return the larger correlation of an innovation with one of the next two; trials weigh by their length."""
     residuals = [p.residual for p in fitted.parts]
     power = sum(float(r @ r) for r in residuals)
     along = [abs(sum(float(r[k:] @ r[:-k]) for r in residuals)) for k in (1, 2)]
@@ -68,7 +67,7 @@ def _shared(fitted: LikelihoodFit) -> float:
 
 
 def _other(fitted: LikelihoodFit, sparser: LikelihoodFit) -> float:
-    """By how much less likely sparser readings are, each, under a fit than under their own."""
+    """Return by how much less likely each sparser reading is under a fit than under the fit of these readings."""
     problem = LikelihoodProblem(sparser.model, sparser.trials, sparser.noise)
     as_it_was = replace(fitted.noise, correlation_s=sparser.noise.correlation_s)
     lost = problem.cost(fitted.values, fitted.unknowns, as_it_was) - sparser.sse
@@ -79,10 +78,10 @@ __all__ = ["with_new_noise"]
 
 
 def words_of_reading(noise: NoiseModel, rig: Rig, trials: Sequence[Trial]) -> tuple[str, ...]:
-    """What is to be said of a reading that hunts, or whose noise lasts over samples.
+    """Return warnings about a reading that hunts between counts, or whose noise is correlated over samples.
 
-    Neighbours that stand on one count err alike; else a record was smoothed. Readings that hunt are followed, and not
-    judged (`hunts`).
+    Noise is correlated where neighbours share a count, or where a record was smoothed. Readings that hunt are followed
+    by the filter and do not enter the likelihood (`hunts`).
     """
     name = rig.output(trials[0].kind)
     columns = [t[name] for t in trials if name in t.columns]
@@ -91,10 +90,10 @@ def words_of_reading(noise: NoiseModel, rig: Rig, trials: Sequence[Trial]) -> tu
     hunting = sum(int(hunts(c).sum()) for c in columns) / max(sum(map(len, columns)), 1)
     if hunting > SMALL_SHARE:
         share = f"{100 * hunting:.0f} % of its samples"
-        said.append(f"{name} goes to and fro between two counts in {share}: these are followed, and judge nothing")
+        said.append(f"{name} alternates between two counts in {share}: these do not enter the likelihood")
     if isinstance(noise, StateSpaceNoise) and noise.correlation_s:
         step = round(noise.correlation_s / trials[0].dt)
         read = f"is read in counts of {count:.2g}" if count else "was smoothed or interpolated before it was stored"
-        words = f"its noise lasts {noise.correlation_s:.2g} s, and one sample in {step} counts as a reading"
+        words = f"its noise is correlated over {noise.correlation_s:.2g} s: one sample in {step} counts as a reading"
         said.append(f"{name} {read}: {words}")
     return tuple(said)

@@ -1,8 +1,9 @@
-"""With how much noise an effort was recorded.
+"""Noise with which an effort was recorded.
 
-A measured current has noise of its own, which moves nothing. A filter takes it for effort: a rig that a controller
-holds seems to be moved less than by what is recorded, as dry friction would have it. What a controller answers tells
-the noise from what acted (`data.answered`); how much of it there is the likelihood says, beside a model.
+A measured current has noise of its own, which moves nothing. A filter takes it for effort: a rig in closed loop then
+seems to move less than the recorded effort would move it, as if dry friction held it. The effort that the controller
+computes from its reading separates the noise from the effort that acted (`data.answered`); the likelihood of a model
+estimates how much noise there is.
 """
 
 from __future__ import annotations
@@ -19,24 +20,24 @@ from fes_pin.infer.levels import CERTAIN_GAIN, EFFORT_NOISE_SHARE
 from fes_pin.workers import in_parallel
 
 TRIED = (0.1, 0.25, 0.5, 0.75)
-"""Shares of the samples whose answer leaves less than a noise that is tried: noise is the same everywhere, and what it
-is not foretold by is not, so that where an answer is known at all it leaves little else."""
+"""Quantiles of the residual between recorded and computed effort that are tried as the noise. Noise has the same size
+everywhere, while other errors of the computed effort do not: they are small in a share of the samples."""
 
 Prepared = Callable[[Sequence[Trial]], Sequence[Trial]]
-"""What a search makes of recorded trials before it fits them."""
+"""Preparation of recorded trials before a search fits them."""
 
 
 def effort_noise_of(
     fitted: LikelihoodFit, trials: Sequence[Trial], answers: Sequence[ControllerAnswer], prepared: Prepared
 ) -> float:
-    """Standard deviation of the noise of an effort, in its unit; 0 where nothing speaks for one.
+    """Return the standard deviation of the noise of an effort, in its unit; 0 where the likelihood supports none.
 
     Parameters
     ----------
     fitted
-        By the likelihood, to what `prepared` makes of the trials.
+        A fit by the likelihood to the prepared trials.
     trials, answers
-        As recorded, and what their efforts answer.
+        Trials as recorded, and the controllers that their efforts follow.
     """
     left = np.concatenate([a.left_std for a in answers])
     tried = [0.0, *(float(v) for v in np.unique(np.quantile(left, TRIED)) if v > _least(fitted, trials))]
@@ -48,18 +49,16 @@ def effort_noise_of(
 
 
 def _least(fitted: LikelihoodFit, trials: Sequence[Trial]) -> float:
-    """The least noise that is anything beside the random effort of a fit, in the effort's unit."""
+    """Return the least noise that matters against the process noise of a fit, in the effort's unit."""
     std, time = (part.get("effort", 0.0) for part in (fitted.noise.std, fitted.noise.time))
     return float(np.sqrt(EFFORT_NOISE_SHARE * 2.0 * std**2 * time / min(t.dt for t in trials)))
 
 
 def quieted(trials: Sequence[Trial], answers: Sequence[ControllerAnswer], noise: float) -> list[Trial]:
-    """The trials without so much noise of their efforts."""
+    """Return the trials with noise of that size removed from their efforts."""
     return [quiet(t, a, noise) for t, a in zip(trials, answers, strict=True)]
 
 
 def words_of_noise(noise: float, unit: str) -> str:
-    """What is to be said of efforts whose noise was taken out."""
-    return (
-        f"the effort was recorded with noise of {noise:.2g} {unit}, which was taken out where the readings foretell it"
-    )
+    """Return a warning about efforts from which noise was removed."""
+    return f"the effort was recorded with noise of {noise:.2g} {unit}: it was removed where readings predict the effort"

@@ -1,33 +1,33 @@
-"""When recorded efforts acted, and when readings were taken: what no log says to less than its rows.
+"""Timing of recorded efforts and readings, which a log resolves no finer than its rows.
 
-A log that asks a controller less often than it works holds an effort for as long as a row lasts, and the rig seems to
-answer before it is driven: by half a row where rows are regular, by one and more where they are not. The effort between
-rows is in none of them; as far as it followed what is smooth, a spline through the rows gives it. The log does not say
-either when within its row an effort that answers the reading begins to act; it is at most half a row later than the
-reading, for what is later is a lag. The likelihood says how late an effort is, in the model that was found.
+A log that samples a controller less often than it works holds an effort for a row, so that the rig seems to respond
+before it is driven: by half a row where rows are regular, by one row or more where they are not. A spline through the
+rows estimates the effort between them as far as it is smooth. Nor does the log say when within its row an effort that
+follows the reading begins to act. It is at most half a row later than the reading; what is later is a lag of the rig.
+The likelihood of the model that was found estimates the delay of the efforts.
 
-**Efforts that answer the readings that they predict.** An effort that is said to have acted before it was written down
-is one that a controller asked for when it had read what the effort is now said to have caused. With the readings y and
-the efforts u of all rows,
+**Efforts that follow the readings that they predict.** An effort that is moved to an earlier time was computed by the
+controller from readings that the moved effort is then said to have caused. With the readings y and the efforts u of all
+rows,
 
     y = A + H u + innovations,   u = B + G y,
 
-readings and efforts have the density of the innovations times |det(1 - H G)|. Where causes come before effects that is
-1. Where efforts are moved, H has parts on its diagonal and above, and to first order in those above
+readings and efforts have the density of the innovations times |det(1 - H G)|. That determinant is 1 where causes come
+before effects. Where efforts are moved, H has parts on its diagonal and above, and to first order in those above
 
     cost = -2 sum_k log |1 - sum_i H_(k-i, k) G_(k, k-i)|,   i = 0, 1
 
-is added to twice the negative log-likelihood of the innovations. Without it, what answers a reading to come enlarges
-the innovations, and efforts are estimated as less late than they are. With it they are estimated as later: that between
-its rows a log holds nothing of what answers the noise of a reading is not in it. The truth lies between.
+is added to twice the negative log-likelihood of the innovations. Without it, efforts that follow a later reading
+enlarge the innovations, and the delay is estimated as too small. With it, the delay is estimated as too large, since a
+log holds nothing of the controller's response to noise between its rows. The truth lies between the two estimates.
 
-**Time of a reading.** A controller reads, and asks for an effort some time later; a simulation in steps lets it act
-before. With d the time by which a reading is early, and v the velocity of what is read,
+**Time of a reading.** A controller applies an effort some time after it reads, while a simulation in steps applies it
+at the reading. With d the time by which a reading is early, and v the velocity of the quantity that is read,
 
-    y = h(x) + d v,   |d| <= row / 2, of deviation row / sqrt(12) before anything is measured.
+    y = h(x) + d v,   |d| <= row / 2, with the prior standard deviation row / sqrt(12).
 
-The data determine d, but an error of form, as of friction by bristles, looks like one. So estimates stay where d is 0,
-and intervals hold the mean square of what d moves them by, by the data and by what was known before.
+The data determine d, but an error of form, as of friction by bristles, has a similar effect. Estimates are therefore
+those at d = 0, and intervals include the mean square of their change by d, from the data and from the prior.
 
 Source: Koopmans, Rubin and Leipnik, Measuring the equation systems of dynamic economics, in Statistical Inference in
 Dynamic Economic Models, Cowles Commission Monograph 10, Wiley, 1950.
@@ -58,26 +58,26 @@ from fes_pin.models.stage import Effect, Stage
 from fes_pin.workers import in_parallel
 
 SPACING = 40
-"""Rows from one pulse by which H is measured to the next: by then the response to the last one is smooth."""
+"""Rows between the pulses with which H is measured: by then the response to the last pulse is smooth."""
 PULSE = 1e-3
-"""Of an effort's deviation: a pulse so small moves a rig in proportion."""
+"""Size of a pulse, in standard deviations of the effort: the response of a rig is linear in so small a pulse."""
 STEP = 0.05
-"""Of a row: half the difference that the slope of the cost is. Readings are smooth over a row."""
+"""Step of the difference that gives the slope of the cost, as a share of a row: readings are smooth over a row."""
 
 _Way = tuple[Callable[[float], Log], float]
 
 
 @dataclass(frozen=True)
 class Lateness:
-    """What a log says of when efforts acted, and the cost of trials with efforts when they did.
+    """The delay of a log's efforts, and the cost of trials with efforts at the estimated times.
 
     Attributes
     ----------
     log
-        Half way between when they acted by the innovations alone, and by these and what the efforts answer: one is too
-        early and the other too late.
+        The log with the mean of two estimates: by the innovations alone, which is too small, and by these together with
+        the feedback of efforts, which is too large.
     at_most
-        The latter.
+        The log with the larger estimate.
     """
 
     log: Log
@@ -86,17 +86,16 @@ class Lateness:
 
 
 def lateness_of(fitted: LikelihoodFit, row_s: float, as_logged: bool = False) -> Lateness | None:
-    """How late the efforts of a fit's trials are; None where they are in time.
+    """Return the delay with which the efforts of a fit's trials were recorded; None where there is none.
 
     Parameters
     ----------
     fitted
-        Of a rig that an effort drives.
+        A fit of a rig that an effort drives.
     row_s
-        Time step of the log.
+        Time step of the log, s.
     as_logged
-        Whether rows are as they were logged, and no averages: then efforts may also act later than written, or between
-        rows.
+        Whether rows are as logged and not averaged: efforts may then also act later than recorded, or between rows.
     """
     tried: dict[Log, LikelihoodFit] = {}
 
@@ -129,32 +128,34 @@ _WAYS: tuple[_Way, ...] = (
     (lambda early_s: Log(effort_late_s=-early_s), MOST_EARLY_ROWS),
     (lambda late_s: Log(effort_over_s=2.0 * late_s), MOST_EARLY_ROWS),
 )
-"""How efforts can be late by some time, and by how many rows at most: a controller that works often is late by half."""
+"""Ways in which efforts can be recorded late, each with its limit in rows: half a row for a fast controller."""
 
 
 def words_of_lateness(log: Log) -> str:
-    """What is reported of efforts that were moved, or read between rows."""
+    """Return a warning about efforts that were moved, or interpolated between rows."""
     if log.effort_over_s:
         return (
-            f"the effort was written down less often than the controller acted, and was read between the rows, over "
+            f"the effort was recorded less often than the controller acted, and was interpolated between rows, over "
             f"{1e3 * log.effort_over_s:.2g} ms from each"
         )
     late_s = log.effort_late_s
     when = "after" if late_s > 0.0 else "before"
-    return f"the effort was written down {1e3 * abs(late_s):.2g} ms {when} it acted, and was moved to when it did"
+    return f"the effort was recorded {1e3 * abs(late_s):.2g} ms {when} it acted, and was moved to that time"
 
 
 def cost_of_answers(fitted: LikelihoodFit, logged: Sequence[Trial], log: Log) -> float:
-    """What is added to a fit's cost because its efforts answer the readings predicted from them; 0 of those in time.
+    """Return the part of a fit's cost that is due to efforts which follow the readings that they predict.
+
+    It is 0 for efforts that were not moved.
 
     Parameters
     ----------
     fitted
-        To trials whose efforts were moved.
+        A fit to trials whose efforts were moved.
     logged
-        The same trials as they were logged.
+        The same trials as logged.
     log
-        How they were.
+        The timing that was applied to them.
     """
     if log.effort_late_s <= 0.0 and log.effort_over_s <= 0.0:
         return 0.0
@@ -179,7 +180,7 @@ def cost_of_answers(fitted: LikelihoodFit, logged: Sequence[Trial], log: Log) ->
 
 
 def _pulse_rows(trial: Trial, correlation_s: float) -> np.ndarray:
-    """Where the pulses of a trial are: at readings that count."""
+    """Return the rows of the pulses of a trial: at readings that enter the likelihood."""
     news = np.flatnonzero(are_news(trial, correlation_s))
     return news[(news >= SPACING) & (np.diff(news // SPACING, prepend=-1) > 0)]
 
@@ -191,10 +192,10 @@ def _pulsed(trial: Trial, at: np.ndarray, size: float) -> Trial:
 
 
 def _loop(change: np.ndarray, at: np.ndarray, gains: np.ndarray) -> np.ndarray:
-    """What an effort asks for itself, by way of a reading, from the change of predictions by its pulses.
+    """Return the loop gain of an effort, through the reading to itself, from the change of predictions by its pulses.
 
-    The response to earlier pulses goes on as a parabola, from the last three rows that an effort which is held and
-    moved leaves alone; a spline moves the efforts before them by some hundredths of the pulse.
+    The response to earlier pulses is extrapolated by a parabola through the last three rows that a held and moved
+    effort does not change; a spline changes the efforts before them by some hundredths of the pulse.
     """
     last = [change[at - k] for k in (2, 3, 4)]
     now = change[at] - np.tensordot([6.0, -8.0, 3.0], last, 1)
@@ -204,7 +205,7 @@ def _loop(change: np.ndarray, at: np.ndarray, gains: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class EarlyReading(Effect):
-    """A reading that is early: of no library, as it is never reported."""
+    """A reading that is early. It is in no library, as it is never reported."""
 
     early_s: float = parameter(0.0, unit="s", null=0.0)
 
@@ -218,11 +219,10 @@ EARLY = "early_reading.early_s"
 
 
 def with_timing_of_readings(fitted: LikelihoodFit, row_s: float) -> LikelihoodFit:
-    """A fit of a joint that an effort drives, with intervals that hold for any time of a reading within its row.
+    """Return a fit of a driven joint with intervals that allow for any time of a reading within its row.
 
-    What the intervals hold beyond how scores scatter they still hold. The fit is as it was where nothing that is read
-    is a place with a velocity `v`, as of a rig of one's own, or where a reading that is a little earlier cannot be
-    predicted.
+    Parts of the intervals beyond the sandwich estimator are kept. The fit is returned unchanged where no output is a
+    position with a velocity `v`, as in a rig of one's own, or where an earlier reading cannot be predicted.
 
     Parameters
     ----------
@@ -246,25 +246,25 @@ def with_timing_of_readings(fitted: LikelihoodFit, row_s: float) -> LikelihoodFi
 
 
 def _beyond_scatter(fitted: LikelihoodFit) -> np.ndarray:
-    """What the covariance of a fit has more than how its scores scatter, shape (free, free); 0 of parameters that have
-    less."""
-    with np.errstate(invalid="ignore"):  # what is not identified
+    """Return the excess of a fit's covariance over the sandwich estimator, shape (free, free); 0 of parameters without
+    one."""
+    with np.errstate(invalid="ignore"):  # parameters that are not identifiable
         more = fitted.covariance - with_honest_intervals(fitted).covariance
     kept = np.nan_to_num(np.diag(more)) > 0.0
     return np.where(np.isfinite(more) & np.outer(kept, kept), more, 0.0)
 
 
 def _linearized(fitted: LikelihoodFit, early_s: float) -> Sequence[Linearized]:
-    """The trials of a fit, with readings that are so early, and sensitivities to that behind those of the fit."""
+    """Return the trials of a fit with early readings, and sensitivities to that time after those of the fit."""
     free = (*fitted.free, EARLY)
     problem = LikelihoodProblem(fitted.model + EarlyReading(), fitted.trials, fitted.noise, free)
     return problem.linearize({**fitted.values, EARLY: early_s}, fitted.unknowns)
 
 
 def with_lateness(fitted: LikelihoodFit, at_most: LikelihoodFit) -> LikelihoodFit:
-    """A fit with intervals that hold by how much its efforts may be later or earlier: up to those of another fit.
+    """Return a fit with intervals that allow for efforts as late as in another fit, and as much earlier.
 
-    Anything between has the same probability, and the mean square of an estimate's error is a third of the largest.
+    The delay is taken as uniform between: the mean square of an estimate's error is a third of the largest.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The measure of a model's error, E, and what it is taken over.
+"""The measure of a model's error, E, and the predictions and data that it is computed on.
 
     E = 100 sum (measured - predicted)^2 / sum (measured - mean of its trial)^2        eq. (2) of the paper, percent
 
@@ -6,12 +6,12 @@ The sums run over all trials and output columns, each column in units of the sta
 perfect model, 100 % no better than the mean. A prediction is
 
 - `free`: from the inputs alone, from a trial's start on;
-- over a `horizon`: each sample from what was measured up to so many seconds before it;
-- `one_step`: each sample from what was measured up to the sample before it.
+- over a `horizon`: each sample from the readings up to that time before it;
+- `one_step`: each sample from the readings before it.
 
-Trials are those that were fitted (`fit`), or took no part in the fit (`held_out`). In records `fit` and `held_out` are
-free; `one_step`, `horizon` and `free` are on trials held out where there are such, else on the fitted ones. Of a rig
-that a recorded effort drives the three are those of its first output.
+Trials are fitted (`fit`) or held out (`held_out`). In records `fit` and `held_out` are free; `one_step`, `horizon` and
+`free` are on held-out trials where there are any, else on the fitted ones. For a driven rig these three are those of
+its first output.
 """
 
 from __future__ import annotations
@@ -21,6 +21,6 @@ E_WORDS = (
     "paper): 0 % is a perfect model, 100 % no better than the mean."
 )
 FREE, ONE_STEP = "free simulations", "predictions one sample ahead"
-"""What a prediction is called in tables."""
+"""Names of predictions in tables."""
 MEASURES = ("fit", "held_out", "horizon")
-"""Errors that every record has of both models, and tables of many studies show."""
+"""Errors of both models that every record has and that tables of many studies show."""

@@ -1,4 +1,4 @@
-"""Whether what drives a rig answers what is read of it."""
+"""Test for feedback: whether the input of a rig follows its reading."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from fes_pin.infer.levels import ANSWERED, CERTAIN_LEVEL
 from fes_pin.models.rigs.base import Rig
 
 SHORTEST = 20
-"""Samples for each lag below which nothing is tested."""
+"""Least number of samples for each lag; shorter trials are not tested."""
 LAGS = 4
-"""Samples that a controller's answer is sought in: it acts in the sample in which it reads, or a few later."""
+"""Lags of the regression, in samples: a controller acts in the sample in which it reads, or a few later."""
 JUMP = 5.0
-"""Deviations beyond which a second difference is a jump, not noise."""
+"""Standard deviations above which a second difference is a jump, not noise."""
 
 
 def is_fed_back(rig: Rig, trials: Sequence[Trial]) -> bool:
-    """True if the effort of a rig answers its reading.
+    """Return whether the effort of a rig follows its reading, by Granger's test of causality.
 
-    Granger's question, asked of the second differences u'' of the effort and y'' of the reading, mostly noise: are the
-    last readings any help to foretell the effort, beside the last efforts? Trials are combined as Fisher does.
+    The test asks whether the last readings improve the prediction of the effort from the last efforts. It uses the
+    second differences u'' of the effort and y'' of the reading, which are mostly noise:
 
         u''_t = a_1 u''_(t-1) + ... + b_0 y''_t + b_1 y''_(t-1) + ...
 
-    An effort that was chosen beforehand knows nothing of the noise.
+    An effort that was chosen beforehand does not depend on the noise. Trials are combined by Fisher's method.
 
     Source: Granger, Investigating causal relations by econometric models and cross-spectral methods, Econometrica 37
     (1969); Fisher, Statistical Methods for Research Workers, 1932, section 21.1.
@@ -38,10 +38,10 @@ def is_fed_back(rig: Rig, trials: Sequence[Trial]) -> bool:
 
 
 def is_stimulus_fed_back(rig: Rig, trials: Sequence[Trial]) -> bool:
-    """The same of a stimulus.
+    """Return whether the stimulus of a rig follows its reading, by the same test.
 
-    One that was chosen beforehand follows the motion that it made: readings foretell a little of it, and more of a
-    controller's.
+    Readings predict a little even of a stimulus that was chosen beforehand, as motion follows it, and more of that of a
+    controller.
     """
     free = [t for t in trials if t.kind != IMPOSED and not rig.is_driven([t])]
     return _certainly(p if share > ANSWERED else 1.0 for p, share in _answers(rig, free))
@@ -60,7 +60,7 @@ def _answers(rig: Rig, trials: Sequence[Trial]) -> Iterator[tuple[float, float]]
 
 
 def _when_given(drive: np.ndarray, reading: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Both at the samples in which the input may change: a pulse width is held until the next pulse."""
+    """Return input and reading at the samples in which the input may change: pulse widths are held between pulses."""
     changes = np.flatnonzero(np.diff(drive) != 0.0) + 1
     step = int(np.gcd.reduce(np.diff(changes))) if len(changes) > 1 else 1
     begin = int(changes[0]) % step if len(changes) else 0
@@ -68,7 +68,7 @@ def _when_given(drive: np.ndarray, reading: np.ndarray) -> tuple[np.ndarray, np.
 
 
 def _granger(effort: np.ndarray, reading: np.ndarray) -> tuple[float, float]:
-    """p-value of the readings' part in what foretells the effort, and its share of what past efforts do not."""
+    """Return the p-value of the readings as predictors of the effort, and their share of its unpredicted variance."""
     u, y = (_without_jumps(np.diff(x, 2)) for x in (effort, reading))
     n = len(u) - LAGS
     if n < SHORTEST * LAGS or not u.any() or not y.any():
@@ -83,9 +83,9 @@ def _granger(effort: np.ndarray, reading: np.ndarray) -> tuple[float, float]:
 
 
 def _without_jumps(x: np.ndarray) -> np.ndarray:
-    """Second differences cut at `JUMP` of their robust deviations: a wanted position that jumps is no noise."""
+    """Return second differences clipped at `JUMP` robust standard deviations: a jump of the reference is no noise."""
     x = np.where(np.isfinite(x), x, 0.0)
-    size = np.abs(x[x != 0.0])  # an encoder at rest, or a sample that is held, says nothing of the noise
+    size = np.abs(x[x != 0.0])  # an encoder at rest, or a held sample, has no noise
     most = JUMP * 1.4826 * float(np.median(size)) if len(size) else 0.0
     return np.clip(x, -most, most)
 

@@ -35,27 +35,27 @@ if TYPE_CHECKING:
     import pandas
 
 GROWTH = (1 / 8, 1 / 4, 1 / 2)
-"""Shares of every trial that a fit from afar begins with, one after another."""
+"""Shares of every trial to which a fit from afar is made, one after another."""
 SHORTEST = 50
-"""Samples of a trial that are worth a fit, at least."""
+"""Least number of samples of a trial that is fitted by itself."""
 GROSS = 10.0
 """Reduced chi-square from which a fit may have ended far from the optimum."""
 
 
 @dataclass(frozen=True, kw_only=True, repr=False, eq=False)
 class Fit(Optimum, Saveable):
-    """A model with fitted parameters; it can prove its own quality.
+    """A model with fitted parameters, their covariance, and tests of its optimality.
 
     Attributes
     ----------
     model
-        With the fitted values.
+        The model with the fitted values.
     trials
-        What it was fitted to.
+        The trials that it was fitted to.
     noise
-        By output column, as assumed in the fit; of a fit by the likelihood its process noise as well.
+        Noise by output column, as assumed in the fit; for a fit by the likelihood, its process noise as well.
     bounds
-        By name, where somebody asked for narrower ones than the parameters have.
+        Bounds by name, where narrower ones were asked for than the parameters have.
     free, parameters, covariance, at_bound, sse, converged, gradient_norm, unknowns, parts, together
         Of every `Optimum`; read-only.
     """
@@ -75,7 +75,7 @@ class Fit(Optimum, Saveable):
                 array.setflags(write=False)
 
     def place(self, name: str) -> int:
-        """Where a fitted parameter stands in `free` and `covariance`.
+        """Return the place of a fitted parameter in `free` and `covariance`.
 
         Raises
         ------
@@ -87,7 +87,7 @@ class Fit(Optimum, Saveable):
         return super().place(name)
 
     def interval(self, name: str, method: str = "wald") -> tuple[float, float]:
-        """95 % interval of a fitted parameter, cut at its bounds; one-sided, by profile, of one that is at its bound.
+        """Return the 95 % interval of a fitted parameter, cut at its bounds; one-sided, by profile, at a bound.
 
         Parameters
         ----------
@@ -129,11 +129,11 @@ class Fit(Optimum, Saveable):
             return profile_interval(problem, name, self.values, self.unknowns, reach, name in self.at_bound)
 
     def is_optimal(self, tolerance: float = LITTLE) -> bool:
-        """True if no free parameter's Newton step would gain more than `tolerance` in twice the log-likelihood."""
+        """Return whether no free parameter's Newton step gains more than `tolerance` in twice the log-likelihood."""
         return self.converged and self.gradient_norm <= tolerance
 
     def not_identified(self) -> tuple[str, ...]:
-        """Parameters that these data say nothing about."""
+        """Return the parameters that are not identifiable from these data."""
         return tuple(n for n in self.free if math.isinf(self.reach(n)))
 
     def _note(self, name: str) -> str:
@@ -141,7 +141,7 @@ class Fit(Optimum, Saveable):
         return "not identified" if name in self.not_identified() else at
 
     def _estimate(self, name: str) -> str:
-        """A value with its deviation, or with its interval where it is at its bound."""
+        """Return a value with its standard deviation, or with its interval where it is at its bound."""
         value, (low, high) = f"{self.values[name]:.4g}", self.interval(name)
         if name in self.at_bound:
             return f"{value} (at its bound, 95 % in [{low:.3g}, {high:.3g}])"
@@ -163,7 +163,7 @@ class Fit(Optimum, Saveable):
         return f"{' + '.join(self.model.structure())}: {self.samples} samples, reduced chi2 {self.reduced:.3f}"
 
     def as_table(self) -> tuple[str, Sequence[str], Sequence[Sequence[str]], Sequence[str]]:
-        """Title, head, rows and notes of the table that is printed."""
+        """Return title, head, rows and notes of the printed table."""
         rows = [
             (n, f"{value:.5g}", f"[{low:.5g}, {high:.5g}]", unit or "-", note)
             for n, value, _, low, high, unit, note in zip(*self.columns().values(), strict=True)
@@ -172,9 +172,10 @@ class Fit(Optimum, Saveable):
         return self._title(), ("parameter", "value", "95 % interval", "unit", ""), rows, notes
 
     def columns(self) -> dict[str, list[Any]]:
-        """The fitted parameters with deviations, 95 % intervals and units.
+        """Return the fitted parameters with standard deviations, 95 % intervals and units.
 
-        `std` is NaN, and `note` "at its bound", where a value is at its bound; "not identified" where nothing is known.
+        `std` is NaN and `note` is "at its bound" where a value is at its bound; `note` is "not identified" where a
+        parameter is not identifiable.
         """
         info = self.model.parameter_info()
         return {
@@ -188,7 +189,7 @@ class Fit(Optimum, Saveable):
         }
 
     def record(self) -> dict[str, Any]:
-        """What JSON holds of it: see `fes_pin.data.results`."""
+        """Return the fit as JSON holds it: see `fes_pin.data.results`."""
         (_, names), *others = self.columns().items()
         cells = {n: [shown(x) if isinstance(x, float) else x for x in column] for n, column in others}
         return {
@@ -200,13 +201,13 @@ class Fit(Optimum, Saveable):
         }
 
     def to_frame(self) -> pandas.DataFrame:
-        """The fitted parameters with deviations and 95 % intervals as a frame of pandas: see `columns`."""
+        """Return the fitted parameters with standard deviations and 95 % intervals as a pandas frame: see `columns`."""
         return frame(self.columns(), index="parameter")
 
     __eq__, __hash__ = object.__eq__, object.__hash__  # two fits are not compared by what they print while one searches
 
     def to_numpy(self) -> NDArray[np.float64]:
-        """Values of the fitted parameters, shape (free,), in the order of `free` and of `covariance`."""
+        """Return the fitted values, shape (free,), in the order of `free` and of `covariance`."""
         return np.array([self.values[n] for n in self.free], dtype=np.float64)
 
     @property
@@ -216,9 +217,9 @@ class Fit(Optimum, Saveable):
 
     @property
     def degrees(self) -> int:
-        """Degrees of freedom of parameters and effects: what is free, and in each trial the effects' unknowns it feels.
+        """Degrees of freedom: free parameters, and in each trial the effects' unknowns that act in it.
 
-        Initial states are not counted: all models of a rig have the same.
+        Initial states are not counted, as all models of a rig have the same.
         """
         own = len(self.model.own_unknowns())
         return len(self.free) + sum(int(p.local[:, -own:].any(axis=0).sum()) for p in self.parts if own)
@@ -247,10 +248,10 @@ def fit_problem(
 def grown_start(
     of: Callable[[list[Trial]], AnyProblem], trials: Sequence[Trial], start: Mapping[str, float], max_iterations: int
 ) -> tuple[dict[str, float], Unknowns | None]:
-    """Where a fit begins from afar: fitted to the beginning of every trial, to twice as much of it, and so on.
+    """Return start values from fits to the beginning of every trial, to twice as much of it, and so on.
 
-    What a wrong parameter does to an angle grows with time, past half a swing; the squares of a long trial then have
-    many minima, those of its beginning few. Source: Voss, Timmer and Kurths, Int. J. Bifurcation Chaos 14 (2004).
+    The error of an angle by a wrong parameter grows with time, past half a swing. The sum of squares of a long trial
+    then has many minima, that of its beginning few. Source: Voss, Timmer and Kurths, Int. J. Bifurc. Chaos 14 (2004).
 
     Parameters
     ----------
@@ -271,7 +272,7 @@ def grown_start(
 
 
 def fit_multistart(problem: Problem, start: Mapping[str, float], max_iterations: int = MAX_ITERATIONS) -> Fit:
-    """Fit a problem from a start, and from afar as well where that leaves a gross misfit; the better of both."""
+    """Fit a problem from a start, and from afar where that leaves a gross misfit; return the better fit."""
 
     def short(trials: list[Trial]) -> Problem:
         made = Problem(problem.model, trials, problem.noise, problem.free)
@@ -286,7 +287,7 @@ def fit_multistart(problem: Problem, start: Mapping[str, float], max_iterations:
 
 
 def ended(model: Model, found: Optimum) -> dict[str, Any]:
-    """What a fit holds of a model's problem that has ended, but for trials and noise."""
+    """Return the attributes of a fit at the optimum of a model's problem, without trials and noise."""
     fitted = model.with_parameters(found.values)
     return {**vars(found), "model": fitted, "parameters": fitted.parameters()}
 
@@ -305,14 +306,14 @@ def fit(
     Parameters
     ----------
     model
-        Start values and structure.
+        The model, whose values are the start values.
     trials
-        What was measured.
+        Measured trials.
     noise
-        By output column. Without it the noise is taken for white, fitted, and estimated from the residuals; then the
-        fit is repeated with it.
+        Noise by output column. By default the model is fitted with white noise, the noise is estimated from the
+        residuals, and the fit is repeated with that.
     max_iterations
-        Steps, at most; what has not converged then says so.
+        Most steps; a fit that has not converged by then says so in `converged`.
     fixed
         Names of parameters that are not fitted, or values that they are held at by name: `("gain",)`,
         `{"gain": 0.65}`.
@@ -357,7 +358,7 @@ def fit(
 def _chosen(
     model: Model, fixed: Sequence[str], bounds: Mapping[str, tuple[float, float]]
 ) -> tuple[tuple[str, ...], dict[str, tuple[float, float]]]:
-    """What is fitted where some is fixed, and the bounds that were asked for, within those of the parameters."""
+    """Return the parameters that are fitted where some are fixed, and the bounds that were asked for."""
     fitted, info, narrower = model.fitted_parameters(), model.parameter_info(), dict[str, tuple[float, float]]()
     free = tuple(n for n in fitted if n not in map(str, fixed))
     for column, names, known in (("fixed", fixed, fitted), ("bounds", bounds, free)):
@@ -376,7 +377,7 @@ def _chosen(
 
 
 def rough_noise(model: Model, trials: Sequence[Trial]) -> dict[str, Noise]:
-    """White noise at the level of the second differences of each measured column: all that is known before a fit."""
+    """Return white noise at the level of the second differences of each measured column, as known before a fit."""
     columns: dict[str, list[np.ndarray]] = {}
     for trial in trials:
         for name in model.rig.outputs(trial.kind):
@@ -393,10 +394,9 @@ def rough_noise(model: Model, trials: Sequence[Trial]) -> dict[str, Noise]:
 
 
 def noise_of(fitted: Fit, longest: int = ORDERS[-1], least: int = 0) -> dict[str, Noise]:
-    """The noise that a fit's residuals show, by output column, with autoregressions of orders `least` to `longest`.
+    """Return the noise of a fit's residuals, by output column, with autoregressions of orders `least` to `longest`.
 
-    Noise of a long order does not hold a trial's initial state: what moves with that in the residuals would be learned
-    as noise again, and is taken out first.
+    A long autoregression would learn the effect of a trial's initial state as noise: that is projected off first.
     """
     problem = Problem(fitted.model, fitted.trials, fitted.noise, free=())
     step = noise_step([t.dt for t in fitted.trials])

@@ -1,4 +1,4 @@
-"""The likelihood of measured trials under a model, a random effort and reading noise.
+"""The likelihood of measured trials under a model with process and measurement noise.
 
 Twice the negative log-likelihood of the innovations r_k of an extended Kalman filter with variances V_k,
 
@@ -36,26 +36,26 @@ from fes_pin.models.predictor import Predictor, StateSpaceNoise
 from fes_pin.workers import check_limit, in_parallel
 
 NOISE_STEPS = 2
-"""Steps of the noise before parameters move again."""
+"""Steps of the noise between those of parameters."""
 FOLLOWED_STEP = 0.01
 """Step of a difference of the cost by a parameter of the reading, in its standard deviations."""
 
 
 class LikelihoodProblem(NoisyProblem):
-    """A model structure on trials under what is random about them.
+    """The likelihood of a model structure on trials, with process and measurement noise.
 
     Parameters
     ----------
     model
         Its structure; values are given to the methods.
     trials
-        What was measured; NaN where nothing was.
+        Measured trials; NaN where nothing was measured.
     noise
-        Of the process and of the measurements.
+        Process and measurement noise.
     free
-        The parameters that move; the model's fitted ones by default.
+        The free parameters; by default the fitted ones of the model.
     starts
-        Trials whose first samples say where each begins, where those of `trials` are not all measured.
+        Trials whose first samples give the initial states, where those of `trials` are not all measured.
     """
 
     def __init__(
@@ -78,7 +78,7 @@ class LikelihoodProblem(NoisyProblem):
         self._batched: Predictor | FreeRun | None = None
 
     def _made(self, count: int, columns: tuple[str, ...]) -> Predictor | FreeRun:
-        """What predicts the trials so many times over, with sensitivities to some parameters and unknowns."""
+        """Return the predictor of `count` copies of the trials, with sensitivities to some parameters and unknowns."""
         if self.is_simulated:
             return FreeRun(self.model, self.trials * count, columns, self.noise.correlation_s)
         own = (self.noise.processes, self.priors * count, self.noise.correlation_s)
@@ -86,18 +86,18 @@ class LikelihoodProblem(NoisyProblem):
 
     @cached_property
     def products(self) -> list[tuple[int, int]]:
-        """Places in `free` of shapes and of the amplitudes that they are factors of."""
+        """Places in `free` of shapes and of the amplitudes that they multiply."""
         return products_of(self.free, self.model.parameter_info())
 
     def start_unknowns(self) -> Unknowns:
-        """The unknowns that a fit begins with: starts as first samples say, where these are fitted, effects at null."""
+        """Return start values of the unknowns: initial states from first samples, effects at their null."""
         own = self.model.own_nulls()
         return [{**begin, **own} if self.is_simulated else dict(own) for begin in self.begins]
 
     def innovations(
         self, values: Mapping[str, float], unknowns: Unknowns, noise: StateSpaceNoise | None = None
     ) -> list[PredictedTrial]:
-        """Every trial as foretold, with sensitivities to `free` and to the effects' unknowns; see `linearize`."""
+        """Return innovations of every trial, with sensitivities to `free` and to the effects' unknowns."""
         check_limit()
         if self._linearized is None:
             self._linearized = self._made(1, (*self.free, *self.unknown_names))
@@ -107,22 +107,22 @@ class LikelihoodProblem(NoisyProblem):
 
     @property
     def noise_parameters(self) -> dict[str, float]:
-        """Those of the noise that may change, by name: not the noise of a reading that none of the trials has."""
+        """Parameters of the noise that may change, by name; not those of an output that no trial has."""
         known, given = self.noise_limits, [f"time.{n}" for n in self.noise.timed]
         given += [f"{part}.{n}" for part in ("std", "time") for n in self.noise.still]
         return {n: v for n, v in self.noise.parameters().items() if n in known and n not in given}
 
     @property
     def noise_limits(self) -> dict[str, tuple[float, float]]:
-        """How small and how large those may become."""
+        """Return bounds of these parameters."""
         return noise_limits(self.model, self.trials, self.noise.correlation_s)
 
     def evaluate(self, points: Sequence[Point]) -> list[Evaluation]:
-        """One-step predictions of all trials at each of several points."""
+        """Return one-step predictions of all trials at each of several points."""
         return self._evaluated([(values, unknowns, self.noise.with_values(own)) for values, unknowns, own in points])
 
     def costs(self, points: Sequence[tuple[Mapping[str, float], Unknowns]]) -> list[float]:
-        """The cost at several parameter values, without sensitivities: less work than linearizing at one of them."""
+        """Return the cost at several points without sensitivities: less work than linearizing at one of them."""
         return [one.cost for one in self._evaluated([(*point, self.noise) for point in points])]
 
     def _evaluated(self, points: Sequence[tuple[Mapping[str, float], Unknowns, StateSpaceNoise]]) -> list[Evaluation]:
@@ -132,7 +132,7 @@ class LikelihoodProblem(NoisyProblem):
     def _runs(
         self, points: Sequence[tuple[Mapping[str, float], Unknowns, StateSpaceNoise]]
     ) -> list[list[PredictedTrial]]:
-        """Every trial as foretold by each of several points, as many side by side as leave no lane idle."""
+        """Return every trial as predicted at each of several points, in batches that fill all lanes."""
         count, trials = self.batch, len(self.trials)
         if self._batched is None:
             self._batched = self._made(count, ())
@@ -155,33 +155,34 @@ class LikelihoodProblem(NoisyProblem):
 
     @property
     def batch(self) -> int:
-        """How many points are tried in one run."""
+        """Number of points that are tried in one run."""
         return max(1, WIDE // len(self.trials))
 
     def predicted(
         self, values: Mapping[str, float], unknowns: Unknowns | None = None
     ) -> list[dict[str, PredictedOutput]]:
-        """What is foretold of each output of each trial, also where nothing was measured."""
+        """Return the prediction of each output of each trial, also where nothing was measured."""
         given = self.start_unknowns() if unknowns is None else unknowns
         own = [{**begin, **u} for begin, u in zip(self.begins, given, strict=True)]
-        if self._predictor is None:  # what was read tells the state, also where nothing acts at random
+        if self._predictor is None:  # a filter estimates the state also without process noise
             random = (self.noise.processes, self.priors, self.noise.correlation_s)
             self._predictor = Predictor(self.model, self.trials, (), *random)
         with np.errstate(all="ignore"):
             return self._predictor.predict(values, self.noise, own)
 
     def linearize(self, values: Mapping[str, float], unknowns: Unknowns) -> list[Linearized]:
-        """Innovations over their deviations, and sensitivities, at a parameter value; see `check_limit`."""
+        """Return standardised innovations and their sensitivities at a parameter value; see `check_limit`."""
         parts = [self._whitened(one) for one in self.innovations(values, unknowns)]
         if self.is_simulated:
             return [self._marginal(p, prior) for p, prior in zip(parts, self.priors, strict=True)]
         return self._followed(parts, values, unknowns) if self._scales else parts
 
     def _marginal(self, part: Linearized, prior: Mapping[str, float]) -> Linearized:
-        """A simulated trial with the cost of its unknown start, as a filter has it.
+        """Return a simulated trial with its unknown initial state integrated out, as a filter does.
 
-        With H the information about the start and S the deviations of its prior, the likelihood is by Laplace's method
-        that of the likeliest start over |1 + S H S|^(1/2). A fit with process noise can be compared with one without.
+        With H the information on the initial state and S the standard deviations of its prior, Laplace's method gives
+        the likelihood at the likeliest state divided by |1 + S H S|^(1/2). Fits with and without process noise can then
+        be compared.
         """
         own = [k for k, n in enumerate(self.unknown_names) if n in prior]
         if not own:
@@ -193,14 +194,14 @@ class LikelihoodProblem(NoisyProblem):
 
     @property
     def is_final(self) -> bool:
-        """True where no other slopes lead on from the end of a descent, as effort itself is read.
+        """Whether a descent ends without other slopes, as effort itself is read.
 
-        There a lag would take up how smooth a random effort is, which no process of first order is.
+        With other slopes a lag would fit the smoothness of process noise, which a process of first order does not have.
         """
         return self.is_simulated or not all(self.model.rig.unknowns(t.kind) for t in self.trials)
 
     def noise_step(self, values: Mapping[str, float], unknowns: Unknowns) -> float:
-        """Improve the noise, in place; returns by how much that lowers the cost."""
+        """Improve the noise, in place; return by how much the cost falls."""
         if self.is_simulated:
             return self._simulated_noise_step(values, unknowns)
         reached = fisher_scoring(self, values, unknowns, {}, NOISE_STEPS)
@@ -208,19 +209,19 @@ class LikelihoodProblem(NoisyProblem):
         return reached.gained + self.renew(values, unknowns)
 
     def renew(self, values: Mapping[str, float], unknowns: Unknowns) -> float:
-        """Find again, in place, what noise foretells of itself; returns by how much that lowers the cost."""
+        """Estimate the autoregressions of noise again, in place; return by how much the cost falls."""
         if not any(self.noise.ar.values()):
             return 0.0
         (run,) = self._runs([(values, unknowns, self.noise)])
         return self._adopted(run, self._with_autoregressions(run))
 
     def _with_autoregressions(self, run: Sequence[PredictedTrial]) -> StateSpaceNoise:
-        """The noise with autoregressions of its orders, found in what a run leaves."""
+        """Return the noise with autoregressions of its orders, from the innovations of a run."""
         orders = {n: (len(ar),) for n, ar in self.noise.ar.items()}
         return replace(self.noise, ar={**self.noise.ar, **autoregressions(run, orders)})
 
     def _adopted(self, run: Sequence[PredictedTrial], found: StateSpaceNoise) -> float:
-        """Take another noise of the readings, in place, if a run costs less with it; returns by how much."""
+        """Take another measurement noise, in place, if that lowers the cost of a run; return by how much."""
         before, after = (sum(one.cost() for one in some) for some in (run, [with_noise(one, found) for one in run]))
         if not after < before:
             return 0.0
@@ -228,7 +229,7 @@ class LikelihoodProblem(NoisyProblem):
         return before - after
 
     def _simulated_noise_step(self, values: Mapping[str, float], unknowns: Unknowns) -> float:
-        """Set the noise of the readings, in place, to what a simulation leaves; returns by how much the cost falls."""
+        """Set the measurement noise, in place, to the residuals of a simulation; return by how much the cost falls."""
         (run,) = self._runs([(values, unknowns, self.noise)])
         found, limits = self._with_autoregressions(run), self.noise_limits
         powers = residual_powers([with_noise(one, found) for one in run])
@@ -237,7 +238,7 @@ class LikelihoodProblem(NoisyProblem):
         return self._adopted(run, found)
 
     def with_orders(self, values: Mapping[str, float], unknowns: Unknowns) -> StateSpaceNoise:
-        """What is random, with autoregressions of the orders that what the filter leaves shows."""
+        """Return the noise with autoregressions of the orders that the innovations support."""
         (run,) = self._runs([(values, unknowns, self.noise)])
         return replace(self.noise, ar=autoregressions(run, dict.fromkeys(self.noise.white, ORDERS)))
 
@@ -247,7 +248,7 @@ class LikelihoodProblem(NoisyProblem):
 
     @cached_property
     def _scales(self) -> tuple[str, ...]:
-        """Free parameters that scale a reading: the filter's gains go with them."""
+        """Free parameters that scale a reading, and the filter's gains with it."""
         if self.is_simulated:  # there are no gains
             return ()
         imposed = any(t.kind == IMPOSED for t in self.trials)
@@ -256,10 +257,10 @@ class LikelihoodProblem(NoisyProblem):
         return tuple(n for n in names if n in self.free)
 
     def _followed(self, parts: list[Linearized], values: Mapping[str, float], unknowns: Unknowns) -> list[Linearized]:
-        """Sensitivities to `_scales` without what gains that stay as they are add along the innovations.
+        """Return sensitivities to `_scales` corrected for filter gains that are taken as constant.
 
-        Where a filter takes up nearly all of what it reads, a scale of the reading seems to shrink the innovations as a
-        whole, as long as the gains do not go with it. The true slope of the cost is its difference.
+        Where a filter follows its readings closely, a scale of the reading seems to shrink all innovations as long as
+        the gains are constant. The correction makes the slope of the cost equal to its finite difference.
         """
         at, squares = [self.free.index(n) for n in self._scales], sum(float(p.residual @ p.residual) for p in parts)
         if not (np.isfinite(squares) and squares > 0.0):
@@ -270,7 +271,7 @@ class LikelihoodProblem(NoisyProblem):
     def _missed_slopes(
         self, parts: Sequence[Linearized], at: Sequence[int], values: Mapping[str, float], unknowns: Unknowns
     ) -> np.ndarray:
-        """What slopes for gains as they are miss of those of half the cost, by parameter; 0 where that is no number."""
+        """Return the error of slopes at constant gains in half the cost, by parameter; 0 where it is not finite."""
         now, out = whitened_sse(parts), np.zeros(len(at))
         sizes = np.sqrt(sum(np.sum(p.jacobian[:, at] ** 2, axis=0) for p in parts))
         felt = np.flatnonzero(sizes) if np.isfinite(now) else np.empty(0, dtype=int)
@@ -281,7 +282,7 @@ class LikelihoodProblem(NoisyProblem):
         return np.nan_to_num(out)
 
     def _whitened(self, one: PredictedTrial) -> Linearized:
-        """A trial's innovations over their deviations; its sensitivities are scaled where they are."""
+        """Return a trial's standardised innovations; its sensitivities are scaled in place."""
         with np.errstate(all="ignore"):
             residual, logs = one.whitened
             moved = one.over_deviations(one.sensitivities)
@@ -290,23 +291,23 @@ class LikelihoodProblem(NoisyProblem):
         return Linearized(residual, moved[:, :split], moved[:, split:], float(np.sum(logs)))
 
     def cost(self, values: Mapping[str, float], unknowns: Unknowns, noise: StateSpaceNoise | None = None) -> float:
-        """Twice the negative log-likelihood."""
+        """Return twice the negative log-likelihood."""
         return sum(one.cost() for one in self.innovations(values, unknowns, noise))
 
 
 def is_simulated(noise: StateSpaceNoise, trials: Sequence[Trial]) -> bool:
-    """True where there is no process noise: one-step predictions are then a free simulation."""
+    """Return whether there is no process noise: one-step predictions are then a free simulation."""
     return not noise.processes and all(t.kind != IMPOSED for t in trials)
 
 
 def unknown_names(model: Model, noise: StateSpaceNoise, trials: Sequence[Trial]) -> tuple[str, ...]:
-    """Unknowns that each trial has of its own, by name: of its start, where that is fitted, and of effects."""
+    """Return the unknowns of each trial by name: of its initial state, where that is fitted, and of effects."""
     begins = [n for t in trials for n in model.rig.unknowns(t.kind)] if is_simulated(noise, trials) else []
     return (*dict.fromkeys(begins), *model.own_unknowns())
 
 
 def _added(part: Linearized, at: Sequence[int], factors: np.ndarray) -> Linearized:
-    """Some columns of the sensitivities with multiples of the residual added."""
+    """Return sensitivities with multiples of the residual added to some columns."""
     jacobian = part.jacobian.copy()
     jacobian[:, at] += np.outer(part.residual, factors)
     return replace(part, jacobian=jacobian)

@@ -38,7 +38,7 @@ class LikelihoodFit(Fit):
 
 
 def fit_of(problem: LikelihoodProblem, found: Optimum) -> LikelihoodFit:
-    """The fit of a problem that has ended, with the noise that the problem has come to."""
+    """Return the fit of a problem at its optimum, with the noise of the problem."""
     return LikelihoodFit(**ended(problem.model, found), trials=problem.trials, noise=problem.noise)
 
 
@@ -49,29 +49,29 @@ def maximise(
     rounds: int = ROUNDS,
     near: bool = False,
 ) -> LikelihoodFit:
-    """The likelihood's maximum: by `infer.maximise.alternate`, or by `together` alone if it is near."""
+    """Maximise the likelihood by `infer.maximise.alternate`, or by `together` alone if the maximum is near."""
     if near and not problem.is_final:
         return fit_of(problem, together(problem, start, unknowns))
     return fit_of(problem, alternate(problem, start, unknowns, rounds))
 
 
 def maximum_from(fitted: LikelihoodFit, trials: Sequence[Trial], noise: StateSpaceNoise | None = None) -> LikelihoodFit:
-    """The likelihood's maximum of a fit's model on trials much like its own, from where it ended.
+    """Maximise the likelihood of a fit's model on trials similar to its own, from the values of the fit.
 
     Parameters
     ----------
     noise
-        That the fit begins with; by default that of the fit.
+        Start values of the noise; by default that of the fit.
     """
     problem = LikelihoodProblem(fitted.model, trials, noise or fitted.noise)
     return maximise(problem, fitted.values, fitted.unknowns, near=fitted.together)
 
 
 def with_white_process_noise(fitted: LikelihoodFit) -> LikelihoodFit:
-    """A fit of the same model to the same trials, with random efforts that are new in every reading.
+    """Fit the same model to the same trials with white process noise.
 
-    Their size is fitted before anything moves: too small, parameters would go after every error, and too large,
-    inertia would be what noise of the reading makes of it.
+    The size of the noise is fitted before the parameters: if it is too small, parameters follow every error; if it is
+    too large, measurement noise biases inertia.
     """
     problem = LikelihoodProblem(fitted.model, fitted.trials, without_memory(fitted.noise, fitted.trials))
     problem.noise_step(fitted.values, fitted.unknowns)

@@ -1,4 +1,4 @@
-"""The noise that is left when everything that a library could explain is taken out."""
+"""Noise of the residuals without any part that the causes of a library could explain."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ def rich_noise(
     columns: Sequence[np.ndarray],
     varying: Sequence[Sequence[np.ndarray]] = (),
 ) -> dict[str, Noise]:
-    """Autoregressive noise of the residuals without any part that the columns could explain.
+    """Return autoregressive noise of the residuals without any part that the columns could explain.
 
     Parameters
     ----------
     fitted
         A fit under any noise.
     white
-        White noise by output column, which the columns are scaled with.
+        White noise by output column, by which the columns are scaled.
     columns
-        Sensitivities scaled with `white`, shape (m, k) each, all trials end to end.
+        Sensitivities scaled by `white`, shape (m, k) each, all trials end to end.
     varying
-        For each effect that can be other in each trial, such columns for each of its shapes. The best shape, if it is
-        worth its degrees of freedom, is taken out trial by trial.
+        For each effect that can differ between trials, such columns for each of its shapes. The best shape is projected
+        off trial by trial if it improves the penalised likelihood.
     """
     problem = Problem(fitted.model, fitted.trials, white, fitted.free)
     parts = problem.linearize(fitted.values, fitted.unknowns)
@@ -55,7 +55,7 @@ def rich_noise(
 
 
 def _of_each_trial(left: np.ndarray, shapes: Sequence[np.ndarray], counts: Sequence[int]) -> np.ndarray:
-    """What the best of several shapes explains with amplitudes of each trial's own; zero if that is too little."""
+    """Return the part that the best of several shapes explains with amplitudes of each trial's own, or zeros."""
     best, most = np.zeros_like(left), 0.0
     ends = np.cumsum(counts)
     for columns in shapes:
@@ -73,7 +73,7 @@ def _of_each_trial(left: np.ndarray, shapes: Sequence[np.ndarray], counts: Seque
 
 
 def span(columns: np.ndarray) -> np.ndarray:
-    """Orthonormal basis of what columns of shape (m, k) span, shape (m, rank)."""
+    """Return an orthonormal basis of the span of columns of shape (m, k), shape (m, rank)."""
     norms = np.linalg.norm(columns, axis=0)
     good = (norms > 0) & np.isfinite(norms)
     scaled = columns[:, good] / norms[good]

@@ -1,8 +1,8 @@
-"""What is each trial's own: predictions and sizes of effects whose amplitudes have a value of their own in every trial.
+"""Predictions and sizes of effects whose amplitudes have a value of their own in every trial.
 
-Nothing is known of such an amplitude before its trial is measured. A prediction from inputs alone leaves the effect
-out. Where there is a measurement, the trial is cut into `SEGMENTS` pieces; the amplitudes that predict the odd pieces
-are estimated from the even ones and the other way round, so that no sample takes part in its own prediction.
+Such an amplitude is unknown before its trial is measured, and a prediction from inputs alone leaves the effect out. A
+measured trial is cut into `SEGMENTS` pieces. The amplitudes that predict the odd pieces are estimated from the even
+ones and vice versa (cross-fitting), so that no sample takes part in its own prediction.
 """
 
 from __future__ import annotations
@@ -25,18 +25,19 @@ from fes_pin.models.simulate import Simulator
 from fes_pin.models.stage import Effect
 
 SEGMENTS = 4
-"""Pieces of a trial: two would ask a slow oscillation to be foretold over half a trial, many would be as slow noise."""
+"""Pieces of a trial. With two, a slow oscillation would have to be predicted over half a trial; many short pieces would
+share slow noise."""
 STEPS = 3
-"""Gauss-Newton steps: the amplitudes are linear but for what the joint's own nonlinearity makes of them."""
+"""Gauss-Newton steps: the amplitudes are nearly linear, but for the nonlinearity of the joint."""
 
 
 def predictions(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> list[np.ndarray]:
-    """Readings that a model predicts of measured trials, shape (n, outputs) each; see the module.
+    """Return the readings that a model predicts of measured trials, shape (n, outputs) each; see the module.
 
     Parameters
     ----------
     noise
-        By output column: what weighs the channels.
+        Noise by output column, by which channels are weighted.
     """
     simulator, values = Simulator(model, trials), model.parameters()
     start = simulator.start(values)
@@ -51,7 +52,7 @@ def predictions(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> lis
 
 
 def halves(count: int) -> tuple[np.ndarray, np.ndarray]:
-    """The odd pieces of a trial and the even ones, as masks of shape (n,)."""
+    """Return the odd pieces of a trial and the even ones, as masks of shape (n,)."""
     first = (np.arange(count) * SEGMENTS // count) % 2 == 0
     return first, ~first
 
@@ -59,16 +60,16 @@ def halves(count: int) -> tuple[np.ndarray, np.ndarray]:
 def cross_fitted_unknowns(
     model: Model, trial: Trial, noise: StateSpaceNoise, start: Mapping[str, float] | None = None
 ) -> list[tuple[np.ndarray, dict[str, float]]]:
-    """What effects have of a trial's own by the likelihood, and the samples, shape (n,), that it is to foretell.
+    """Return the samples of each half, shape (n,), with unknowns of effects estimated by the likelihood from the other.
 
-    Of an effect without such amplitudes that is all of the trial. Where the rig is simulated the initial state is
-    estimated beside them, no farther from the start than `spread_of_start` has it: what is seen may have forgotten it.
-    Sinusoids are estimated as well by white noise as by the right one (Grenander 1954).
+    Without effects that have amplitudes of a trial's own, one pair holds all samples. Where the rig is simulated, the
+    initial state is estimated together with them, no farther from the start than `spread_of_start`, since the other
+    half may not determine it. White noise estimates sinusoids as well as the right noise does (Grenander 1954).
 
     Parameters
     ----------
     start
-        Where the trial's unknowns begin, by default as its first samples say.
+        Start values of the trial's unknowns; by default from its first samples.
     """
     if not model.own_unknowns():
         return [(np.ones(len(trial), dtype=bool), {})]
@@ -91,7 +92,7 @@ def cross_fitted_unknowns(
 def _moved(
     part: Linearized, names: Sequence[str], now: Mapping[str, float], reach: Mapping[str, tuple[float, float]]
 ) -> dict[str, float]:
-    """A step of least squares from where unknowns are now; where some would leave their reach, the others follow."""
+    """Return unknowns after a step of least squares; where some would leave their bounds, the others are adapted."""
     step = dict(zip(names, least_squares(part.local, part.residual, rcond=1e-6), strict=True))
     kept = {n: float(np.clip(step[n], low - now[n], high - now[n])) for n, (low, high) in reach.items()}
     if any(kept[n] != step[n] for n in kept):
@@ -103,10 +104,10 @@ def _moved(
 
 
 def amplitude(fitted: Fit, effect: Effect) -> tuple[float, float]:
-    """Size of an effect whose amplitudes are each trial's own: the root mean square of their length, and its deviation.
+    """Return the root mean square size of an effect with amplitudes of each trial's own, and its standard deviation.
 
-    The mean is over the trials of the kind that comes first among those that feel the effect, as a motion and a force
-    have no unit in common; what the uncertainty of the single values adds to their squares is taken off.
+    The mean is over the trials of the first kind in which the effect acts, as a motion and a force have no common unit.
+    The variance of the single estimates is subtracted from their squares.
     """
     if isinstance(fitted.noise, StateSpaceNoise):
         names = unknown_names(fitted.model, fitted.noise, fitted.trials)

@@ -1,4 +1,4 @@
-"""Whitened residuals and sensitivities of a model that is simulated freely on trials."""
+"""Whitened residuals and sensitivities of a free simulation of trials."""
 
 from __future__ import annotations
 
@@ -20,22 +20,23 @@ from fes_pin.models.simulate import Simulated, SimulatedBatch, Simulator
 from fes_pin.workers import check_limit
 
 NEXT_TO = 1e-6
-"""Scales from its null that what switches a form with a memory on stays: nothing beside what data tell of it."""
+"""Distance in scales that a parameter which switches on a form with a memory keeps from its null: far below what data
+resolve."""
 
 
 class Problem(infer.Problem):
-    """A model structure on trials, with the noise that weighs them.
+    """A model structure on trials, with the noise that weights their residuals.
 
     Parameters
     ----------
     model
         Its structure; values are given to the methods.
     trials
-        What was measured.
+        Measured trials.
     noise
-        By output column; a column that is missing here weighs nothing.
+        Noise by output column; a column without noise has no weight.
     free
-        The parameters that sensitivities are wanted for; the model's fitted ones by default.
+        The parameters of the sensitivities; by default the fitted ones of the model.
     """
 
     def __init__(
@@ -55,15 +56,15 @@ class Problem(infer.Problem):
 
     @cached_property
     def products(self) -> list[tuple[int, int]]:
-        """Places in `free` of shapes and of the amplitudes that they are factors of."""
+        """Places in `free` of shapes and of the amplitudes that they multiply."""
         return products_of(self.free, self.model.parameter_info())
 
     def start_unknowns(self) -> Unknowns:
-        """The unknowns of each trial as its first samples suggest."""
+        """Return start values of the unknowns of each trial, from its first samples."""
         return [self.model.initial_unknowns(t) for t in self.trials]
 
     def residuals(self, values: Mapping[str, float], unknowns: Unknowns) -> list[dict[str, np.ndarray]]:
-        """Measured minus simulated, for each trial by output column; not whitened."""
+        """Return measured minus simulated, for each trial by output column; not whitened."""
         run = self.simulator.run(values, unknowns)
         return [self._left(trial, simulated) for trial, simulated in zip(self.trials, run, strict=True)]
 
@@ -72,7 +73,7 @@ class Problem(infer.Problem):
         return {n: trial[n] - simulated.readings[:, k] for k, n in enumerate(names) if n in trial.columns}
 
     def settled(self, values: Mapping[str, float], unknowns: Unknowns) -> list[dict[str, np.ndarray]]:
-        """The residuals without what a step of each trial's initial state takes out of them by least squares."""
+        """Return the residuals after a least-squares step of each trial's initial state."""
         rig, out = self.model.rig, []
         for trial, simulated in zip(self.trials, self.simulator.run(values, unknowns), strict=True):
             left = self._left(trial, simulated)
@@ -88,7 +89,7 @@ class Problem(infer.Problem):
         return out
 
     def linearize(self, values: Mapping[str, float], unknowns: Unknowns) -> list[Linearized]:
-        """Whitened residuals and sensitivities at a parameter value; ends where a limit of time does."""
+        """Return whitened residuals and sensitivities at a parameter value; stops at a limit of time."""
         check_limit()
         out: list[Linearized | None] = [None] * len(self.trials)
         for block in self.simulator.run_batches(values, unknowns):
@@ -97,12 +98,12 @@ class Problem(infer.Problem):
         return [p for p in out if p is not None]
 
     def rows(self, trial: Trial) -> int:
-        """How many whitened residuals a trial has, all channels end to end."""
+        """Return the number of whitened residuals of a trial, all channels end to end."""
         weighed = [self.noise[n] for n in self.model.rig.outputs(trial.kind) if n in trial.columns and n in self.noise]
         return sum(one.innovations(len(trial), trial.dt) for one in weighed)
 
     def _whitened(self, block: SimulatedBatch) -> Iterator[Linearized]:
-        """Trials that were simulated side by side, whitened side by side."""
+        """Yield the trials of a simulated batch, whitened as a batch."""
         trials = [self.trials[i] for i in block.trials]
         pieces: list[list[tuple[np.ndarray, np.ndarray]]] = [[] for _ in trials]
         missed = self._measured(block) - block.readings
@@ -121,7 +122,7 @@ class Problem(infer.Problem):
         return (self._linearized(own, block.columns) for own in pieces)
 
     def _measured(self, block: SimulatedBatch) -> np.ndarray:
-        """What was measured of the trials of a block, as their readings stand in it; zero where nothing was."""
+        """Return the measured outputs of the trials of a batch, in its layout; zero where nothing was measured."""
         if block.trials not in self._read:
             out = np.zeros(block.readings.shape)
             for lane, trial in enumerate(self.trials[i] for i in block.trials):
@@ -132,7 +133,7 @@ class Problem(infer.Problem):
         return self._read[block.trials]
 
     def _linearized(self, pieces: Sequence[tuple[np.ndarray, np.ndarray]], columns: Sequence[int]) -> Linearized:
-        """One trial from the whitened residuals of its channels and their sensitivities to some of all columns."""
+        """Return one trial from the whitened residuals of its channels and their sensitivities to some columns."""
         split = len(self.free)
         count, width = sum(len(r) for r, _ in pieces), split + len(self.unknown_names)
         residual, rows, at = np.empty(count), np.zeros((count, width)), 0
@@ -144,7 +145,7 @@ class Problem(infer.Problem):
 
 
 def products_of(names: Sequence[str], info: Mapping[str, ParameterInfo]) -> list[tuple[int, int]]:
-    """Places of shapes and of the amplitudes that they are factors of; those of a group are that group's."""
+    """Return places of shapes and of the amplitudes that they multiply, within one group where there are groups."""
     out = []
     for at, name in enumerate(names):
         path, mark, group = name.partition("@")
@@ -155,7 +156,7 @@ def products_of(names: Sequence[str], info: Mapping[str, ParameterInfo]) -> list
 
 
 def measured_columns(model: Model, trials: Sequence[Trial]) -> dict[str, np.ndarray]:
-    """Every measured output, imposed motion and effort, all trials end to end, by column name.
+    """Return every measured output, imposed motion and effort, all trials end to end, by column name.
 
     `time` since each trial began, s; `reading` the first output of each that passes a sensor.
     """
@@ -171,7 +172,7 @@ def measured_columns(model: Model, trials: Sequence[Trial]) -> dict[str, np.ndar
 
 
 def answered_columns(model: Model, trials: Sequence[Trial]) -> dict[str, np.ndarray]:
-    """The same of a rig that the likelihood judges, whose effort, if it has one, answers what is read: `answer`."""
+    """Return the same for a rig in closed loop, with the effort of its controller as `answer`."""
     measured = measured_columns(model, trials)
     if "effort" in measured and not any(t.kind == IMPOSED for t in trials):
         measured["answer"] = measured["effort"]
@@ -179,17 +180,17 @@ def answered_columns(model: Model, trials: Sequence[Trial]) -> dict[str, np.ndar
 
 
 def limits_of(model: Model, trials: Sequence[Trial]) -> dict[str, tuple[float, float]]:
-    """Bounds of every parameter on these trials, by name.
+    """Return bounds of every parameter on these trials, by name.
 
-    Where a form of an effect has a state or a memory of its own, what switches it on stays off its null: a fit that
-    came there would be one of another model, which has not.
+    Where a form of an effect has a state or a memory of its own, the parameter that switches it on keeps off its null:
+    at the null the model is another one, without that state.
     """
     limits = {n: (i.lower, i.upper) for n, i in model.parameter_info().items()}
     measured = measured_columns(model, trials) if model.effects else {}
     for effect in model.effects:
         for n, (low, high) in effect.limits(measured).items():
             name = f"{effect.name}.{n}"
-            if name not in limits:  # each trial's own
+            if name not in limits:  # of each trial's own
                 continue
             limits[name] = (max(limits[name][0], low), min(limits[name][1], high))
         for n in set(effect.of_form.values()) & set(effect.refined()):

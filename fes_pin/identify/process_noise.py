@@ -1,14 +1,14 @@
-"""Process and measurement noise of a rig: where a fit begins, how large or slow it may become, and without memory.
+"""Process and measurement noise of a rig: start values, bounds, and process noise that is white.
 
-**Random efforts without memory.** The likelihood gives what a model gets wrong to a random effort, and an error of form
-is none: friction behind an elastic drive is wrong for a moment at every reversal. Where readings are fine, a random
-effort that lasts makes that likelier than any other does, and takes what is slow in the motion with it, of which
-inertia, damping and friction are known; these then bend to the moments. With efforts that are new in every sample,
-parameters are those that leave the least effort unexplained, whatever it is, as those of an inverse dynamic model
-(Khalil and Dombre, Modeling, Identification and Control of Robots, 2002, chapter 12): calibration in the mean square,
-which is the model nearest to what is measured where none is right (Tuo and Wu, Efficient calibration for imperfect
-computer models, Annals of Statistics 43, 2015). Where a random effort does last, errors of prediction are smaller with
-it (`diagnosis.estimators`).
+**White process noise.** The likelihood attributes the error of a model to process noise. An error of form is no noise:
+friction behind an elastic drive, for example, is wrong for a moment at every reversal. Where readings are fine,
+coloured process noise makes such an error likelier than white noise does. It then also takes the slow part of the
+motion, which determines inertia, damping and friction, and these are biased towards the moments of the error. With
+white process noise the parameters are those that leave the least effort unexplained, as in an inverse dynamic model
+(Khalil and Dombre, Modeling, Identification and Control of Robots, 2002, chapter 12). This is calibration in the mean
+square, which gives the model nearest to the data where no model is right (Tuo and Wu, Efficient calibration for
+imperfect computer models, Annals of Statistics 43, 2015). Where the process noise of a rig is coloured, errors of
+prediction are smaller with a coloured model of it (`diagnosis.estimators`).
 """
 
 from __future__ import annotations
@@ -25,20 +25,20 @@ from fes_pin.models.model import Model
 from fes_pin.models.predictor import StateSpaceNoise
 
 FIRST_SHARE = 0.003
-"""Random effort that a fit begins with, as a share of what drives the rig: little, see `infer.maximise`."""
+"""Process noise at which a fit starts, as a share of the driving effort: small, see `infer.maximise`."""
 FIRST_TIME_S = 0.1
-"""Time constant that it begins with."""
+"""Time constant at which it starts, s."""
 SMALLEST = 1e-6
-"""Smallest random part, as a share of what drives the rig or of a reading's range: it counts as none."""
+"""Smallest process noise, as a share of the driving effort or of a reading's range: it counts as none."""
 SLOWEST = 0.1
-"""Longest time constant of a random process, as a share of the longest trial: what does not change some ten times in a
-trial is an offset, and would hide one."""
+"""Longest time constant of a random process, as a share of the longest trial: a process that changes fewer than ten
+times in a trial could not be distinguished from an offset."""
 
 
 def spread_of_start(model: Model, trial: Trial) -> dict[str, float]:
-    """How far the start of a trial may be from what its first samples say: nothing is known of it beforehand.
+    """Return the prior standard deviation of each initial state about the estimate from the first samples of a trial.
 
-    A position as far as it ever is from another, a rate as fast as the trial moves.
+    It is the range of a position, and the speed of the trial for a rate: the prior is vague.
     """
     if not model.rig.unknowns(trial.kind):
         return {}
@@ -51,16 +51,16 @@ def spread_of_start(model: Model, trial: Trial) -> dict[str, float]:
 
 
 def driving_size(model: Model, trials: Sequence[Trial]) -> dict[str, float]:
-    """Root mean square of what drives the rig, by random process: the reference that random efforts are a share of.
+    """Return the root mean square of the driving effort, by random process: the reference for process noise.
 
-    The effort at a joint is that of the nominal equations along the measured motion, inertia's and gravity's parts
-    included, so that a rig without an input has one too.
+    The effort at a joint is that of the nominal equations along the measured motion, with the parts of inertia and
+    gravity, so that a rig without an input has one too.
     """
     return {n: value for n, value in model.rig.driving_sizes(trials).items() if value > 0.0}
 
 
 def first_guess(model: Model, trials: Sequence[Trial], correlation_s: float = 0.0) -> StateSpaceNoise:
-    """Noise that a fit begins with: of a reading from second differences, and a small random effort."""
+    """Return start values of noise: measurement noise from second differences, and small process noise."""
     white = {n: noise.std for n, noise in _rough_noise(model, trials, correlation_s).items()}
     sizes = driving_size(model, trials)
     return StateSpaceNoise(
@@ -69,7 +69,7 @@ def first_guess(model: Model, trials: Sequence[Trial], correlation_s: float = 0.
 
 
 def _rough_noise(model: Model, trials: Sequence[Trial], correlation_s: float) -> dict[str, Noise]:
-    """Of readings so far apart that each has noise of its own."""
+    """Return white measurement noise from readings a correlation time apart."""
     steps = [slice(None, None, max(1, round(correlation_s / t.dt))) for t in trials]
     columns = [{n: v[own] for n, v in t.columns.items()} for t, own in zip(trials, steps, strict=True)]
     apart = [derived_trial(t, columns=c, time=t.time[own]) for t, c, own in zip(trials, columns, steps, strict=True)]
@@ -77,25 +77,25 @@ def _rough_noise(model: Model, trials: Sequence[Trial], correlation_s: float) ->
 
 
 def stilled(model: Model, trials: Sequence[Trial], noise: StateSpaceNoise) -> StateSpaceNoise:
-    """The same with random processes that are too small to do anything, and stay so."""
+    """Return the noise with process noise too small to have an effect, and fixed there."""
     sizes = driving_size(model, trials)
     return replace(noise, std={n: SMALLEST * sizes[n] for n in noise.std}, still=noise.processes)
 
 
 def step_s(noise: StateSpaceNoise, trials: Sequence[Trial]) -> float:
-    """From one reading to the next, s."""
+    """Return the time from one reading to the next, s."""
     return max(noise.correlation_s, *(t.dt for t in trials))
 
 
 def without_memory(noise: StateSpaceNoise, trials: Sequence[Trial]) -> StateSpaceNoise:
-    """The same with random efforts that are new in every reading, of the power that they have at rest: 2 std^2 time."""
+    """Return the noise with white process noise of the same power at low frequencies: 2 std^2 time."""
     step = step_s(noise, trials)
     std = {n: v * (noise.time[n] / step) ** 0.5 for n, v in noise.std.items()}
     return replace(noise, std=std, time=dict.fromkeys(noise.time, step), timed=noise.processes)
 
 
 def noise_limits(model: Model, trials: Sequence[Trial], correlation_s: float = 0.0) -> dict[str, tuple[float, float]]:
-    """Bounds of every parameter of the noise, by name."""
+    """Return bounds of every parameter of the noise, by name."""
     step, longest = max(t.dt for t in trials), max(t.duration for t in trials)
     out: dict[str, tuple[float, float]] = {}
     for name, noise in _rough_noise(model, trials, correlation_s).items():

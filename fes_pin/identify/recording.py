@@ -1,9 +1,9 @@
-"""Where readings were low-passed before they were stored, as a laboratory's software does with angles and forces.
+"""Estimate of a low pass that readings went through before they were stored, as in laboratory software.
 
-A low pass without delay takes from the motion what it takes from the noise, and so much noise that the little of the
-motion stands out: of a right model something would be left, and a vibration be named for it. A record that has next to
-no noise from sample to sample, beside what the nominal model leaves, may be such a one. Which cut-off it had, if any,
-is the one with which the simulation, low-passed as well, is likeliest under the noise that it leaves.
+A low pass without delay removes the fast part of motion and noise. With so little noise that part of the motion is
+significant: a right model would have a lack of fit, and a vibration might be named for it. A record with little noise
+from sample to sample, compared with the residuals of the nominal model, may be low-passed. The cut-off is the one at
+which the simulation, low-passed as well, is likeliest under the noise of its residuals.
 """
 
 from __future__ import annotations
@@ -22,26 +22,26 @@ from fes_pin.infer.levels import SMALL_SHARE, SMOOTH
 from fes_pin.models.model import Model
 
 PERIODS, MOST = 10.0, 0.2
-"""Cut-offs that are tried: from so many periods in the shortest trial, of which the ends are one or two, to this share
-of the sampling rate."""
+"""Range of cut-offs that are tried: from so many periods in the shortest trial, of which its ends spoil one or two, to
+this share of the sampling rate."""
 TRIED = 12
-"""Cut-offs, each as many times the one before, between which the best is then sought."""
+"""Cut-offs on a logarithmic grid, between which the best is then sought."""
 
 
 def low_pass_of(model: Model, trials: Sequence[Trial]) -> float | None:
-    """The cut-off of the low pass that readings went through, Hz; None of readings that are as they were read.
+    """Estimate the cut-off of a low pass that readings went through, Hz; None of readings without one.
 
     Parameters
     ----------
     model
-        The nominal one, with start values.
+        The nominal model, with start values.
     trials
-        What was measured: freely simulated, not imposed.
+        Measured trials: freely simulated, not imposed.
 
     Returns
     -------
     float or None
-        Hz, between what ten periods of the shortest trial and a fifth of the sampling rate can tell.
+        The cut-off in Hz, between ten periods in the shortest trial and a fifth of the sampling rate.
 
     Raises
     ------
@@ -66,7 +66,7 @@ def low_pass_of(model: Model, trials: Sequence[Trial]) -> float | None:
     grid = np.linspace(math.log(PERIODS / shortest), math.log(MOST / dt), TRIED)
     costs = [_cost(fitted(x)) for x in grid]
     best = int(np.argmin(costs))
-    if best in (0, TRIED - 1):  # at the end of what can be told
+    if best in (0, TRIED - 1):  # at an end of the range
         return None
     near = (grid[best - 1], grid[best + 1])
     found = minimize_scalar(lambda x: _cost(fitted(x)), bounds=near, method="bounded", options={"xatol": 0.01})
@@ -74,17 +74,16 @@ def low_pass_of(model: Model, trials: Sequence[Trial]) -> float | None:
 
 
 def improves(passed: Fit, recorded: Fit) -> bool:
-    """True if a fit of trials that were low-passed leaves a likelier noise than one of the same trials as recorded.
+    """Return whether the residual noise of a fit with a low pass is likelier than that of a fit without.
 
-    By more than little: the power of what is new in each sample must fall by `SMALL_SHARE` of itself. Of readings that
-    were low-passed twice the log-likelihood rises by 0.2 to 10 a sample, of others, whose model misses a cause, by 0.07
-    at most.
+    The power of the innovations must fall by `SMALL_SHARE`. For readings that were low-passed twice the log-likelihood
+    rises by 0.2 to 10 a sample; for others whose model misses a cause, by 0.07 at most.
     """
     return _cost(passed) < _cost(recorded) - SMALL_SHARE * sum(map(len, recorded.trials))
 
 
 def _cost(fitted: Fit) -> float:
-    """Twice the negative log-likelihood of a fit's residuals under autoregressive noise of their own."""
+    """Return twice the negative log-likelihood of a fit's residuals under their autoregressive noise."""
     noise, trials = noise_of(fitted), fitted.trials
     counts = {n: sum(one.innovations(len(t), t.dt) for t in trials if n in t) for n, one in noise.items()}
     return float(sum(2.0 * count * math.log(noise[n].innovation_std) for n, count in counts.items()))

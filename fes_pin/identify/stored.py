@@ -1,7 +1,7 @@
-"""What is known beside a model, on disk: the tables `random` and `log` of a `model.toml`.
+"""Noise and log of a saved model: the tables `random` and `log` of a `model.toml`.
 
-A rig that is simulated freely has autoregressive noise by output column; one whose input answers its reading has
-noise of each column, autoregressive where it lasts, and first-order random processes.
+A rig that is simulated freely has autoregressive noise by output column. A rig in closed loop has noise of each
+column, autoregressive where it is coloured, and first-order random processes.
 """
 
 from __future__ import annotations
@@ -30,22 +30,22 @@ _LOG = {
     "effort_noise": NumberKey("N m or N", lower=0.0, required=False),
     "low_pass_hz": NumberKey("Hz", lower=0.0, required=False),
 }
-"""What `Log` holds, as a file may."""
+"""Keys of a `Log` in a file."""
 _NOISE = {"std": NumberKey(""), "innovation_std": NumberKey(""), "step_s": NumberKey("s")}
 
 
 def stored_tables(fitted: Fit, log: Log) -> dict[str, dict[str, Any]]:
-    """What is random in a fit, and what the log of its trials does, for `model_toml`."""
+    """Return the tables of a fit's noise and of its log, for `model_toml`."""
     return {KEY: _random_table(fitted), **({LOG_KEY: log_table(log)} if log != Log() else {})}
 
 
 def log_table(log: Log) -> dict[str, float]:
-    """What a log does to its trials, by name."""
+    """Return the faults of a log, by name."""
     return {n: float(v) for n, v in asdict(log).items() if v}
 
 
 def load_log(path: str | Path) -> Log:
-    """What the log of a rig does to its trials, as `diagnose` found it.
+    """Read the faults of a rig's log, as `diagnose` found them.
 
     Raises
     ------
@@ -70,7 +70,7 @@ def _noise_table(noise: Noise) -> dict[str, Any]:
 
 
 def load_random(path: str | Path) -> Random | None:
-    """What is random about a rig as `diagnose` found it; None of a model that was saved without it.
+    """Read the noise of a rig, as `diagnose` estimated it; None of a model that was saved without it.
 
     Raises
     ------

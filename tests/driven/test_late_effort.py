@@ -44,7 +44,7 @@ def test_an_effort_that_was_written_down_late_is_moved(causes, request, tmp_path
     recorded = tuple(logged(t, rng) for t in study.trials)
     diagnosis = diagnose_joint(replace(study, trials=recorded))
     assert tuple(c.name for c in diagnosis.causes) == causes, str(diagnosis)
-    assert any("ms after it acted, and was moved" in said or "between the rows" in said for said in diagnosis.warnings)
+    assert any("ms after it acted, and was moved" in said or "between rows" in said for said in diagnosis.warnings)
     fitted = diagnosis.extended
     assert abs(fitted.values["inertia_scale"] - 1.0) < 4.0 * fitted.std("inertia_scale")
     check_that_a_prediction_knows(diagnosis, recorded[0], tmp_path)
@@ -77,7 +77,7 @@ def test_a_log_of_every_fifth_sample_is_read_between_its_rows(tmp_path):
     diagnosis = diagnose_joint(read_study(draw((), 0.3, 1151003, tmp_path, recorded=True, every=5).study))
     assert diagnosis.verdict == "adequate", str(diagnosis)
     assert diagnosis.log.effort_over_s == pytest.approx(0.008, rel=0.3) and not diagnosis.log.effort_late_s
-    assert any("was read between the rows, over" in said for said in diagnosis.warnings)
+    assert any("was interpolated between rows, over" in said for said in diagnosis.warnings)
     load = {n: v for n, v in log_table(diagnosis.log).items() if v}
     assert Log(**load) == diagnosis.log
 
