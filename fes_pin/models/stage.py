@@ -25,6 +25,8 @@ from fes_pin.models.parameters import (  # noqa: F401 - what the file of a cause
     refinement,
 )
 
+Scalar = Any
+"""A number, an array of them, or an expression of CasADi."""
 Measured = Mapping[str, np.ndarray]
 """Every measured column, all trials end to end, by name; `time` since each trial began, s."""
 ByName = Mapping[str, Any]

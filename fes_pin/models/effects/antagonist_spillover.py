@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from fes_pin.models.maths import clip, lag, maximum
-from fes_pin.models.stage import ByName, Effect, Stage, parameter, refinement
+from fes_pin.models.stage import ByName, Effect, Scalar, Signals, Stage, parameter, refinement
 
 
 @dataclass(frozen=True)
@@ -33,12 +32,12 @@ class AntagonistSpillover(Effect):
     states = ("act",)
     memories = ("recruited",)
 
-    def apply(self, value: Any, s: Any) -> Any:
+    def apply(self, value: Scalar, s: Signals) -> Scalar:
         return value - self.share * s.force_scale * lag(s.own.recruited, s.own.act, self.lag_s, s.step)[0]
 
-    def rate(self, s: Any) -> ByName:
+    def rate(self, s: Signals) -> ByName:
         return {"act": lag(s.own.recruited, s.own.act, self.lag_s, s.step)[1]}
 
-    def update(self, s: Any) -> ByName:
+    def update(self, s: Signals) -> ByName:
         room = maximum(s.c.saturation_us - self.onset_us, 1.0)
         return {"recruited": clip((s.u.pulse_width_us - self.onset_us) / room, 0.0, 1.0)}

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from fes_pin.models.maths import play
-from fes_pin.models.stage import Bounds, ByName, Effect, Grids, Measured, Stage, least_step, parameter, span
+from fes_pin.models.parameters import parameter
+from fes_pin.models.stage import Bounds, ByName, Effect, Grids, Measured, Scalar, Signals, Stage, least_step, span
 
 WIDTHS = (0.003, 0.03)
 """Half widths at which a fit starts, in addition to those that slopes lead to, as shares of the range of the motion."""
@@ -51,18 +51,18 @@ class Backlash(Effect):
         step = least_step(measured.get("position", np.zeros(1)))
         return {"half_width": 0.5 * step} if np.isfinite(step) else {}
 
-    def apply(self, value: Any, s: Any) -> Any:
+    def apply(self, value: Scalar, s: Signals) -> Scalar:
         return play(s.own.followed, value, self.half_width)
 
-    def update(self, s: Any) -> ByName:
+    def update(self, s: Signals) -> ByName:
         return {"followed": play(s.own.followed, s.q, self.half_width)}
 
-    def slack(self, s: Any) -> Mapping[str, tuple[Any, Any]]:
+    def slack(self, s: Signals) -> Mapping[str, tuple[Scalar, Scalar]]:
         return {"followed": (s.q, self.half_width)}
 
-    def rest(self, s: Any) -> ByName:
+    def rest(self, s: Signals) -> ByName:
         return {"followed": s.q}
 
-    def start_variances(self, reach: Any, speed: Any) -> ByName:
+    def start_variances(self, reach: Scalar, speed: Scalar) -> ByName:
         """Where in the slack a trial begins nobody knows: evenly spread over 2 half_width."""
         return {"followed": self.half_width**2 / 3.0}

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from fes_pin.models.maths import TURN, cos, sin
-from fes_pin.models.stage import Bounds, Effect, Grids, Measured, Stage, parameter, refinement
+from fes_pin.models.stage import Bounds, Effect, Grids, Measured, Scalar, Signals, Stage, parameter, refinement
 
 FEWEST, MOST = 1.5, 30.0
 """Waves within the measured range: one is a spring that hardens, or gravity; of one and a half, half comes again. More
@@ -57,7 +56,7 @@ class Cogging(Effect):
         size = _range(measured)
         return {"waves": (FEWEST * TURN / size, np.inf)} if size > 0.0 else {}
 
-    def apply(self, value: Any, s: Any) -> Any:
+    def apply(self, value: Scalar, s: Signals) -> Scalar:
         angle = self.waves * s.q
         value = value + self.in_phase * sin(angle) + self.quadrature * cos(angle)
         return value + self.second * sin(2.0 * angle + self.phase_rad)

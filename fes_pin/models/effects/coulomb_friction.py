@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from fes_pin.models.maths import exp, fabs, lag, log, play, power, sqrt
-from fes_pin.models.stage import Bounds, ByName, Effect, Grids, Measured, Stage, parameter, refinement
+from fes_pin.models.stage import Bounds, ByName, Effect, Grids, Measured, Scalar, Signals, Stage, parameter, refinement
 
 STIFFEST = 2.5
 """Largest rate of decay times step that it may show; RK4 is stable to 2.78: Hairer, Wanner, Solving ODEs II, IV.2."""
@@ -133,7 +132,7 @@ class CoulombFriction(Effect):
         limits |= {"stretch": (0.0, MOST_STRETCH * free)} if free > 0.0 else {}
         return {**limits, "presliding": (0.0, 0.5 * way)} if way > 0.0 else limits
 
-    def apply(self, value: Any, s: Any) -> Any:
+    def apply(self, value: Scalar, s: Signals) -> Scalar:
         ratio = s.v / self.stribeck_speed
         loaded = power(s.bearing_load, self.load_exponent, UNLOADED)
         most = self.torque_nm * loaded * (1.0 + self.stiction * exp(-ratio * ratio))
@@ -141,45 +140,45 @@ class CoulombFriction(Effect):
         most = most * (1.0 + self.asymmetry * both_ways / _length(both_ways))
         return value - most * self._acting(most, value, s)[0]
 
-    def _held(self, y: Any, s: Any) -> Any:
+    def _held(self, y: Scalar, s: Signals) -> Scalar:
         """What holds the joint at rest, in units of the largest friction."""
         if hasattr(s.own, "anchor"):
             return (s.q - s.own.anchor) / self._way(s)
         beyond = 0.5 * (_length(y + 1.0) + _length(y - 1.0))
         return y / (beyond * beyond)
 
-    def update(self, s: Any) -> ByName:
+    def update(self, s: Signals) -> ByName:
         return {"anchor": play(s.own.anchor, s.q, self._way(s))} if hasattr(s.own, "anchor") else {}
 
-    def rest(self, s: Any) -> ByName:
+    def rest(self, s: Signals) -> ByName:
         return {"anchor": s.q} if hasattr(s.own, "anchor") else {}
 
-    def start_variances(self, reach: Any, speed: Any) -> ByName:
+    def start_variances(self, reach: Scalar, speed: Scalar) -> ByName:
         """How far the contact is stretched when a trial begins nobody knows."""
         return {"anchor": self.stretch**2 / 3.0}
 
-    def _way(self, s: Any) -> Any:
+    def _way(self, s: Signals) -> Scalar:
         """Way over which the contact stretches, at least the shortest that integration steps resolve."""
         shortest = self.torque_nm * s.step / _stopping(s)
         return sqrt(self.stretch * self.stretch + shortest * shortest)
 
-    def _creeping(self, most: Any, s: Any) -> Any:
+    def _creeping(self, most: Scalar, s: Signals) -> Scalar:
         """Speed at which it creeps: on a contact that stretches at least as fast as critical damping has it."""
         if not hasattr(s.own, "anchor"):
             return self.creep_speed
         return sqrt(self.creep_speed * self.creep_speed + 0.25 * most * self._way(s) / s.inertia)
 
-    def rate(self, s: Any) -> ByName:
+    def rate(self, s: Signals) -> ByName:
         return {"share": self._acting(self.torque_nm, 0.0, s)[1]} if hasattr(s.own, "share") else {}
 
-    def _acting(self, most: Any, value: Any, s: Any) -> tuple[Any, Any]:
+    def _acting(self, most: Scalar, value: Scalar, s: Signals) -> tuple[Scalar, Scalar]:
         """Share that acts, and the rate of its state."""
         steady = self._share(most, value, s)
         if not hasattr(s.own, "share"):
             return steady, 0.0
         return lag(steady, s.own.share, self.presliding / sqrt(s.v * s.v + STANDING * STANDING), s.step)
 
-    def _share(self, most: Any, value: Any, s: Any) -> Any:
+    def _share(self, most: Scalar, value: Scalar, s: Signals) -> Scalar:
         """Share of the largest friction that acts, with its sign: clip(x)."""
         stopping = _stopping(s)
         scale = most + stopping * self._creeping(most, s)
@@ -187,7 +186,7 @@ class CoulombFriction(Effect):
         unsure = self._unsure(stopping / scale, s)
         return _clip(x, sqrt(self.softness * self.softness + 0.5 * math.pi * unsure * unsure))
 
-    def _unsure(self, slope: Any, s: Any) -> Any:
+    def _unsure(self, slope: Scalar, s: Signals) -> Scalar:
         """Standard deviation of x by the motion, with `slope` of the velocity."""
         if not hasattr(s.own, "anchor"):
             return slope * s.std(s.v)
@@ -195,7 +194,7 @@ class CoulombFriction(Effect):
         return s.std(s.q - s.own.anchor + way * slope * s.v) / way
 
 
-def _stopping(s: Any) -> Any:
+def _stopping(s: Signals) -> Scalar:
     """Torque over velocity that stops the joint within a step: k."""
     return STIFFEST * getattr(s, "stopping", s.inertia / s.step)
 
@@ -225,12 +224,12 @@ def _usual_speed(measured: Measured) -> float:
     return float(np.sqrt(np.nanmean(moved**2))) / (lag * dt) if len(moved) else 0.0
 
 
-def _length(x: Any) -> Any:
+def _length(x: Scalar) -> Scalar:
     """|x| with a rounded corner."""
     return sqrt(x * x + CORNER * CORNER)
 
 
-def _clip(x: Any, corner: Any) -> Any:
+def _clip(x: Scalar, corner: Scalar) -> Scalar:
     """x from -1 to 1 with rounded corners: corner / 2 ln(cosh((x + 1) / corner) / cosh((x - 1) / corner))."""
     above, below = fabs(x + 1.0), fabs(x - 1.0)
     tails = (1.0 + exp(-2.0 * above / corner)) / (1.0 + exp(-2.0 * below / corner))

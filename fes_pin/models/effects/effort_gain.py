@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
-from fes_pin.models.stage import Effect, Stage, parameter
+from fes_pin.models.stage import Effect, Scalar, Signals, Stage, parameter
 
 
 @dataclass(frozen=True)
@@ -28,5 +27,5 @@ class EffortGain(Effect):
     name, stage, signal, rigs = "effort_gain", Stage.RIG, "effort", ("joint",)
     scales = True
 
-    def apply(self, value: Any, s: Any) -> Any:
+    def apply(self, value: Scalar, s: Signals) -> Scalar:
         return (1.0 + self.error) * value

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from fes_pin.models.stage import Bounds, Effect, Measured, Stage, parameter
+from fes_pin.models.stage import Bounds, Effect, Measured, Scalar, Signals, Stage, parameter, symmetric
 
 
 @dataclass(frozen=True)
@@ -27,8 +26,7 @@ class EffortOffset(Effect):
 
     def limits(self, measured: Measured) -> Bounds:
         """No more than the largest effort that was commanded: more would be another rig."""
-        largest = float(np.max(np.abs(measured.get("effort", np.zeros(1)))))
-        return {"offset": (-largest, largest)} if largest > 0.0 else {}
+        return {"offset": symmetric(float(np.max(np.abs(measured.get("effort", np.zeros(1))))))}
 
-    def apply(self, value: Any, s: Any) -> Any:
+    def apply(self, value: Scalar, s: Signals) -> Scalar:
         return value + self.offset

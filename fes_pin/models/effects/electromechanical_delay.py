@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
-from fes_pin.models.stage import Effect, Stage, parameter
+from fes_pin.models.stage import Effect, Scalar, Signals, Stage, parameter
 
 
 @dataclass(frozen=True)
@@ -22,5 +21,5 @@ class ElectromechanicalDelay(Effect):
 
     name, stage, signal, rigs = "electromechanical_delay", Stage.MUSCLE, "delay", ("ankle", "muscle")
 
-    def apply(self, value: Any, s: Any) -> Any:
+    def apply(self, value: Scalar, s: Signals) -> Scalar:
         return value + self.delay_s

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from fes_pin.models.session import after_the_past
-from fes_pin.models.stage import ByName, Effect, Stage, parameter
+from fes_pin.models.stage import ByName, Effect, Scalar, Signals, Stage, parameter
 
 FLOOR = 0.35
 """Share of the force that never tires; Riener and Fuhr fit 0.3 to 0.4 to quadriceps."""
@@ -33,16 +32,16 @@ class Fatigue(Effect):
     name, stage, signal, rigs = "fatigue", Stage.MUSCLE, "force", ("ankle", "muscle")
     states, remembers = ("lost",), True
 
-    def apply(self, value: Any, s: Any) -> Any:
+    def apply(self, value: Scalar, s: Signals) -> Scalar:
         return value * (1.0 - s.own.lost)
 
-    def rest(self, s: Any) -> ByName:
+    def rest(self, s: Signals) -> ByName:
         speed, recovery = self.rate_per_s, 1.0 / self.recovery_s
         lost = after_the_past(
             s, lambda act: speed * act + recovery, lambda act: speed * act * (1.0 - FLOOR) / (speed * act + recovery)
         )
         return {"lost": lost}
 
-    def rate(self, s: Any) -> ByName:
+    def rate(self, s: Signals) -> ByName:
         lost = s.own.lost
         return {"lost": self.rate_per_s * s.act * (1.0 - FLOOR - lost) - lost / self.recovery_s}

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from fes_pin.models.maths import exp
-from fes_pin.models.stage import Bounds, Effect, Grids, Measured, Stage, parameter, refinement, span
+from fes_pin.models.stage import Bounds, Effect, Grids, Measured, Scalar, Signals, Stage, parameter, refinement, span
 
 
 @dataclass(frozen=True)
@@ -40,6 +39,6 @@ class ForceLength(Effect):
         way = span(measured, "length_m") if "length_m" in measured else 1.0
         return {"slope_per_rad": (-10.0 / way, 10.0 / way), "curvature_per_rad2": (-10.0 / way**2, 30.0 / way**2)}
 
-    def apply(self, value: Any, s: Any) -> Any:
+    def apply(self, value: Scalar, s: Signals) -> Scalar:
         x = getattr(s, "bent", 0.0)
         return value * exp((self.slope_per_rad - (self.curvature_per_rad2 + self.skew_per_rad3 * x) * x) * x)

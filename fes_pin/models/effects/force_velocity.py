@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from fes_pin.models.maths import sqrt, where
-from fes_pin.models.stage import Bounds, Effect, Grids, Measured, Stage, parameter, refinement
+from fes_pin.models.stage import Bounds, Effect, Grids, Measured, Scalar, Signals, Stage, parameter, refinement
 
 PLATEAU = 2.0
 """1 / (1.5 - 1): a stretched muscle bears half more than its isometric force at most, until data show another: van
@@ -51,20 +50,20 @@ class ForceVelocity(Effect):
             return {"slope_s_per_rad": (0.0, 1e4)}
         return {"slope_s_per_rad": (0.0 if "torque_nm" in measured else -0.5, 2.0)}
 
-    def apply(self, value: Any, s: Any) -> Any:
+    def apply(self, value: Scalar, s: Signals) -> Scalar:
         """Of a joint; a muscle on a lever has its fibres' speed from `balanced`, and v = 0 here."""
         if s.kind == "imposed":
             return value * self.factor(s.v)
         x = self.slope_s_per_rad * s.v
         return value * (1.0 - x + self.bend * x * x)
 
-    def factor(self, speed: Any) -> Any:
+    def factor(self, speed: Scalar) -> Scalar:
         """Share of the isometric force at a shortening speed."""
         x, rest = self.slope_s_per_rad * speed, 1.0 / (1.0 + self.hill)
         shortening = (1.0 - rest * x) / (1.0 + self.hill * rest * where(x > 0.0, x, 0.0))
         return where(x > 0.0, shortening, 1.0 - x / (1.0 - self.plateau * where(x < 0.0, x, 0.0)))
 
-    def balanced(self, force: Any, at_rest: Any, slope: Any) -> Any:
+    def balanced(self, force: Scalar, at_rest: Scalar, slope: Scalar) -> Scalar:
         """The shortening speed u at which force * factor(u) = at_rest + slope u: roots of two quadratics."""
         k, rest = self.slope_s_per_rad, 1.0 / (1.0 + self.hill)
         lack = force - at_rest
@@ -77,7 +76,7 @@ class ForceVelocity(Effect):
         return where(lack > 0.0, faster, -slower)
 
 
-def _root(a: Any, b: Any, c: Any) -> Any:
+def _root(a: Scalar, b: Scalar, c: Scalar) -> Scalar:
     """The positive root of a u^2 + b u = c, for a and c not below 0."""
     size = sqrt(b * b + 4.0 * a * c + SMALL)
     return where(b > 0.0, 2.0 * c / (size + where(b > 0.0, b, 0.0)), (size - b) / (2.0 * a + SMALL))

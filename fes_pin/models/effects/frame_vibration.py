@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from fes_pin.models.maths import TURN
-from fes_pin.models.stage import ByName, Effect, Stage, parameter
+from fes_pin.models.stage import ByName, Effect, Scalar, Signals, Stage, parameter
 
 
 @dataclass(frozen=True)
@@ -33,19 +32,19 @@ class FrameVibration(Effect):
     name, stage, signal, rigs = "frame_vibration", Stage.RIG, "acceleration", ("ankle", "joint")
     states = ("angle", "rate")
 
-    def apply(self, value: Any, s: Any) -> Any:
+    def apply(self, value: Scalar, s: Signals) -> Scalar:
         return value - self._swing(s, value)
 
-    def rate(self, s: Any) -> ByName:
+    def rate(self, s: Signals) -> ByName:
         # the joint's own acceleration is torque / J = q'' + phi'', solved for it
         return {"angle": s.own.rate, "rate": self._swing(s, s.driving)}
 
-    def start_variances(self, reach: Any, speed: Any) -> ByName:
+    def start_variances(self, reach: Scalar, speed: Scalar) -> ByName:
         """Where a trial begins in motion, the frame swings already."""
         swings = (self.coupling * speed) ** 2
         return {"angle": swings / (TURN * self.frequency_hz) ** 2, "rate": swings}
 
-    def _swing(self, s: Any, driving: Any) -> Any:
+    def _swing(self, s: Signals, driving: Scalar) -> Scalar:
         omega = TURN * self.frequency_hz
         spring = omega * omega * s.own.angle + 2.0 * self.damping_ratio * omega * s.own.rate
         return -spring - self.coupling * driving

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from fes_pin.models.maths import ramp
-from fes_pin.models.stage import Bounds, Effect, Grids, Measured, Stage, parameter
+from fes_pin.models.stage import Bounds, Effect, Grids, Measured, Scalar, Signals, Stage, parameter
 
 
 @dataclass(frozen=True)
@@ -44,5 +43,5 @@ class JointStop(Effect):
         low, high = (0.35, 0.999) if self.side > 0 else (0.001, 0.65)
         return {"angle_rad": (float(np.quantile(angles, low)), float(np.quantile(angles, high)))}
 
-    def apply(self, value: Any, s: Any) -> Any:
+    def apply(self, value: Scalar, s: Signals) -> Scalar:
         return value - self.side * self.stiffness * ramp(self.side * (s.q - self.angle_rad))

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from fes_pin.models.maths import exp, power
-from fes_pin.models.stage import Bounds, Effect, Measured, Stage, parameter, span
+from fes_pin.models.stage import Bounds, Effect, Measured, Scalar, Signals, Stage, parameter, span
 
 LEAST = 1e-3
 """Activation below which its power is replaced by a straight line, which keeps derivatives finite."""
@@ -34,6 +33,6 @@ class LengthDependentActivation(Effect):
         way = span(measured, "length_m")
         return {"slope": (-3.0 / way, 3.0 / way)} if way > 0.0 else {}
 
-    def apply(self, value: Any, s: Any) -> Any:
+    def apply(self, value: Scalar, s: Signals) -> Scalar:
         exponent = exp(-self.slope * getattr(s, "bent", 0.0))
         return value * power(value, exponent - 1.0, LEAST)

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
-from fes_pin.models.stage import Effect, Stage, parameter
+from fes_pin.models.stage import Effect, Scalar, Signals, Stage, parameter
 
 
 @dataclass(frozen=True)
@@ -22,5 +21,5 @@ class LoadError(Effect):
 
     name, stage, signal, rigs = "load_error", Stage.RIG, "load", ("ankle",)
 
-    def apply(self, value: Any, s: Any) -> Any:
+    def apply(self, value: Scalar, s: Signals) -> Scalar:
         return value * (1.0 + self.error)

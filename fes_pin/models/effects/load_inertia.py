@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from fes_pin.models.maths import cos, sin
-from fes_pin.models.stage import Effect, Stage, parameter, refinement
+from fes_pin.models.stage import Effect, Scalar, Signals, Stage, parameter, refinement
 
 
 @dataclass(frozen=True)
@@ -25,7 +24,7 @@ class LoadInertia(Effect):
 
     name, stage, signal, rigs = "load_inertia", Stage.JOINT, "driving", ("ankle",)
 
-    def apply(self, value: Any, s: Any) -> Any:
+    def apply(self, value: Scalar, s: Signals) -> Scalar:
         moved = self.share * s.load * s.lever * s.lever
         sine, cosine = sin(s.q), cos(s.q)
         torque = value * s.inertia - moved * (1.0 - self.wheel) * sine * cosine * s.v * s.v

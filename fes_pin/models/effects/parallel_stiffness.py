@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from fes_pin.models.maths import exp, ramp, sqrt
-from fes_pin.models.stage import Bounds, Effect, Grids, Measured, Stage, parameter, refinement
+from fes_pin.models.stage import Bounds, Effect, Grids, Measured, Scalar, Signals, Stage, parameter, refinement
 
 FLAT = 1e-6
 """Squared rate at which the exponential is a straight line, 1/m2."""
@@ -53,7 +52,7 @@ class ParallelStiffness(Effect):
         low, high = float(np.min(angles)), float(np.max(angles))
         return {"rest_angle_rad": (low - 0.5 * (high - low), high + 0.5 * (high - low))}
 
-    def apply(self, value: Any, s: Any) -> Any:
+    def apply(self, value: Scalar, s: Signals) -> Scalar:
         x = s.q - self.rest_angle_rad
         if hasattr(s, "isometric"):
             rate = sqrt(6.0 * self.hardening_per_rad2 + FLAT)

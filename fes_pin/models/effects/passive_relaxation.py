@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
-from fes_pin.models.stage import ByName, Effect, Stage, parameter
+from fes_pin.models.stage import ByName, Effect, Scalar, Signals, Stage, parameter
 
 NOTHING = 1e-30
 """Below any square of a motion: a rig that begins at rest has 0 / 0."""
@@ -29,16 +28,16 @@ class PassiveRelaxation(Effect):
     states = ("relaxed",)
     dissipative = True
 
-    def apply(self, value: Any, s: Any) -> Any:
+    def apply(self, value: Scalar, s: Signals) -> Scalar:
         return value - self.stiffness_nm_per_rad * (s.q - s.own.relaxed)
 
-    def rate(self, s: Any) -> ByName:
+    def rate(self, s: Signals) -> ByName:
         return {"relaxed": (s.q - s.own.relaxed) / self.relaxation_s}
 
-    def rest(self, s: Any) -> ByName:
+    def rest(self, s: Signals) -> ByName:
         return {"relaxed": s.q}
 
-    def start_variances(self, reach: Any, speed: Any) -> ByName:
+    def start_variances(self, reach: Scalar, speed: Scalar) -> ByName:
         """Where a trial begins in motion, how it moved before nobody knows: the damper is late, within what it does."""
         late = self.relaxation_s * speed
         return {"relaxed": late * late * reach * reach / (late * late + reach * reach + NOTHING)}

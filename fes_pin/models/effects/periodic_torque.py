@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from fes_pin.models.maths import TURN, cos, sin
-from fes_pin.models.stage import Bounds, Effect, Grids, Measured, Stage, parameter
+from fes_pin.models.stage import Bounds, Effect, Grids, Measured, Scalar, Signals, Stage, parameter
 
 FASTEST_HZ = 0.8
 """The fastest breathing that is looked for; see the source below."""
@@ -28,12 +27,7 @@ class PeriodicTorque(Effect):
     in_phase: float = parameter(0.01, unit="{effort}", null=0.0, lower=-1e6, upper=1e6, scale=0.005)
     quadrature: float = parameter(0.0, unit="{effort}", null=0.0, lower=-1e6, upper=1e6, scale=0.005)
     frequency_hz: float = parameter(
-        0.4,
-        unit="Hz",
-        lower=0.05,
-        upper=FASTEST_HZ,
-        scale=0.02,
-        grid=(0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.55, 0.6, 0.65, 0.7, 0.75),
+        0.4, unit="Hz", lower=0.05, upper=FASTEST_HZ, scale=0.02, grid=tuple(k / 20 for k in range(2, 16))
     )
 
     name, stage, signal, rigs = "periodic_torque", Stage.RIG, "torque", ("ankle", "joint")
@@ -51,7 +45,7 @@ class PeriodicTorque(Effect):
         effect."""
         return {"frequency_hz": (_slowest(measured), FASTEST_HZ)}
 
-    def apply(self, value: Any, s: Any) -> Any:
+    def apply(self, value: Scalar, s: Signals) -> Scalar:
         phase = TURN * self.frequency_hz * s.time
         return value + self.in_phase * sin(phase) + self.quadrature * cos(phase)
 

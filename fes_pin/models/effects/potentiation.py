@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from fes_pin.models.session import after_the_past
-from fes_pin.models.stage import ByName, Effect, Stage, parameter
+from fes_pin.models.stage import ByName, Effect, Scalar, Signals, Stage, parameter
 
 
 @dataclass(frozen=True)
@@ -29,11 +28,11 @@ class Potentiation(Effect):
     name, stage, signal, rigs = "potentiation", Stage.MUSCLE, "force", ("ankle", "muscle")
     states, remembers = ("level",), True
 
-    def apply(self, value: Any, s: Any) -> Any:
+    def apply(self, value: Scalar, s: Signals) -> Scalar:
         return value * (1.0 + self.gain * s.own.level)
 
-    def rest(self, s: Any) -> ByName:
+    def rest(self, s: Signals) -> ByName:
         return {"level": after_the_past(s, lambda act: 1.0 / self.decay_s, lambda act: act)}
 
-    def rate(self, s: Any) -> ByName:
+    def rate(self, s: Signals) -> ByName:
         return {"level": (s.act - s.own.level) / self.decay_s}

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from fes_pin.models.maths import power
-from fes_pin.models.stage import Effect, Stage, parameter, refinement
+from fes_pin.models.stage import Effect, Scalar, Signals, Stage, parameter, refinement
 
 LEAST = 1e-3
 """Activation below which its powers are replaced by a straight line, which keeps derivatives finite."""
@@ -30,6 +29,6 @@ class PulseSummation(Effect):
 
     name, stage, signal, rigs = "pulse_summation", Stage.MUSCLE, "activation", ("muscle",)
 
-    def apply(self, value: Any, s: Any) -> Any:
+    def apply(self, value: Scalar, s: Signals) -> Scalar:
         bound = value * power(value, self.cooperation, LEAST)
         return (1.0 + self.saturation) * bound / (1.0 + self.saturation * bound)

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from fes_pin.models.maths import fabs
-from fes_pin.models.stage import Effect, Stage, parameter
+from fes_pin.models.stage import Effect, Scalar, Signals, Stage, parameter
 
 
 @dataclass(frozen=True)
@@ -24,5 +23,5 @@ class QuadraticDamping(Effect):
     name, stage, signal, rigs = "quadratic_damping", Stage.JOINT, "torque", ("ankle", "joint")
     dissipative = True
 
-    def apply(self, value: Any, s: Any) -> Any:
+    def apply(self, value: Scalar, s: Signals) -> Scalar:
         return value - self.coefficient * s.v * fabs(s.v)

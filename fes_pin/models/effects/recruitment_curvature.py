@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from fes_pin.models.maths import exp, log, maximum
-from fes_pin.models.stage import Effect, Stage, parameter
+from fes_pin.models.stage import Effect, Scalar, Signals, Stage, parameter
 
 R_SMALL = 1e-6
 """Recruitment below which its power is linear: a millionth of the muscle."""
@@ -30,7 +29,7 @@ class RecruitmentCurvature(Effect):
 
     name, stage, signal, rigs = "recruitment_curvature", Stage.NERVE, "recruitment", ("ankle", "muscle")
 
-    def apply(self, value: Any, s: Any) -> Any:
+    def apply(self, value: Scalar, s: Signals) -> Scalar:
         n, bend = exp(self.log_exponent), exp(self.log_bend)
         power = value * exp((n - 1.0) * log(maximum(value, R_SMALL)))
         return bend * power / (1.0 + (bend - 1.0) * power)

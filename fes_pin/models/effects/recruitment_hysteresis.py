@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from fes_pin.models.maths import play
-from fes_pin.models.stage import ByName, Effect, Stage, parameter
+from fes_pin.models.stage import ByName, Effect, Scalar, Signals, Stage, parameter
 
 
 @dataclass(frozen=True)
@@ -26,8 +25,8 @@ class RecruitmentHysteresis(Effect):
     name, stage, signal, rigs = "recruitment_hysteresis", Stage.NERVE, "pulse_width", ("ankle", "muscle")
     memories = ("followed",)
 
-    def apply(self, value: Any, s: Any) -> Any:
+    def apply(self, value: Scalar, s: Signals) -> Scalar:
         return play(s.own.followed, value, self.half_width_us)
 
-    def update(self, s: Any) -> ByName:
+    def update(self, s: Signals) -> ByName:
         return {"followed": play(s.own.followed, s.commanded, self.half_width_us)}

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from fes_pin.models.maths import ramp
-from fes_pin.models.stage import Bounds, ByName, Effect, Measured, Stage, parameter, span
+from fes_pin.models.stage import Bounds, ByName, Effect, Measured, Scalar, Signals, Stage, parameter, span
 
 LOST_S = 0.1
 """Time constant with which it is lost where the muscle is not activated, s: it does not outlast deactivation
@@ -34,9 +33,9 @@ class ResidualForceEnhancement(Effect):
         way = span(measured, "length_m")
         return {"gain": (-1.0 / way, 1.0 / way)} if way > 0.0 else {}
 
-    def apply(self, value: Any, s: Any) -> Any:
+    def apply(self, value: Scalar, s: Signals) -> Scalar:
         return value * (1.0 + self.gain * s.own.stretched)
 
-    def rate(self, s: Any) -> ByName:
+    def rate(self, s: Signals) -> ByName:
         gained = s.act * ramp(getattr(s, "stretching", 0.0))
         return {"stretched": gained - ramp(1.0 - s.act) * s.own.stretched / LOST_S}

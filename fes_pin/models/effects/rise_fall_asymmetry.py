@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from fes_pin.models.maths import exp, where
-from fes_pin.models.stage import Effect, Stage, parameter
+from fes_pin.models.stage import Effect, Scalar, Signals, Stage, parameter
 
 
 @dataclass(frozen=True)
@@ -23,5 +22,5 @@ class RiseFallAsymmetry(Effect):
 
     name, stage, signal, rigs = "rise_fall_asymmetry", Stage.MUSCLE, "time_constant", ("ankle", "muscle")
 
-    def apply(self, value: Any, s: Any) -> Any:
+    def apply(self, value: Scalar, s: Signals) -> Scalar:
         return value * where(s.r < s.act, exp(self.log_ratio), 1.0)

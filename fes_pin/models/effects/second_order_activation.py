@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from fes_pin.models.maths import lag
-from fes_pin.models.stage import ByName, Effect, Stage, parameter
+from fes_pin.models.stage import ByName, Effect, Scalar, Signals, Stage, parameter
 
 
 @dataclass(frozen=True)
@@ -26,9 +25,9 @@ class SecondOrderActivation(Effect):
     states = ("lagged",)
     max_step_s = 1.25e-3
 
-    def apply(self, value: Any, s: Any) -> Any:
+    def apply(self, value: Scalar, s: Signals) -> Scalar:
         s.unlagged = value
         return lag(value, s.own.lagged, self.second_s, s.step)[0]
 
-    def rate(self, s: Any) -> ByName:
+    def rate(self, s: Signals) -> ByName:
         return {"lagged": lag(s.unlagged, s.own.lagged, self.second_s, s.step)[1]}

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from fes_pin.models.stage import Bounds, Effect, Measured, Stage, parameter, reading_range, refinement, symmetric
+from fes_pin.models.parameters import parameter, refinement
+from fes_pin.models.stage import Bounds, Effect, Measured, Scalar, Signals, Stage, reading_range, symmetric
 
 
 @dataclass(frozen=True)
@@ -31,5 +31,5 @@ class SensorDrift(Effect):
         longest = float(np.max(measured.get("time", np.zeros(1))))
         return {"rate_per_s": (low / longest, high / longest)} if longest > 0.0 and high > 0.0 else {}
 
-    def apply(self, value: Any, s: Any) -> Any:
+    def apply(self, value: Scalar, s: Signals) -> Scalar:
         return value + self.rate_per_s * s.time / (1.0 + self.settling_per_s * s.time)

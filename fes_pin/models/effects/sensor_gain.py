@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
-from fes_pin.models.stage import FromAPlace, Stage, counted_from, parameter
+from fes_pin.models.stage import FromAPlace, Scalar, Signals, Stage, counted_from, parameter
 
 
 @dataclass(frozen=True)
@@ -29,5 +28,5 @@ class SensorGain(FromAPlace):
     name, stage, signal, rigs = "sensor_gain", Stage.SENSOR, "reading", ("ankle", "joint")
     scales = True
 
-    def apply(self, value: Any, s: Any) -> Any:
+    def apply(self, value: Scalar, s: Signals) -> Scalar:
         return value + self.error * (value - counted_from(s, self.place))

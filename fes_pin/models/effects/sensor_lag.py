@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from fes_pin.models.maths import lag, lag_time
-from fes_pin.models.stage import ByName, Effect, Measured, Stage, least_step, parameter, refinement
+from fes_pin.models.stage import ByName, Effect, Measured, Scalar, Signals, Stage, least_step, parameter, refinement
 
 
 @dataclass(frozen=True)
@@ -34,21 +33,21 @@ class SensorLag(Effect):
         """Half a row of a controller's log, which does not say when in it the effort answered the reading."""
         return {"lag_s": 0.5 * least_step(measured["time"])} if "answer" in measured else {}
 
-    def apply(self, value: Any, s: Any) -> Any:
+    def apply(self, value: Scalar, s: Signals) -> Scalar:
         return value + (1.0 + self.shift) * (self._lagged(s)[0] - s.sensed)
 
-    def rate(self, s: Any) -> ByName:
+    def rate(self, s: Signals) -> ByName:
         return {"filtered": self._lagged(s)[1]}
 
-    def rest(self, s: Any) -> ByName:
+    def rest(self, s: Signals) -> ByName:
         return {"filtered": s.sensed - lag_time(self._lag(), s.step) * s.sensed_rate}
 
-    def start_variances(self, reach: Any, speed: Any) -> ByName:
+    def start_variances(self, reach: Scalar, speed: Scalar) -> ByName:
         """Where a trial begins in motion, how it moved before nobody knows."""
         return {"filtered": (self._lag() * speed) ** 2}
 
-    def _lagged(self, s: Any) -> tuple[Any, Any]:
+    def _lagged(self, s: Signals) -> tuple[Scalar, Scalar]:
         return lag(s.sensed, s.own.filtered, self._lag(), s.step)
 
-    def _lag(self) -> Any:
+    def _lag(self) -> Scalar:
         return self.lag_s / (1.0 + self.shift)

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
-from fes_pin.models.stage import FromAPlace, Stage, counted_from, parameter, refinement
+from fes_pin.models.stage import FromAPlace, Scalar, Signals, Stage, counted_from, parameter, refinement
 
 
 @dataclass(frozen=True)
@@ -29,6 +28,6 @@ class SensorNonlinearity(FromAPlace):
 
     name, stage, signal, rigs = "sensor_nonlinearity", Stage.SENSOR, "reading", ("ankle", "joint")
 
-    def apply(self, value: Any, s: Any) -> Any:
+    def apply(self, value: Scalar, s: Signals) -> Scalar:
         x = value - counted_from(s, self.place)
         return value + self.curvature * x * x * (1.0 + self.skew_per_rad * x)

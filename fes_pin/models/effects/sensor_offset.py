@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
-from fes_pin.models.stage import Bounds, Effect, Measured, Stage, parameter, reading_range, symmetric
+from fes_pin.models.stage import Bounds, Effect, Measured, Scalar, Signals, Stage, parameter, reading_range, symmetric
 
 
 @dataclass(frozen=True)
@@ -26,5 +25,5 @@ class SensorOffset(Effect):
         """No more than the sensor's readings differ by: more would be another place."""
         return {"offset": symmetric(reading_range(measured))}
 
-    def apply(self, value: Any, s: Any) -> Any:
+    def apply(self, value: Scalar, s: Signals) -> Scalar:
         return value + self.offset

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from fes_pin.models.maths import exp
-from fes_pin.models.stage import Bounds, ByName, Effect, Grids, Measured, Stage, parameter, refinement, span
+from fes_pin.models.parameters import parameter, refinement
+from fes_pin.models.stage import Bounds, ByName, Effect, Grids, Measured, Scalar, Signals, Stage, span
 
 RIGID = 1e-16
 """Compliance that counts as none, m/N."""
@@ -51,17 +51,17 @@ class SeriesElasticity(Effect):
         force = max(float(np.nanmax(measured.get("reading", np.ones(1)))), 1e-9)
         return {"compliance": (0.0, longest / force), "toe": (0.0, longest), "toe_force": (0.05 * force, force)}
 
-    def elongation(self, s: Any) -> Any:
+    def elongation(self, s: Signals) -> Scalar:
         """Of the tendon, m."""
         tension = s.own.tension
         return self.compliance * tension + self.toe * (1.0 - exp(-tension / self.toe_force))
 
-    def softness(self, s: Any) -> Any:
+    def softness(self, s: Signals) -> Scalar:
         """d(elongation) / d(tension), m/N."""
         return RIGID + self.compliance + self.toe / self.toe_force * exp(-s.own.tension / self.toe_force)
 
-    def apply(self, value: Any, s: Any) -> Any:
+    def apply(self, value: Scalar, s: Signals) -> Scalar:
         return value
 
-    def rate(self, s: Any) -> ByName:
+    def rate(self, s: Signals) -> ByName:
         return {"tension": (s.tendon - s.own.tension) / (0.5 * s.step)}

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from fes_pin.models.maths import ramp
-from fes_pin.models.stage import ByName, Effect, Stage, parameter
+from fes_pin.models.stage import ByName, Effect, Scalar, Signals, Stage, parameter
 
 
 @dataclass(frozen=True)
@@ -28,10 +27,10 @@ class StretchReflex(Effect):
     name, stage, signal, rigs = "stretch_reflex", Stage.JOINT, "torque", ("ankle",)
     states = ("follow", "change")
 
-    def apply(self, value: Any, s: Any) -> Any:
+    def apply(self, value: Scalar, s: Signals) -> Scalar:
         late = s.v - self.delay_s * s.own.change
         return value - self.side * self.gain_nms * ramp(self.side * late)
 
-    def rate(self, s: Any) -> ByName:
+    def rate(self, s: Signals) -> ByName:
         own, pace = s.own, 1.0 / self.delay_s
         return {"follow": own.change, "change": 12.0 * pace * pace * (s.v - own.follow) - 6.0 * pace * own.change}

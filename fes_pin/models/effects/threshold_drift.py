@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
-from fes_pin.models.stage import Effect, Stage, parameter, refinement
+from fes_pin.models.stage import Effect, Scalar, Signals, Stage, parameter, refinement
 
 
 @dataclass(frozen=True)
@@ -25,5 +24,5 @@ class ThresholdDrift(Effect):
 
     name, stage, signal, rigs = "threshold_drift", Stage.NERVE, "pulse_width", ("ankle", "muscle")
 
-    def apply(self, value: Any, s: Any) -> Any:
+    def apply(self, value: Scalar, s: Signals) -> Scalar:
         return value - self.rate_us_per_s * s.time / (1.0 + self.settling_per_s * s.time)
