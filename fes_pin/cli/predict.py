@@ -52,9 +52,7 @@ def predict(
     horizon: Annotated[
         float | None,
         typer.Option(
-            min=0.0,
-            metavar="SECONDS",
-            help="Predict each sample from what the trial measured up to so long before it.",
+            min=0.0, metavar="SECONDS", help="Predict each sample from what the trial measured up to so long before it."
         ),
     ] = None,
     library: Libraries = None,

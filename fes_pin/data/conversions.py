@@ -71,23 +71,17 @@ def _numbers(row: Mapping[str, Any], path: Path) -> list[float]:
         raise InputError(f"not a log as it was when this was written: {problem}", file=path) from None
 
 
+_CYCLED = "data/dataset-1/characterization datasets/{rate}{pull}lbtension.json"
+_WIDENED = "data/dataset-3/characterization tests/{rate}30lbtension{wide}amplitude.json"
+_RATES = ("0.5Hz", "1Hz")
 DAMPER_FILES = {
-    **{
-        f"d1_{pull}lb_{rate.lower()}": (
-            f"data/dataset-1/characterization datasets/{rate}{pull}lbtension.json",
-            f"{pull} lb",
-        )
-        for pull in (20, 35, 70)
-        for rate in ("0.5Hz", "1Hz")
-    },
-    **{
-        f"d3_30lb_{rate.lower()}_{wide}in": (
-            f"data/dataset-3/characterization tests/{rate}30lbtension{wide}amplitude.json",
-            "30 lb, 2023",
-        )
-        for wide in ("0.5", "1", "1.5")
-        for rate in ("0.5Hz", "1Hz")
-    },
+    f"d1_{pull}lb_{rate.lower()}": (_CYCLED.format(rate=rate, pull=pull), f"{pull} lb")
+    for pull in (20, 35, 70)
+    for rate in _RATES
+} | {
+    f"d3_30lb_{rate.lower()}_{wide}in": (_WIDENED.format(rate=rate, wide=wide), "30 lb, 2023")
+    for wide in ("0.5", "1", "1.5")
+    for rate in _RATES
 }
 """By the trial's name its file, and the tension that the experimenter set."""
 

@@ -199,13 +199,8 @@ def _retrieve(dataset: Dataset, scratch: Path) -> None:
         target.parent.mkdir(parents=True, exist_ok=True)
         address = dataset.url + quote(place)
         try:
-            pooch.retrieve(
-                address,
-                known_hash=None if known is None else f"sha256:{known}",
-                fname=target.name,
-                path=target.parent,
-                downloader=fetcher,
-            )
+            expected = None if known is None else f"sha256:{known}"
+            pooch.retrieve(address, expected, fname=target.name, path=target.parent, downloader=fetcher)
         except Exception as error:
             reason = "its checksum is another" if "does not match the known hash" in str(error) else _short(error)
             raise InputError(f"cannot be fetched: {reason}", file=address) from None

@@ -166,8 +166,5 @@ def _spline(time: np.ndarray, values: np.ndarray, knots: np.ndarray) -> BSpline:
 
 
 def _knot_places(time: np.ndarray, inner: int) -> np.ndarray:
-    return np.r_[
-        np.full(DEGREE + 1, time[0]),
-        np.linspace(time[0], time[-1], inner + 2)[1:-1],
-        np.full(DEGREE + 1, time[-1]),
-    ]
+    """Knots in equal steps, with as many at each end as a spline of this degree needs."""
+    return np.pad(np.linspace(time[0], time[-1], inner + 2), DEGREE, mode="edge")

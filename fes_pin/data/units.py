@@ -54,11 +54,7 @@ _SPELLINGS = {
 """Other spellings, as measuring systems write them, in the form that `_plain` leaves."""
 
 _BY_SUFFIX = {"s": "time", "us": "pulse width", "rad": "angle", "m": "length", "n": "force", "nm": "torque"}
-_OF_A_JOINT = {
-    "position": ("angle", "length"),
-    "velocity": ("angular rate", "speed"),
-    "effort": ("torque", "force"),
-}
+_OF_A_JOINT = {"position": ("angle", "length"), "velocity": ("angular rate", "speed"), "effort": ("torque", "force")}
 
 
 def _plain(unit: str) -> str:

@@ -19,7 +19,7 @@ from fes_pin.models.disturbance import disturbed
 from fes_pin.models.model import Model
 from fes_pin.models.predictions import PredictedOutput, PredictedTrial, Readings
 from fes_pin.models.rigs.base import Rig
-from fes_pin.models.simulate import Block, EachTrial, Values, max_step, side_by_side, spread, substeps
+from fes_pin.models.simulate import Block, EachTrial, OnTrials, Values, max_step, spread
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +95,7 @@ class StateSpaceNoise(ReadOnly, Mapping[str, Noise]):
         return {f"{part}.{n}": v for part in ("white", "std", "time") for n, v in getattr(self, part).items()}
 
 
-class Predictor:
+class Predictor(OnTrials):
     """A model structure on measured trials, ready to foretell them for any values of its parameters.
 
     Parameters
@@ -123,17 +123,13 @@ class Predictor:
         priors: Sequence[Mapping[str, float]],
         correlation_s: float = 0.0,
     ) -> None:
-        self.model, self.trials, self.columns = model, tuple(trials), columns
-        self.max_step_s = min([max_step(model), *(e.predictor_step_s for e in model.effects)])
-        together, own = side_by_side(self.trials, columns, self._key), (columns, processes, priors)
-        self._blocks = [
-            _Prediction(model, self.trials, lanes, *own, self.max_step_s, correlation_s) for lanes in together
-        ]
+        super().__init__(model, trials, columns, min([max_step(model), *(e.predictor_step_s for e in model.effects)]))
+        self.processes, self.priors, self.correlation_s = processes, priors, correlation_s
+        self._blocks = [_Prediction(self, lanes) for lanes in self.side_by_side()]
 
-    def _key(self, trial: Trial) -> tuple[Any, ...]:
-        """What trials share that can share a block: kind, inputs, what was measured, integration steps per sample."""
-        steps = substeps(self.model, trial.dt, self.max_step_s)
-        return trial.kind, self.model.driven_by(trial), measured_outputs(self.model, trial), steps
+    def key(self, trial: Trial) -> tuple[Any, ...]:
+        """What trials share that can share a block: also what was measured."""
+        return (*super().key(trial), measured_outputs(self.model, trial))
 
     def run(
         self, values: Values, noise: StateSpaceNoise | Sequence[StateSpaceNoise], unknowns: EachTrial
@@ -211,28 +207,19 @@ def measured_outputs(model: Model, trial: Trial) -> tuple[str, ...]:
 class _Prediction(Block):
     """A block with what was measured."""
 
-    def __init__(
-        self,
-        model: Model,
-        trials: Sequence[Trial],
-        lanes: list[int],
-        columns: tuple[str, ...],
-        processes: tuple[str, ...],
-        priors: Sequence[Mapping[str, float]],
-        max_step_s: float,
-        correlation_s: float,
-    ) -> None:
-        kind, self.outputs = trials[lanes[0]].kind, measured_outputs(model, trials[lanes[0]])
-        super().__init__(disturbed(model, kind, processes), trials, lanes, columns, max_step_s, self.outputs)
+    def __init__(self, all_of: Predictor, lanes: list[int]) -> None:
+        first = all_of.trials[lanes[0]]
+        kind, self.outputs = first.kind, measured_outputs(all_of.model, first)
+        super().__init__(all_of, lanes, disturbed(all_of.model, kind, all_of.processes), self.outputs)
         for name in self.rig.unknowns(kind):
-            self._set(self.constants, f"prior.{name}", [priors[i][name] for i in lanes])
+            self._set(self.constants, f"prior.{name}", [all_of.priors[i][name] for i in lanes])
         self.noise_names = [n for n in self.layout.constants if n.startswith(("white.", "std.", "time."))]
         self.seen = np.zeros((self.count, len(self.outputs), self.width), dtype=bool)
         self.measured = np.zeros((self.count, len(self.outputs), self.width))
         self.repeated = np.ones((self.count, len(self.outputs), self.width))
         self.readings: list[Readings] = []
         for lane, trial in enumerate(self.trials):
-            read, n = read_columns(self.rig, trial, self.outputs, correlation_s), len(trial)
+            read, n = read_columns(self.rig, trial, self.outputs, all_of.correlation_s), len(trial)
             self.seen[:n, :, lane], self.measured[:n, :, lane], self.repeated[:n, :, lane] = read[:3]
             self.readings.append(read.readings)
 

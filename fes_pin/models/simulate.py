@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -74,7 +74,37 @@ class SimulatedBatch:
     sensitivities: np.ndarray
 
 
-class Simulator:
+class OnTrials:
+    """A model structure on trials, which run in blocks of those that can share one.
+
+    Parameters
+    ----------
+    model, trials, columns
+        See `Simulator`.
+    max_step_s
+        Longest integration step.
+    """
+
+    def __init__(self, model: Model, trials: Sequence[Trial], columns: tuple[str, ...], max_step_s: float) -> None:
+        self.model, self.trials, self.columns, self.max_step_s = model, tuple(trials), columns, max_step_s
+
+    def key(self, trial: Trial) -> tuple[Any, ...]:
+        """What trials share that can share a block: kind, inputs and integration steps per sample."""
+        return trial.kind, self.model.driven_by(trial), substeps(self.model, trial.dt, self.max_step_s)
+
+    def side_by_side(self) -> Iterator[list[int]]:
+        """Places of trials that can share a block: those of the same key, of similar length."""
+        groups: dict[Any, list[int]] = {}
+        for i, trial in enumerate(self.trials):
+            groups.setdefault(self.key(trial), []).append(i)
+        for members in groups.values():
+            members.sort(key=lambda i: len(self.trials[i]))
+            most = widest(self.columns)
+            for start in range(0, len(members), most):
+                yield members[start : start + most]
+
+
+class Simulator(OnTrials):
     """A model structure on a set of trials, ready to run for any parameter values.
 
     Parameters
@@ -92,15 +122,9 @@ class Simulator:
     def __init__(
         self, model: Model, trials: Sequence[Trial], columns: tuple[str, ...] = (), max_step_s: float | None = None
     ) -> None:
-        self.model, self.trials, self.columns = model, tuple(trials), columns
-        self.max_step_s = max_step(model) if max_step_s is None else max_step_s
-        steps, together = self.max_step_s, side_by_side(self.trials, columns, self._key)
-        self._blocks = [_Simulation(model, self.trials, lanes, columns, steps) for lanes in together]
+        super().__init__(model, trials, columns, max_step(model) if max_step_s is None else max_step_s)
+        self._blocks = [_Simulation(self, lanes, model) for lanes in self.side_by_side()]
         self._fixed = {n: value for block in self._blocks for n, value in block.layout.fixed}
-
-    def _key(self, trial: Trial) -> tuple[Any, ...]:
-        """What trials share that can share a block: kind, inputs and integration steps per sample."""
-        return trial.kind, self.model.driven_by(trial), substeps(self.model, trial.dt, self.max_step_s)
 
     def run(self, values: Values, unknowns: EachTrial | None = None) -> list[Simulated]:
         """Simulate every trial.
@@ -193,28 +217,19 @@ class Block:
 
     Parameters
     ----------
-    model, trials
-        Of all blocks.
+    all_of
+        What all blocks are of. Sensitivities that the model has not are left out.
     lanes
         Places of those among the trials that are in this one.
-    columns
-        Sensitivities that are asked for; those that the model has not are left out.
-    max_step_s
-        Longest integration step.
+    model
+        With what acts at random.
     measured
         Outputs whose measurement corrects the states, for a predictor.
     """
 
-    def __init__(
-        self,
-        model: Model,
-        trials: Sequence[Trial],
-        lanes: list[int],
-        columns: tuple[str, ...],
-        max_step_s: float,
-        measured: tuple[str, ...] = (),
-    ) -> None:
-        first, self.lanes, self.trials = trials[lanes[0]], lanes, [trials[i] for i in lanes]
+    def __init__(self, all_of: OnTrials, lanes: list[int], model: Model, measured: tuple[str, ...] = ()) -> None:
+        self.lanes, self.trials, columns = lanes, [all_of.trials[i] for i in lanes], all_of.columns
+        first = self.trials[0]
         self.model, self.rig, self.inputs = model, model.rig, model.driven_by(first)
         model = model.acting(first.kind, self.rig.input_columns(first))
         available = set(model.parameters()) | set(model.unknowns(first.kind))
@@ -222,7 +237,7 @@ class Block:
         self.layout, self.width = make_layout(model, first.kind, self.inputs, chosen, measured, width), width
         self.program: Program = compiled_program(model, self.layout)
         self.places = tuple(columns.index(n) for n in self.layout.columns)
-        self.substeps = substeps(model, first.dt, max_step_s)
+        self.substeps = substeps(model, first.dt, all_of.max_step_s)
         self.count = max(len(t) for t in self.trials)
         padded = self.trials + [self.trials[-1]] * (width - len(lanes))
         known = [{**self.rig.constants_of(t), **timing(t, self.substeps)} for t in padded]
@@ -277,20 +292,6 @@ def spread(sensitivities: np.ndarray, places: tuple[int, ...], width: int) -> np
     full = np.zeros((*sensitivities.shape[:2], width))
     full[..., list(places)] = sensitivities
     return full
-
-
-def side_by_side(
-    trials: Sequence[Trial], columns: tuple[str, ...], key: Callable[[Trial], Hashable]
-) -> Iterator[list[int]]:
-    """Places of trials that can share a block: those of the same key, of similar length."""
-    groups: dict[Hashable, list[int]] = {}
-    for i, trial in enumerate(trials):
-        groups.setdefault(key(trial), []).append(i)
-    for members in groups.values():
-        members.sort(key=lambda i: len(trials[i]))
-        most = widest(columns)
-        for start in range(0, len(members), most):
-            yield members[start : start + most]
 
 
 def max_step(model: Model) -> float:

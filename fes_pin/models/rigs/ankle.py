@@ -23,17 +23,6 @@ from fes_pin.models.stage import Signals, parameter
 
 UPRIGHT = 1.5707963267948966
 """The angle of the largest lever, pi/2 rad, where the muscle's length counts as its reference."""
-CONSTANTS = (
-    "foot_mass_kg",
-    "com_distance_m",
-    "moment_arm_m",
-    "force_scale_n",
-    "threshold_us",
-    "saturation_us",
-    "f0_n",
-    "f1_per_rad",
-    "theta_r_rad",
-)
 
 
 @dataclass(frozen=True)
@@ -59,7 +48,7 @@ class Ankle(Rig):
     inertia_kgm2: float = parameter(1e-3, unit="kg m2", lower=1e-6, upper=10.0, scale=2e-4)
     damping_nms: float = parameter(0.06, unit="N m s", lower=0.0, upper=100.0, scale=0.01)
 
-    name, needed = "ankle", CONSTANTS
+    name = "ankle"
     settings = ("--set load_kg=1.5", "--set kind=isometric --set angle_rad=1.9", "--set kind=imposed")
     schema = RigSchema(
         constants={
@@ -88,6 +77,7 @@ class Ankle(Rig):
         inputs=("pulse_width_us",),
         imposed=("angle_rad",),
     )
+    needed = (*schema.constants, *schema.passive)
 
     @classmethod
     def of_study(cls, study: Study) -> Ankle:
@@ -131,10 +121,10 @@ class Ankle(Rig):
 
     def constant_names(self, kind: str) -> tuple[str, ...]:
         own = {"motion": ("load_kg",), "isometric": ("angle_rad",), IMPOSED: ("load_kg", "torque_sign")}
-        return (*CONSTANTS, "gravity_cos", "gravity_sin", *own[kind])
+        return (*self.needed, "gravity_cos", "gravity_sin", *own[kind])
 
     def trial_constants(self, trial: Trial) -> dict[str, float]:
-        known = {name: float(self.constants[name]) for name in CONSTANTS}
+        known = {name: float(self.constants[name]) for name in self.needed}
         a, b = _foot_gravity(known["foot_mass_kg"], known["com_distance_m"])
         known.update(gravity_cos=a, gravity_sin=b)
         if trial.kind == IMPOSED:
@@ -164,7 +154,7 @@ class Ankle(Rig):
         """
         from scipy.signal import lfilter  # noqa: PLC0415 - half a second, for dynamometers alone
 
-        c, rows, read = {n: float(self.constants[n]) for n in CONSTANTS}, [], []
+        c, rows, read = {n: float(self.constants[n]) for n in self.needed}, [], []
         for trial in trials:
             q, v, bend = imposed_motion(trial, self.schema.imposed).values
             pole = math.exp(-trial.dt / self.time_constant_s)
