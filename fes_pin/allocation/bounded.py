@@ -19,8 +19,8 @@ from scipy.sparse import csc_matrix
 
 from fes_pin.data.errors import InputError
 
-TOLERANCE = 1e-11
-"""Violation of a limit that DAQP lets pass: a hundred times what rounding makes of numbers about 1."""
+TOLERANCE = 1e-13
+"""Violation of a limit that DAQP lets pass: 450 units of rounding of numbers about 1."""
 PRECISE = 1e-14
 """Residual, of `lone_steps`, up to which an answer is taken as it is: 50 units of rounding."""
 
