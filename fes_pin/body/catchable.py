@@ -14,10 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fes_pin.body.attainable import SETTLE_DEG, Leans, greatest_leans, lean_text
+from fes_pin.body.attainable import Leans, greatest_leans, lean_text
 from fes_pin.body.inputs import Inputs
 from fes_pin.body.linear_body import LinearBody
-from fes_pin.body.plans import Plans
+from fes_pin.body.plans import SETTLE_DEG, Plans
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import number, positive_number, truth
 
@@ -120,10 +120,7 @@ def catchable(
     """
     inputs = Inputs.of(inputs, linear)
     plans = plans_of(linear, inputs, settle_deg, balance, rest_deg, gravity)
-    still = np.zeros(len(plans.modes))
-    upright, falls = plans.program(still, still), np.diag(plans.modes.degree)[plans.modes.kinds == "fall"]
-    rests = upright.solve().x is not None
-    leans, errors = greatest_leans(upright, lambda i, sign: plans.program(sign * falls[i], still), len(falls), rests)
+    leans, errors, rests = greatest_leans(plans)
     return CaughtLeans(plans.modes.falling, leans, errors, rests, modal_bound(linear, inputs, gravity=gravity))
 
 

@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from fes_pin.body.attainable import SETTLE_DEG
 from fes_pin.body.balance import soles_of
 from fes_pin.body.catchable import plans_of
 from fes_pin.body.ground import centre_of_pressure
@@ -24,7 +23,7 @@ from fes_pin.body.inputs import Inputs
 from fes_pin.body.joints import JOINT_NAMES, angles_array
 from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.linearize import model_on_slope
-from fes_pin.body.plans import PULSE_S, Plans
+from fes_pin.body.plans import PULSE_S, SETTLE_DEG, Plans
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import positive_number, truth
 from fes_pin.data.tabulated import Tabulated

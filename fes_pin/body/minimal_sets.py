@@ -13,13 +13,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fes_pin.body.attainable import SETTLE_DEG, HoldingDemands, attainable, demands, lean_text
+from fes_pin.body.attainable import attainable, lean_text
 from fes_pin.body.catchable import catchable, plans_of
 from fes_pin.body.controllability import modal_controllability
 from fes_pin.body.covering import Demand, smallest
 from fes_pin.body.inputs import Inputs
 from fes_pin.body.joints import SIDES, known_joint, names_of
 from fes_pin.body.linear_body import LinearBody
+from fes_pin.body.plans import SETTLE_DEG, Plans
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import all_known, known_word, number, positive_number, truth, whole
 
@@ -225,41 +226,35 @@ class _Question:
 
 def _smallest(linear: LinearBody, inputs: Inputs, asked: _Question, alternatives: int) -> list[tuple[str, ...]]:
     """Names of the inputs of the smallest sets."""
-    settle = asked.settle_deg if asked.together else np.inf
-    wanted = demands(linear, inputs, asked.gravity, settle, asked.balance)
-    rows, needs = _in_turn(wanted, inputs, asked.lean_deg)
-    cases: list[Demand] = []
-    if asked.together and asked.stimulation == "constant":
-        cases = _held(wanted, asked.lean_deg)
+    if asked.together and asked.stimulation == "over_time":
+        plans = plans_of(linear, inputs, asked.settle_deg, asked.balance, gravity=asked.gravity)
+    else:
+        plans = Plans.held(linear, inputs, asked.settle_deg, asked.balance, asked.gravity)
+    rows, needs = _in_turn(plans, asked.lean_deg)
+    if plans.steady and asked.together and len(plans.leans):
         # balance and leans in k modes need k inputs; inputs that only pull, around no load at all, k + 1
-        alone = not wanted.target.any() and not inputs.lower.any()
-        if wanted.falling:
-            rows, needs = np.vstack([rows, np.ones(inputs.n)]), np.append(needs, len(wanted.falling) + alone)
-    elif asked.together:
-        cases = _caught(linear, inputs, asked)
-    found = smallest(inputs.n, rows, needs, cases, alternatives)
+        alone = not plans.constant[plans.modes.kinds == "fall"].any() and not inputs.lower.any()
+        rows, needs = np.vstack([rows, np.ones(inputs.n)]), np.append(needs, len(plans.leans) + alone)
+    found = smallest(inputs.n, rows, needs, _leaning(plans, asked.lean_deg) if asked.together else [], alternatives)
     return [tuple(name for name, z in zip(inputs.names, chosen, strict=True) if z) for chosen in found]
 
 
-def _held(wanted: HoldingDemands, lean_deg: float) -> list[Demand]:
-    """The posture, and a lean each way in each falling mode, held by constant inputs."""
-    leans = [(0, 0.0), *itertools.product(range(len(wanted.falling)), (lean_deg, -lean_deg))]
-    return [Demand(wanted.program(*lean), np.arange(wanted.inputs.n)) for lean in leans]
-
-
-def _caught(linear: LinearBody, inputs: Inputs, asked: _Question) -> list[Demand]:
-    """The posture, and a lean each way in each falling mode, brought to rest by inputs over time."""
-    plans = plans_of(linear, inputs, asked.settle_deg, asked.balance, gravity=asked.gravity)
-    still = np.zeros(len(plans.modes))
-    leans = np.diag(asked.lean_deg * plans.modes.degree)[plans.modes.kinds == "fall"]
+def _leaning(plans: Plans, lean_deg: float) -> list[Demand]:
+    """The posture, and a lean each way in each falling mode, held or brought to rest."""
+    still, leans = np.zeros(len(plans.modes)), lean_deg * plans.leans
     watched: list[int] = []
     return [Demand(plans.program(start, still), plans.owner, watched) for start in [still, *leans, *-leans]]
 
 
-def _in_turn(wanted: HoldingDemands, inputs: Inputs, lean_deg: float) -> tuple[np.ndarray, np.ndarray]:
+def _in_turn(plans: Plans, lean_deg: float) -> tuple[np.ndarray, np.ndarray]:
     """Rows that every set must cover: in every falling mode the pulls reach a lean both ways, on their own."""
-    down, up = inputs.pushes(wanted.gains)
-    needs = np.concatenate([wanted.target + wanted.load * lean_deg, -wanted.target + wanted.load * lean_deg])
+    fall = plans.modes.kinds == "fall"
+    gains = plans.gains[fall]
+    size = np.abs(gains).max(axis=1, initial=0.0)
+    size = np.where(size > 1e-12, size, 1.0)
+    down, up = plans.inputs.pushes(gains / size[:, None])
+    constant, load = plans.constant[fall] / size, (plans.modes.values * plans.modes.degree)[fall] * lean_deg / size
+    needs = np.concatenate([load - constant, load + constant])
     rows = np.minimum(np.vstack([up, -down]), 1e9)
     return rows[needs > 1e-9], needs[needs > 1e-9]
 

@@ -27,7 +27,7 @@ from fes_pin.data.tabulated import Tabulated
 NOISE_DEG, RATE_HZ, LOOK_S = 0.5, 200.0, 0.3
 """Noise of a good flexible goniometer, degrees; its sampling, Hz; the time that a fall leaves for a look, s (ours)."""
 PRIOR_DEG = 10.0
-"""What is known without sensors: within the linear model's reach, degrees (`fes_pin.body.attainable.SETTLE_DEG`)."""
+"""What is known without sensors: within the linear model's reach, degrees (`fes_pin.body.plans.SETTLE_DEG`)."""
 
 _SETS_AT_ONCE = 20000
 

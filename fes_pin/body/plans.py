@@ -15,7 +15,6 @@ from functools import cached_property
 
 import numpy as np
 
-from fes_pin.body.attainable import SETTLE_DEG
 from fes_pin.body.balance import GroundRows
 from fes_pin.body.balance import balance as _balance
 from fes_pin.body.inputs import Inputs
@@ -23,6 +22,9 @@ from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.modes import ModeSet
 from fes_pin.body.programs import LinearProgram
 
+SETTLE_DEG = 10.0
+"""How far a mode may be from the posture and still count as the posture: ours; linear models reach no further. The
+answers depend on it: it is an option of the command."""
 PULSE_S = 0.04
 """Time between pulses, s: 25 a second, within the 20 to 50 of functional stimulation (Peckham, Knutson, Annu. Rev.
 Biomed. Eng. 7:327-360, 2005)."""
@@ -53,6 +55,9 @@ class Plans:
         Whether the posture's weight (C) must be carried; otherwise only deviations count, and no pressure is known.
     pieces, pulse_s
         How long each input is held, in pulses, and the time between pulses, s.
+    steady
+        Whether one input is held for good: it must balance each fall where it is, whose lean is not limited, and
+        swings are looked at where they have come to rest.
     """
 
     linear: LinearBody
@@ -63,6 +68,12 @@ class Plans:
     gravity: bool = True
     pieces: Sequence[int] = PIECES
     pulse_s: float = PULSE_S
+    steady: bool = False
+
+    @classmethod
+    def held(cls, linear: LinearBody, inputs: Inputs, settle_deg: float, balance: bool, gravity: bool) -> Plans:
+        """Plans of one input that is held for good; with an infinite `settle_deg` swings are ignored."""
+        return cls(linear, inputs, settle_deg, balance, gravity=gravity, pieces=(1,), steady=True)
 
     @cached_property
     def modes(self) -> ModeSet:
@@ -165,7 +176,7 @@ class Plans:
         modes = len(self.modes)
         nothing = np.zeros((0, self.inputs.n * len(self.pieces))), np.zeros(0), np.zeros(0), np.zeros((0, 2 * modes))
         blocks = [nothing]
-        for i in np.flatnonzero(self.modes.kinds != "neutral"):
+        for i in np.flatnonzero(self.modes.kinds == "swing" if self.steady else self.modes.kinds != "neutral"):
             blocks += self._near_the_posture(int(i))
         if self.balance and self.gravity:
             blocks += self._on_the_soles()
@@ -176,10 +187,14 @@ class Plans:
         """The block of `_limits` that keeps mode i within them, one way and the other."""
         value, kind, weight = self.modes.values[i], self.modes.kinds[i], self.modes.degree[i] * self.settle_deg
         last = np.eye(len(self.pieces))[[-1]]
-        along = [self._responses[i][self._later], last / -value]
-        alone = [self._courses[i][self._later], np.zeros((1, 2))]
-        later = len(along[0])
-        if kind == "swing":  # what still swings then goes on: |rest| + |offset| + |rate| within the limit
+        along, alone = [last / -value], [np.zeros((1, 2))]
+        if not self.steady:
+            along.insert(0, self._responses[i][self._later])
+            alone.insert(0, self._courses[i][self._later])
+        later = sum(map(len, along)) - 1
+        if (
+            kind == "swing" and not self.steady
+        ):  # what still swings then goes on: |rest| + |offset| + |rate| within the limit
             (begin, end), w, time = self._edges, np.sqrt(-value), self._looks[0][-1]
             rate = (np.sin(w * (time - begin)) - np.sin(w * np.maximum(time - end, 0.0))) / -value
             offset, ends = self._responses[i][[-1]] - last / -value, self._courses[i][[-1]]
@@ -229,9 +244,15 @@ class Plans:
             final = np.zeros((1, self.inputs.n * len(self.pieces)))
             final[0, -self.inputs.n :] = end
             starts = np.einsum("i,ilk->lik", -self.ground.per_mode[e], self._courses).reshape(len(times), -1)
-            blocks.append((row, limit, np.full(len(times), -1.0), starts))
+            if not self.steady:
+                blocks.append((row, limit, np.full(len(times), -1.0), starts))
             blocks.append((final, np.array([rest]), np.array([-1.0]), np.zeros((1, starts.shape[1]))))
         return blocks
+
+    @property
+    def leans(self) -> np.ndarray:
+        """Modal coordinates of one degree of lean in each falling mode: (k, r)."""
+        return np.diag(self.modes.degree)[self.modes.kinds == "fall"]
 
     @property
     def owner(self) -> np.ndarray:
