@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from fes_pin.contrasts.changes import change_of, misread_change, not_changed
 from fes_pin.contrasts.faults import GroupConditions, is_likelier, late_in_groups
-from fes_pin.contrasts.grouped import Grouped, noise_in
+from fes_pin.contrasts.grouped import Grouped
 from fes_pin.contrasts.groups import BY_GROUP, grouped_study, in_groups, labels_of
 from fes_pin.contrasts.models import POLICY, ContrastModels, ContrastSearch, Found
 from fes_pin.contrasts.result import Contrast
@@ -207,8 +207,8 @@ def _provenance(study: Study, after: Study | None, seed: int) -> Provenance:
 
 def _smoothed(best: Grouped) -> tuple[str, ...]:
     """Remarks on smoothed readings of a driven rig: their noise has the same correlation time in all groups."""
-    noise = next(iter(best.weights.values()))
-    return words_of_reading(noise_in(noise), best.model.rig, best.fit.trials)
+    noise = next(iter(best.weights.values())).noise
+    return words_of_reading(noise, best.model.rig, best.fit.trials)
 
 
 __all__ = ["contrast"]

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from fes_pin.contrasts.fits import GroupedFits
 from fes_pin.contrasts.grouped import Grouped
 from fes_pin.contrasts.groups import in_groups
 from fes_pin.contrasts.models import ContrastModels, ContrastSearch, Found
@@ -16,9 +17,8 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.conditions import Conditions, Restated
 from fes_pin.diagnosis.misread import Misread, find_misread
 from fes_pin.identify.effort_timing import lateness_of
-from fes_pin.identify.likelihood_fit import LikelihoodFit, maximum_from
+from fes_pin.identify.likelihood_fit import maximum_from
 from fes_pin.infer.levels import CLAIM_LEVEL
-from fes_pin.models.predictor import StateSpaceNoise
 from fes_pin.workers import in_parallel
 
 
@@ -46,7 +46,7 @@ class GroupConditions(Conditions[ContrastSearch, Found]):
     def saved(self, searched: Found, trials: Sequence[Trial], made: Restated[ContrastSearch, Found]) -> float:
         """The fall of the penalised likelihood, with the noise of the restated trials."""
         best, after = searched.best, made.searched.best
-        fits = ContrastModels(self.nominal, in_groups(trials), (), best.is_driven).maxima
+        fits = GroupedFits(self.nominal, in_groups(trials), best.is_driven)
         return fits.converged(best.model, best.items, after.weights, best.fit.unknowns).criterion - after.criterion
 
 
@@ -67,8 +67,6 @@ def _late_in(models: ContrastModels, one: Grouped) -> float | None:
 
     def late_in(group: str) -> float:
         part = models.maxima.part(one, group)
-        if not isinstance(part, LikelihoodFit):
-            return math.nan
         late = lateness_of(maximum_from(part, part.trials), min(t.dt for t in part.trials))
         return math.nan if late is None else late.log.effort_late_s
 
@@ -81,7 +79,5 @@ def _late_in(models: ContrastModels, one: Grouped) -> float | None:
 
 def is_likelier(timed: Grouped, recorded: Grouped) -> bool:
     """True if efforts in time explain the same readings with a lower penalised likelihood."""
-    one, other = (
-        {w.correlation_s for w in f.weights.values() if isinstance(w, StateSpaceNoise)} for f in (timed, recorded)
-    )
+    one, other = ({w.noise.correlation_s for w in f.weights.values()} for f in (timed, recorded))
     return one == other and timed.criterion < recorded.criterion

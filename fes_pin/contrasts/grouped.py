@@ -7,50 +7,25 @@ import itertools
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
-from fes_pin.contrasts.repeats import RepeatedProblem, Repeats
+from fes_pin.contrasts.repeats import RepeatedProblem, Repeats, Shrink, scatter
 from fes_pin.data.trial import Trial
-from fes_pin.identify.fit import Fit, ended
-from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.identify.fit import Fit
 from fes_pin.identify.problem import products_of
 from fes_pin.infer.levels import PARAMETER_PENALTY, SEPARABLE
-from fes_pin.infer.noise import Noise, NoiseModel
+from fes_pin.infer.noise import Noise
 from fes_pin.infer.optimum import Optimum
-from fes_pin.infer.problem import Linearized, Unknowns
+from fes_pin.infer.problem import Linearized, Unknowns, whitened_sse
 from fes_pin.infer.scoring import Evaluation, NoisyProblem, Point
 from fes_pin.models.model import Model
 from fes_pin.models.parameters import ParameterInfo
-from fes_pin.models.predictor import StateSpaceNoise
 from fes_pin.models.rigs.base import Rig
 from fes_pin.models.stage import Effect
 
 T = TypeVar("T")
-Weight = Repeats | StateSpaceNoise
-"""What weighs the residuals of a group: the noise of simulations with the scatter of repeats, or what is random about
-predictions."""
-
-
-def group_problem(model: Model, trials: Sequence[Trial], weight: Weight, free: tuple[str, ...] | None = None) -> Any:
-    """A model on the trials of one group, as their weight demands; predictions move all that can be fitted."""
-    if isinstance(weight, StateSpaceNoise):
-        return LikelihoodProblem(model, trials, weight)
-    return RepeatedProblem(model, trials, weight, free)
-
-
-def noise_in(weight: Weight) -> NoiseModel:
-    """The noise alone."""
-    return weight.noise if isinstance(weight, Repeats) else weight
-
-
-def reweigh(problem: Any, weight: Weight) -> None:
-    """Change the weight of the problem of a group, in place."""
-    if isinstance(weight, StateSpaceNoise):
-        problem.noise = weight
-    else:
-        problem.noise, problem.weight = weight.noise, weight
 
 
 @dataclass(frozen=True)
@@ -182,17 +157,23 @@ class GroupedProblem(NoisyProblem):
     trials
         By group, in the order of the model's groups.
     weights
-        By group: noise, or what is random. Groups have their own: a noisier day is no change of the rig.
+        By group: noise, and how much repeats scatter. Groups have their own noise: a noisier day is no change of the
+        rig.
     """
 
     def __init__(
-        self, model: GroupedModel, trials: Mapping[str, Sequence[Trial]], weights: Mapping[str, Weight]
+        self, model: GroupedModel, trials: Mapping[str, Sequence[Trial]], weights: Mapping[str, Repeats]
     ) -> None:
         self.model, self.free, self._by_group = model, model.free, trials
-        self.parts: dict[str, Any] = {g: group_problem(m, trials[g], weights[g]) for g, m in model.models.items()}
+        self.parts = {g: RepeatedProblem(m, trials[g], weights[g]) for g, m in model.models.items()}
         self.trials = tuple(t for p in self.parts.values() for t in p.trials)
         self.unknown_names = tuple(dict.fromkeys(n for p in self.parts.values() for n in p.unknown_names))
         self.limits = {model.path(n, g): v for g, p in self.parts.items() for n, v in p.limits.items()}
+
+    @property
+    def weights(self) -> dict[str, Repeats]:
+        """By group: noise, and how much repeats scatter."""
+        return {g: p.weight for g, p in self.parts.items()}
 
     @property
     def noise(self) -> dict[str, Noise]:
@@ -230,9 +211,38 @@ class GroupedProblem(NoisyProblem):
         return [Evaluation.joined(one) for one in zip(*each, strict=True)]
 
     def noise_step(self, values: Mapping[str, float], unknowns: Unknowns) -> float:
-        """Improve the noise of each group, in place; returns by how much that lowers the cost. Of driven rigs."""
+        """Improve the noise of each group, in place; returns by how much that lowers the cost.
+
+        And how much repeats scatter, where nothing acts at random in a trial: that would take it up.
+        """
         own = by_group(unknowns, self._by_group)
-        return sum(p.noise_step(self.model.of(g, values), own[g]) for g, p in self.parts.items())
+        gained = float(sum(p.noise_step(self.model.of(g, values), own[g]) for g, p in self.parts.items()))
+        return gained + self._scatter_step(values, unknowns) if self.is_simulated else gained
+
+    @property
+    def is_simulated(self) -> bool:
+        """True where nothing acts at random in any group."""
+        return all(p.is_simulated for p in self.parts.values())
+
+    def _scatter_step(self, values: Mapping[str, float], unknowns: Unknowns) -> float:
+        """Find again, in place, how much repeats scatter; returns by how much that lowers the cost."""
+        cut, names = by_group(unknowns, self._by_group), Model(self.model.rig).fitted_parameters()
+        plain = {g: p.plain(self.model.of(g, values), cut[g]) for g, p in self.parts.items()}
+        columns = [p.columns(one, names) for g, p in self.parts.items() for one in plain[g]]
+        found = scatter([one for g, many in plain.items() for one in self._spread(g, many)], columns, names)
+        before = self._cost(plain)
+        for part in self.parts.values():
+            part.deviations = found
+        return before - self._cost(plain)
+
+    def _cost(self, plain: Mapping[str, Sequence[Linearized]]) -> float:
+        """The cost of trials that were linearized as if nothing scattered."""
+        return float(sum(whitened_sse(p.scattered(plain[g])) for g, p in self.parts.items()))
+
+    def shrinks(self, values: Mapping[str, float], unknowns: Unknowns) -> list[Shrink]:
+        """What the scatter of repeats makes of each trial; nothing where there is none."""
+        cut, known = by_group(unknowns, self._by_group), {g: p for g, p in self.parts.items() if p.deviations}
+        return [s for g, p in known.items() for s in p.shrinks(p.plain(self.model.of(g, values), cut[g]))]
 
     @cached_property
     def products(self) -> list[tuple[int, int]]:
@@ -260,16 +270,20 @@ class GroupedProblem(NoisyProblem):
 
     def linearize(self, values: Mapping[str, float], unknowns: Unknowns) -> list[Linearized]:
         """Whitened residuals and sensitivities of all trials, group after group."""
-        out: list[Linearized] = []
         cut = by_group(unknowns, self._by_group)
-        for group, part in self.parts.items():
-            at = [self.free.index(self.model.path(n, group)) for n in part.free]
-            own = [self.unknown_names.index(n) for n in part.unknown_names]
-            for one in part.linearize(self.model.of(group, values), cut[group]):
-                jacobian = np.zeros((len(one.residual), len(self.free)))
-                local = np.zeros((len(one.residual), len(self.unknown_names)))
-                jacobian[:, at], local[:, own] = one.jacobian, one.local
-                out.append(dataclasses.replace(one, jacobian=jacobian, local=local))
+        each = {g: p.linearize(self.model.of(g, values), cut[g]) for g, p in self.parts.items()}
+        return [one for g, many in each.items() for one in self._spread(g, many)]
+
+    def _spread(self, group: str, parts: Sequence[Linearized]) -> list[Linearized]:
+        """Trials of a group with the parameters and unknowns of all groups."""
+        out, own = [], self.parts[group]
+        at = [self.free.index(self.model.path(n, group)) for n in own.free]
+        unknown = [self.unknown_names.index(n) for n in own.unknown_names]
+        for one in parts:
+            jacobian = np.zeros((len(one.residual), len(self.free)))
+            local = np.zeros((len(one.residual), len(self.unknown_names)))
+            jacobian[:, at], local[:, unknown] = one.jacobian, one.local
+            out.append(dataclasses.replace(one, jacobian=jacobian, local=local))
         return out
 
 
@@ -299,19 +313,23 @@ class Grouped:
         Of `model`; its `sse` is twice the negative log-likelihood, but for a constant.
     weights
         By group.
+    shrinks
+        What the scatter of repeats makes of each trial, all groups end to end; empty where nothing scatters.
     """
 
     items: frozenset[Item]
     model: GroupedModel
     fit: Fit
-    weights: Mapping[str, Weight]
+    weights: Mapping[str, Repeats]
+    shrinks: Sequence[Shrink]
 
     @classmethod
-    def of(cls, items: Collection[Item], problem: Any, found: Optimum, weights: Mapping[str, Weight]) -> Grouped:
+    def of(cls, items: Collection[Item], problem: GroupedProblem, found: Optimum) -> Grouped:
         """The fit of a grouped problem that has ended."""
-        fitted = ended(problem.model, found)
-        fit = Fit(**fitted, trials=problem.trials, noise=problem.noise)
-        return cls(frozenset(items), fitted["model"], fit, weights)
+        model, shrinks = problem.model.with_parameters(found.values), problem.shrinks(found.values, found.unknowns)
+        ended = {**vars(found), "model": model, "parameters": model.parameters()}
+        fit = Fit(**ended, trials=problem.trials, noise=problem.noise)
+        return cls(frozenset(items), model, fit, problem.weights, shrinks)
 
     @property
     def sse(self) -> float:
@@ -325,11 +343,12 @@ class Grouped:
 
     @property
     def criterion(self) -> float:
-        """`sse` with a penalty for each parameter, and for each change: a common cause that explains as much is taken.
+        """`sse` with a penalty for each parameter, of process noise too, and for each change.
 
-        A model that is wrong in all groups is no change.
+        A common cause that explains as much as a change is taken: a model that is wrong in all groups is no change.
         """
-        return self.sse + PARAMETER_PENALTY * self.degrees + SEPARABLE * len(self.changes)
+        random = 2 * sum(len(w.noise.acting) for w in self.weights.values()) + len(self.deviations)
+        return self.sse + PARAMETER_PENALTY * (self.degrees + random) + SEPARABLE * len(self.changes)
 
     @property
     def changes(self) -> tuple[Item, ...]:
@@ -344,17 +363,19 @@ class Grouped:
 
     @property
     def is_driven(self) -> bool:
-        """True if predictions are judged, with everything that is random."""
-        return any(isinstance(w, StateSpaceNoise) for w in self.weights.values())
+        """True if something acts at random, which predictions one sample ahead follow."""
+        return any(w.noise.processes for w in self.weights.values())
+
+    @property
+    def deviations(self) -> Mapping[str, float]:
+        """Standard deviation of each nominal parameter that scatters between trials, in its unit."""
+        return next(iter(self.weights.values())).deviations
 
     @property
     def repeats(self) -> dict[str, float]:
-        """How much nominal parameters scatter between trials, as a share of the first group's value."""
-        weight = next(iter(self.weights.values()))
-        if not isinstance(weight, Repeats):
-            return {}
+        """The same as a share of the first group's value."""
         values = next(iter(self.model.models.values())).parameters()
-        return {n: s / abs(values[n]) for n, s in weight.deviations.items() if values[n]}
+        return {n: s / abs(values[n]) for n, s in self.deviations.items() if values[n]}
 
     def leaning(self, moved: np.ndarray) -> float:
         """What of the squares that move the trials rests on how much repeats scatter.
@@ -365,8 +386,5 @@ class Grouped:
             Shape (m,), all trials end to end.
         """
         ends = np.cumsum([len(p.residual) for p in self.fit.parts])[:-1]
-        pieces, total = iter(np.split(moved, ends)), 0.0
-        for weight in self.weights.values():
-            if isinstance(weight, Repeats):
-                total += weight.leaning(list(itertools.islice(pieces, len(weight.along))))
-        return total
+        pieces = np.split(moved, ends) if self.shrinks else []
+        return sum(s.leaning(one) for s, one in zip(self.shrinks, pieces, strict=True))

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from fes_pin.contrasts.fits import GroupedFits, PredictedGroups, SimulatedGroups
+from fes_pin.contrasts.fits import GroupedFits
 from fes_pin.contrasts.grouped import Grouped, GroupedModel, Item
 from fes_pin.contrasts.screen import ItemScore, Screen
 from fes_pin.data.trial import Trial
@@ -66,9 +66,7 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
         every = [t for many in trials.values() for t in many]
         self._library = Library(self.nominal_model, every, effects)
         self.screen = Screen(self.nominal_model, self.trials, self._library)
-        self.maxima: GroupedFits = (
-            PredictedGroups(nominal, trials) if driven else SimulatedGroups(nominal, trials, effects)
-        )
+        self.maxima = GroupedFits(nominal, trials, driven)
         self._compared: dict[tuple[Names, str], Grouped] = {}
 
     def nominal(self) -> Grouped:
@@ -201,12 +199,15 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
         return demanded_form(fitted, looks, DRIVEN_LEVEL / max(tried, 1), self.converged)
 
     def begin_again(self, names: Names) -> bool:
-        """Fit a set and the nominal model under the noise that the set leaves; False where every fit has its own."""
-        weights = self.maxima.under_own_noise(self.fits[names])
-        if weights is None:
+        """Fit a set and the nominal model with process noise where that improves the set's penalised likelihood."""
+        acting = None if self.driven else self.maxima.with_process_noise(self.fits[names])
+        if acting is None:
             return False
         kept = {k: self.fits[k] for k in ((), names)}
-        self.fits = {k: self.maxima.converged(f.model, f.items, weights, f.fit.unknowns) for k, f in kept.items()}
+        self.fits = {
+            k: self.maxima.converged(f.model, f.items, acting.weights, f.fit.unknowns) for k, f in kept.items()
+        }
+        self.family = self.screen.scores(self.fits[()]).family(self.seed)
         self._converged, self._begun, self._compared = set(self.fits), set(), {}
         for name in names:
             self.without(names, name)

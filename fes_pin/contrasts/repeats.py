@@ -15,17 +15,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 
 import numpy as np
 
 from fes_pin.data.trial import Trial
-from fes_pin.identify.problem import Problem
+from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.infer.levels import PARAMETER_PENALTY
-from fes_pin.infer.noise import NoiseModel
 from fes_pin.infer.problem import Linearized, Unknowns
 from fes_pin.infer.projection import without_locals
 from fes_pin.models.model import Model
+from fes_pin.models.predictions import PredictedTrial
+from fes_pin.models.predictor import StateSpaceNoise
 
 SMALLEST, LARGEST = -1.0, 12.0
 """Logarithms between which s is sought, in units of the standard error of a parameter from these trials: at the least
@@ -41,50 +41,80 @@ class Repeats:
     Attributes
     ----------
     noise
-        By output column.
+        Of the process and of the measurements.
     deviations
         Standard deviation of a nominal parameter between trials, in its unit, by name.
-    along
-        V D of each trial, shape (m, parameters that scatter).
     """
 
-    noise: NoiseModel
+    noise: StateSpaceNoise
     deviations: Mapping[str, float] = field(default_factory=dict)
-    along: tuple[np.ndarray, ...] = ()
-
-    @cached_property
-    def shrinks(self) -> list[Shrink]:
-        """Of each trial; empty where nothing scatters."""
-        return [Shrink.of(v) for v in self.along]
-
-    def of_trials(self, kept: Sequence[int]) -> Repeats:
-        """The same of some trials alone."""
-        return replace(self, along=tuple(self.along[k] for k in kept if self.along))
-
-    def leaning(self, moved: Sequence[np.ndarray]) -> float:
-        """Part of the squares of what moves each trial, weighed, that is the larger the less repeats scatter.
-
-        With the logarithm of s^2 it falls as this part of it, and so is as uncertain.
-        """
-        total = 0.0
-        for one, shrink in zip(moved if self.along else (), self.shrinks, strict=True):
-            total += float(np.sum((shrink.basis.T @ one) ** 2 * shrink.powers / (1.0 + shrink.powers)))
-        return total
 
 
-class RepeatedProblem(Problem):
-    """A `Problem` whose residuals are weighed by the scatter of repeats as well."""
+class RepeatedProblem(LikelihoodProblem):
+    """A `LikelihoodProblem` whose nominal parameters scatter between trials.
+
+    Parameters
+    ----------
+    model, trials, free
+        As of `LikelihoodProblem`.
+    weight
+        Noise, and how much parameters scatter.
+    """
 
     def __init__(
         self, model: Model, trials: Sequence[Trial], weight: Repeats, free: tuple[str, ...] | None = None
     ) -> None:
         super().__init__(model, trials, weight.noise, free)
-        self.weight = weight
+        self.deviations = weight.deviations
+
+    @property
+    def weight(self) -> Repeats:
+        """Noise, and how much parameters scatter."""
+        return Repeats(self.noise, self.deviations)
 
     def linearize(self, values: Mapping[str, float], unknowns: Unknowns) -> list[Linearized]:
-        """As a `Problem` does, times (I + V D^2 V')^(-1/2)."""
-        plain = super().linearize(values, unknowns)
-        return [s.shrunk(p) for p, s in zip(plain, self.weight.shrinks, strict=True)] if self.weight.along else plain
+        """As a `LikelihoodProblem` does, times (I + V D^2 V')^(-1/2)."""
+        return self.scattered(super().linearize(values, unknowns))
+
+    def scattered(self, plain: Sequence[Linearized]) -> list[Linearized]:
+        """Trials as they are where parameters scatter, from trials as if nothing did."""
+        shrinks = self.shrinks(plain) if self.deviations else []
+        return [s.shrunk(p) for p, s in zip(plain, shrinks, strict=True)] if shrinks else list(plain)
+
+    def plain(self, values: Mapping[str, float], unknowns: Unknowns) -> list[Linearized]:
+        """The trials as if nothing scattered."""
+        return super().linearize(values, unknowns)
+
+    def shrinks(self, plain: Sequence[Linearized]) -> list[Shrink]:
+        """(I + V D^2 V')^(-1/2) of each trial."""
+        return [Shrink.of(self.columns(p, list(self.deviations)) * self._sizes) for p in plain]
+
+    def columns(self, plain: Linearized, names: Sequence[str]) -> np.ndarray:
+        """Sensitivities of a trial to some parameters without what its own unknowns take up, shape (m, names)."""
+        return without_locals(plain, plain.jacobian[:, [self.free.index(n) for n in names]])
+
+    @property
+    def _sizes(self) -> np.ndarray:
+        return np.array(list(self.deviations.values()))
+
+    def costs(self, points: Sequence[tuple[Mapping[str, float], Unknowns]]) -> list[float]:
+        """A lower bound of the cost: without sensitivities none is known where parameters scatter."""
+        return [-np.inf] * len(points) if self.deviations else super().costs(points)
+
+    def residual_run(self, values: Mapping[str, float], unknowns: Unknowns) -> list[PredictedTrial]:
+        """Trials less what they most likely differ from their group by."""
+        if not self.deviations:
+            return super().residual_run(values, unknowns)
+        at = [self.free.index(n) for n in self.deviations]
+        return [self._less(one, at) for one in self.innovations(values, unknowns)]
+
+    def _less(self, one: PredictedTrial, at: Sequence[int]) -> PredictedTrial:
+        part = self.whitened(one)
+        v = self.columns(part, list(self.deviations)) * self._sizes
+        own = np.linalg.solve(np.eye(len(at)) + v.T @ v, v.T @ part.residual) * self._sizes
+        beside = np.linalg.lstsq(part.local, part.jacobian[:, at] @ own, rcond=1e-10)[0]
+        moved = one.sensitivities[..., at] @ own - one.sensitivities[..., len(self.free) :] @ beside
+        return replace(one, values=np.where(one.seen, one.values + moved, 0.0))
 
 
 @dataclass(frozen=True)
@@ -96,27 +126,28 @@ class Shrink:
 
     @classmethod
     def of(cls, along: np.ndarray) -> Shrink:
-        powers, vectors = np.linalg.eigh(along.T @ along)
+        with np.errstate(all="ignore"):
+            gram = along.T @ along
+        if not np.isfinite(gram).all():  # what runs away costs infinitely much anyway
+            return cls(np.zeros((len(along), 0)), np.zeros(0))
+        powers, vectors = np.linalg.eigh(gram)
         felt = powers > 1e-12 * max(powers.max(initial=0.0), 1e-300)
         return cls(along @ vectors[:, felt] / np.sqrt(powers[felt]), powers[felt])
 
     def shrunk(self, part: Linearized) -> Linearized:
-        return self._scaled(part, 1.0 / np.sqrt(1.0 + self.powers), 1.0)
+        factors, more = 1.0 / np.sqrt(1.0 + self.powers), float(np.log1p(self.powers).sum())
 
-    def grown(self, part: Linearized) -> Linearized:
-        return self._scaled(part, np.sqrt(1.0 + self.powers), -1.0)
-
-    def _scaled(self, part: Linearized, factors: np.ndarray, sign: float) -> Linearized:
         def scaled(x: np.ndarray) -> np.ndarray:
             return x + (self.basis * (factors - 1.0)) @ (self.basis.T @ x)
 
-        more = sign * float(np.log1p(self.powers).sum())
         return Linearized(scaled(part.residual), scaled(part.jacobian), scaled(part.local), part.log_determinant + more)
 
+    def leaning(self, moved: np.ndarray) -> float:
+        """Part of the squares of what moves a trial, weighed, that is the larger the less repeats scatter.
 
-def without_scatter(parts: Sequence[Linearized], weight: Repeats) -> list[Linearized]:
-    """Trials of a `RepeatedProblem` as a `Problem` would have them."""
-    return [s.grown(p) for p, s in zip(parts, weight.shrinks, strict=True)] if weight.along else list(parts)
+        With the logarithm of s^2 it falls as this part of it, and so is as uncertain.
+        """
+        return float(np.sum((self.basis.T @ moved) ** 2 * self.powers / (1.0 + self.powers)))
 
 
 def scatter(parts: Sequence[Linearized], columns: Sequence[np.ndarray], names: Sequence[str]) -> dict[str, float]:

@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from fes_pin.contrasts.grouped import Grouped, Item, by_group, group_problem, reweigh
+from fes_pin.contrasts.grouped import Grouped, Item, by_group
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.search.library import Library
 from fes_pin.diagnosis.search.starts import near_null, started
+from fes_pin.identify.likelihood import LikelihoodProblem, is_simulated
 from fes_pin.infer.family import Family
 from fes_pin.infer.levels import PARAMETER_PENALTY
 from fes_pin.infer.problem import Linearized, Unknowns, completed
@@ -129,7 +130,7 @@ class Screen:
         self._nominal, self._trials, self._library = nominal, trials, library
         self._kept: dict[int, tuple[Grouped, ItemScores]] = {}
         self._effects = [e for e in library.effects if library.felt(e)]
-        self._problems: dict[tuple[Any, ...], Any] = {}
+        self._problems: dict[tuple[Any, ...], LikelihoodProblem] = {}
 
     def scores(self, base: Grouped) -> ItemScores:
         """Every item that a set does not have, scored."""
@@ -195,16 +196,19 @@ class Screen:
 
     def _linearized(self, base: Grouped, group: str, forms: Sequence[Effect], unknowns: Unknowns) -> list[np.ndarray]:
         """Sensitivities of the trials of a group to the amplitudes of each form of a cause."""
-        bare, weight, out = Model(base.model.models[group].rig), base.weights[group], []
+        bare, noise, out = Model(base.model.models[group].rig), base.weights[group].noise, []
+        trials, shrinks = self._trials[group], by_group(base.shrinks, self._trials)[group]
+        simulated = is_simulated(noise, trials)  # predictions share the program of a fit, which moves all parameters
         for one in forms:
             names = tuple(f"{one.name}.{n}" for n in one.amplitudes())
-            key = (group, one.name, *one.unused().items())  # what is unused is compiled in, with its values
+            key = (group, simulated, one.name, *one.unused().items())  # what is unused is compiled in, with its values
             if key not in self._problems:
-                self._problems[key] = group_problem(bare + one, self._trials[group], weight, names)
+                self._problems[key] = LikelihoodProblem(bare + one, trials, noise, names if simulated else None)
             problem = self._problems[key]
-            reweigh(problem, weight)
+            problem.noise = noise
             at = [problem.free.index(n) for n in names]
             parts = problem.linearize((bare + one).parameters(), completed(problem.start_unknowns(), unknowns))
+            parts = [s.shrunk(p) for p, s in zip(parts, shrinks, strict=True)] if shrinks else parts
             out.append(np.concatenate([p.jacobian[:, at] for p in parts]))
         return out
 

@@ -172,7 +172,7 @@ class LikelihoodProblem(NoisyProblem):
 
     def linearize(self, values: Mapping[str, float], unknowns: Unknowns) -> list[Linearized]:
         """Return standardised innovations and their sensitivities at a parameter value; see `check_limit`."""
-        parts = [self._whitened(one) for one in self.innovations(values, unknowns)]
+        parts = [self.whitened(one) for one in self.innovations(values, unknowns)]
         if self.is_simulated:
             return [self._marginal(p, prior) for p, prior in zip(parts, self.priors, strict=True)]
         return self._followed(parts, values, unknowns) if self._scales else parts
@@ -228,9 +228,14 @@ class LikelihoodProblem(NoisyProblem):
         self.noise = found
         return before - after
 
+    def residual_run(self, values: Mapping[str, float], unknowns: Unknowns) -> list[PredictedTrial]:
+        """Return every trial as predicted, of which the noise of simulated trials is estimated."""
+        (run,) = self._runs([(values, unknowns, self.noise)])
+        return run
+
     def _simulated_noise_step(self, values: Mapping[str, float], unknowns: Unknowns) -> float:
         """Set the measurement noise, in place, to the residuals of a simulation; return by how much the cost falls."""
-        (run,) = self._runs([(values, unknowns, self.noise)])
+        run = self.residual_run(values, unknowns)
         found, limits = self._with_autoregressions(run), self.noise_limits
         powers = residual_powers([with_noise(one, found) for one in run])
         white = {n: found.white[n] * math.sqrt(power) for n, power in powers.items()}
@@ -281,7 +286,7 @@ class LikelihoodProblem(NoisyProblem):
         out[felt] = -slopes - sum(p.residual @ p.jacobian[:, at] for p in parts)[felt]
         return np.nan_to_num(out)
 
-    def _whitened(self, one: PredictedTrial) -> Linearized:
+    def whitened(self, one: PredictedTrial) -> Linearized:
         """Return a trial's standardised innovations; its sensitivities are scaled in place."""
         with np.errstate(all="ignore"):
             residual, logs = one.whitened

@@ -7,9 +7,8 @@ import pytest
 from contrast_pairs.free import free_pair
 
 import fes_pin as fp
-from fes_pin.contrasts.repeats import RepeatedProblem, Repeats, scatter, without_scatter
-from fes_pin.identify.fit import fit
-from fes_pin.identify.problem import Problem
+from fes_pin.contrasts.repeats import RepeatedProblem, Repeats, scatter
+from fes_pin.diagnosis.search.likelihood_fits import MEASUREMENT, LikelihoodFits
 from fes_pin.infer.problem import Linearized
 from fes_pin.infer.projection import without_locals
 from fes_pin.models.nominal import nominal_model
@@ -57,24 +56,41 @@ def test_a_trial_beyond_floating_point_numbers_scatters_by_nothing(bad, field):
     assert scatter(parts, columns, ["a", "b", "c", "d"]) == {}
 
 
-def test_the_squares_are_those_of_the_covariance(tmp_path):
-    """r' (I + V D^2 V')^-1 r and its log-determinant, as dense matrices have them; and back again."""
+@pytest.fixture
+def muscle(tmp_path):
+    """A fit of a muscle by the likelihood, and its trials."""
     study = free_pair("muscle", (), 80.0, 3, tmp_path)
-    fitted = fit(nominal_model(study), study.trials)
-    problem = Problem(fitted.model, study.trials, fitted.noise)
-    plain = problem.linearize(fitted.values, fitted.unknowns)
-    along = tuple(without_locals(p, p.jacobian * [0.01, 0.002]) for p in plain)
-    weight = Repeats(fitted.noise, {"gain": 0.01, "time_constant_s": 0.002}, along)
-    weighed = RepeatedProblem(fitted.model, study.trials, weight).linearize(fitted.values, fitted.unknowns)
-    for one, two, back, v in zip(plain, weighed, without_scatter(weighed, weight), along, strict=True):
+    models = LikelihoodFits(nominal_model(study), study.trials, (), answered=False, noise=MEASUREMENT)
+    return models.nominal()
+
+
+SIZES = {"gain": 0.01, "time_constant_s": 0.002}
+
+
+def test_the_squares_are_those_of_the_covariance(muscle):
+    """r' (I + V D^2 V')^-1 r and its log-determinant, as dense matrices have them."""
+    problem = RepeatedProblem(muscle.model, muscle.trials, Repeats(muscle.noise, SIZES))
+    plain = problem.plain(muscle.values, muscle.unknowns)
+    for one, two in zip(plain, problem.linearize(muscle.values, muscle.unknowns), strict=True):
+        v = without_locals(one, one.jacobian) * list(SIZES.values())
         covariance = np.eye(len(one.residual)) + v @ v.T
         assert two.residual @ two.residual == pytest.approx(one.residual @ np.linalg.solve(covariance, one.residual))
-        assert two.log_determinant == pytest.approx(np.linalg.slogdet(covariance)[1])
+        more = two.log_determinant - one.log_determinant
+        assert more == pytest.approx(np.linalg.slogdet(covariance)[1])
         assert two.jacobian.T @ two.jacobian == pytest.approx(
             one.jacobian.T @ np.linalg.solve(covariance, one.jacobian), rel=1e-6
         )
-        assert back.residual == pytest.approx(one.residual, abs=1e-9)
-        assert back.log_determinant == pytest.approx(0.0, abs=1e-9)
+
+
+def test_noise_is_found_in_what_trials_do_not_differ_by(muscle):
+    """Of a reading r that is whitened it is (I + V D^2 V')^-1 r, with the likeliest start of each trial."""
+    white = replace(muscle.noise, ar={})
+    problem = RepeatedProblem(muscle.model, muscle.trials, Repeats(white, SIZES))
+    run = problem.residual_run(muscle.values, muscle.unknowns)
+    for one, left in zip(problem.plain(muscle.values, muscle.unknowns), run, strict=True):
+        v = without_locals(one, one.jacobian) * list(SIZES.values())
+        expected = np.linalg.solve(np.eye(len(v)) + v @ v.T, one.residual)
+        assert problem.whitened(left).residual == pytest.approx(expected, abs=1e-9)
 
 
 def test_a_change_shows_through_trials_that_scatter(tmp_path):
