@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 
 from fes_pin.contrasts.grouped import Grouped, GroupedModel, GroupedProblem, Item, by_group
@@ -19,7 +18,6 @@ from fes_pin.infer.maximise import alternate
 from fes_pin.infer.optimum import minimise
 from fes_pin.infer.problem import Unknowns
 from fes_pin.models.model import Model
-from fes_pin.models.predictor import StateSpaceNoise
 from fes_pin.workers import in_parallel
 
 LOOK = 4
@@ -132,20 +130,10 @@ class GroupedFits:
 
     def with_process_noise(self, one: Grouped) -> Grouped | None:
         """A set again with process noise; None where that is none the likelier, by the penalised likelihood."""
-        weights = {g: Repeats(self._likeliest(one, g)) for g in self.trials}
-        if not all(w.noise.processes for w in weights.values()):
+        parts = {g: self.part(one, g) for g in self.trials}
+        begun = {g: LikelihoodMaxima(f.trials).process_noises(f, FIRST_NOISE_SCALES) for g, f in parts.items()}
+        if not all(begun.values()):
             return None
-        found = self.converged(one.model, one.items, weights, one.fit.unknowns)
-        self._begun = [weights]
+        weights = {g: Repeats(LikelihoodMaxima(f.trials).likeliest(f, begun[g])) for g, f in parts.items()}
+        found, self._begun = self.converged(one.model, one.items, weights, one.fit.unknowns), [weights]
         return found if found.criterion < one.criterion else None
-
-    def _likeliest(self, one: Grouped, group: str) -> StateSpaceNoise:
-        """The noise, with process noise of several sizes, that is likeliest beside a set in one group at once."""
-        trials, part = self.trials[group], self.part(one, group)
-        guess = first_guess(self.nominal, trials)
-        if not guess.std or any(t.low_pass_hz for t in trials):  # no filter passes a state on
-            return part.noise
-        white = {n: (0.0,) * len(own) for n, own in part.noise.ar.items()}
-        begun = [replace(part.noise, std=guess.std, time=guess.time)]
-        begun += [replace(guess, std={n: k * v for n, v in guess.std.items()}, ar=white) for k in FIRST_NOISE_SCALES]
-        return LikelihoodMaxima(trials).likeliest(part, begun)

@@ -2,7 +2,6 @@
 
 import math
 from types import SimpleNamespace
-from unittest.mock import MagicMock
 
 import numpy as np
 import oracle.rigs
@@ -22,6 +21,7 @@ from fes_pin.diagnosis.remainder.lines import line_p_value
 from fes_pin.diagnosis.remainder.play import play_p_value
 from fes_pin.diagnosis.remainder.repeated import repeated_p_value
 from fes_pin.diagnosis.remainder.slips import slip_p_value
+from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
 from fes_pin.identify.fit import fit
 from fes_pin.infer.levels import CLAIM_LEVEL, FULL_NOISE
 from fes_pin.infer.noise import Noise, estimate_noise
@@ -37,7 +37,12 @@ TREMBLING = Noise(1.0, (1.6, -0.64), 5.0)
 
 
 def left_in(study):
-    return lack_of_fit(fit(nominal_model(study), study.trials))
+    return lack_of_fit(likeliest(nominal_model(study), study.trials))
+
+
+def likeliest(model, trials):
+    """The fit of a model without causes by the likelihood."""
+    return LikelihoodFits(model, trials, (), answered=False).nominal()
 
 
 def forces(rng, bend=lambda t, force: force, colour=0.0):
@@ -48,7 +53,7 @@ def forces(rng, bend=lambda t, force: force, colour=0.0):
         force = bend(trial.time, predict(model, trial)["force_n"])
         noise = scipy.signal.lfilter([math.sqrt(1.0 - colour**2)], [1.0, -colour], rng.standard_normal(1000))
         made.append(trial.with_columns(force_n=force + 0.2 * noise))
-    return fit(model, made)
+    return likeliest(model, made)
 
 
 @pytest.mark.parametrize("noise", ["white", "ar1", "process"])
@@ -78,10 +83,10 @@ def test_eight_tests_together_keep_the_level(monkeypatch):
     monkeypatch.setattr(open_set, "Projection", lambda _: None)
     monkeypatch.setattr(open_set, "under_own_noise", lambda *_: SimpleNamespace(parts=()))
 
-    monkeypatch.setattr(tests_of_fit, "LikelihoodFits", MagicMock())
+    monkeypatch.setattr(tests_of_fit, "fit", lambda *_: SimpleNamespace(sse=1.0))
     monkeypatch.setattr(tests_of_fit, "level_of", lambda _: CLAIM_LEVEL)
     monkeypatch.setattr(tests_of_fit, "_features_left", lambda *_: Remainder(False, rng.uniform(), "phase"))
-    fitted = SimpleNamespace(model=None, trials=(), sse=1.0)
+    fitted = SimpleNamespace(model=None, trials=(), noise=SimpleNamespace(ar={"force_n": ()}))
     share = np.mean([lack_of_fit(fitted).unexplained for _ in range(20_000)])
     assert share == pytest.approx(CLAIM_LEVEL, abs=0.002)
 

@@ -2,11 +2,11 @@
 
 import numpy as np
 from diagnosis.hidden import study_of
-from identify.rigs import WHITE, trials_of
+from identify.rigs import trials_of
 
 from fes_pin.diagnosis.held_out import folds_of
 from fes_pin.diagnosis.remainder.lack_of_fit import lack_of_fit
-from fes_pin.identify.fit import fit
+from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
 from fes_pin.models.predict import predict
 
 
@@ -21,7 +21,7 @@ def test_the_remainder_keeps_its_level():
             t.with_columns(force_n=c["force_n"] + 0.2 * rng.standard_normal(len(t)))
             for t, c in zip(trials, clean, strict=True)
         ]
-        found += lack_of_fit(fit(model, noisy, WHITE)).unexplained
+        found += lack_of_fit(LikelihoodFits(model, noisy, (), answered=False).nominal()).unexplained
     assert found <= 5
 
 
@@ -29,7 +29,7 @@ def test_a_smooth_remainder_is_located():
     rng = np.random.default_rng(4)
     model, trials = trials_of("muscle", rng, count=5, n=300)
     bent = [t.with_columns(force_n=t["force_n"] + 0.4 * (t.time / t.time[-1]) ** 2) for t in trials]
-    fitted = fit(model, bent, WHITE)
+    fitted = LikelihoodFits(model, bent, (), answered=False).nominal()
     left = lack_of_fit(fitted)
     assert left.unexplained and left.p_value < 1e-6
     assert left.where in {"time", "history", "offset"}

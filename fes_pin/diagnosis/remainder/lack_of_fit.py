@@ -16,8 +16,7 @@ import numpy as np
 
 from fes_pin.diagnosis.decide.significance import level_of
 from fes_pin.diagnosis.remainder.open_set import residual_tests
-from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
-from fes_pin.identify.fit import Fit, fit
+from fes_pin.identify.fit import fit
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.problem import limits_of
@@ -38,24 +37,20 @@ SIGN_DRAWS = 400
 """Draws of random signs of the trials over which the inflation of a statistic is averaged."""
 
 
-def lack_of_fit(fitted: Fit, seed: int = 0) -> Remainder:
-    """Test whether a fit leaves anything but noise; a fit by simulation is first fitted by the likelihood as well.
+def lack_of_fit(fitted: LikelihoodFit, seed: int = 0) -> Remainder:
+    """Test whether a fit leaves anything but noise.
 
     Where measurement noise may be autoregressive, the residuals of a free simulation are tested too, see
     `remainder.open_set`: process noise would take bursts, detents and slips for its own. The p-value is that of the
     most significant test, times the number of tests.
     """
-    if isinstance(fitted, LikelihoodFit):
-        likeliest, free = fitted, fit(fitted.model, fitted.trials) if fitted.noise.ar else None
-    else:
-        likeliest = LikelihoodFits(fitted.model, fitted.trials, (), answered=False).by_likelihood(fitted)
-        free = fitted
-    featured = _features_left(likeliest, seed)
+    free = fit(fitted.model, fitted.trials) if fitted.noise.ar else None
+    featured = _features_left(fitted, seed)
     others = residual_tests(free, seed) if free is not None and math.isfinite(free.sse) else []
     found = [(featured.p_value, featured.where), *others]
     p_value, where = min(found, key=lambda f: f[0])
     p_value = min(1.0, len(found) * p_value)
-    unexplained = p_value < level_of(likeliest)
+    unexplained = p_value < level_of(fitted)
     return Remainder(unexplained, p_value, where if unexplained else None)
 
 

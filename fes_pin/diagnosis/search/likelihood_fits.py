@@ -19,7 +19,6 @@ from fes_pin.diagnosis.search.possible import is_possible
 from fes_pin.diagnosis.search.score import Scored, best_by_effect, best_pairs
 from fes_pin.diagnosis.search.starts import STARTS, from_afar, refinements, started
 from fes_pin.identify.correlation_time import with_new_noise
-from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.process_noise import first_guess, stilled, without_memory
@@ -127,22 +126,13 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
 
     def with_process_noise(self, calm: LikelihoodFit) -> LikelihoodFit:
         """Return a fit without process noise again with it, from the likeliest of several sizes of process noise."""
-        guess = first_guess(self.model, self.trials)
-        if not guess.std or any(t.low_pass_hz for t in self.trials):  # no filter takes a low pass of trials
+        begun = self._maxima.process_noises(calm, FIRST_NOISE_SCALES)
+        if not begun:
             return calm
-        white = {n: (0.0,) * len(own) for n, own in calm.noise.ar.items()}
-        begun = [replace(calm.noise, std=guess.std, time=guess.time, still=())]
-        begun += [replace(guess, std={n: k * v for n, v in guess.std.items()}, ar=white) for k in FIRST_NOISE_SCALES]
         if self.answered:
             found = in_parallel(lambda d: self._maxima.from_start(calm.model, d), begun)
             return self._with_orders(min(found, key=lambda f: f.sse))
         return self._with_orders(self._maxima.from_start(calm.model, self._maxima.likeliest(calm, begun)))
-
-    def by_likelihood(self, fitted: Fit) -> LikelihoodFit:
-        """Return a fit by simulation again by the likelihood; with process noise if that improves the criterion."""
-        white = replace(first_guess(fitted.model, self.trials), std={}, time={})
-        calm = self._with_orders(self._maxima.from_start(fitted.model, white, fitted.unknowns))
-        return min(calm, self.with_process_noise(calm), key=lambda f: f.criterion)
 
     def _with_orders(self, fitted: LikelihoodFit) -> LikelihoodFit:
         """Return a fit again, with autoregressive noise of the orders that its innovations support."""

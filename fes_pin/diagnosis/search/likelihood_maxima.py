@@ -14,6 +14,7 @@ from fes_pin.identify.fit import GROSS, grown_start
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit, fit_of, maximise
 from fes_pin.identify.problem import limits_of
+from fes_pin.identify.process_noise import first_guess
 from fes_pin.infer.covariance import moved_with
 from fes_pin.infer.levels import PARAMETER_PENALTY
 from fes_pin.infer.maximise import ROUNDS
@@ -58,6 +59,23 @@ class LikelihoodMaxima:
         )
         grown = self.from_start(model.with_parameters(values), noise, unknowns)
         return grown if grown.sse < plain.sse or not math.isfinite(plain.sse) else plain
+
+    def process_noises(self, calm: LikelihoodFit, scales: Sequence[float]) -> list[StateSpaceNoise]:
+        """Return several sizes of process noise with which a fit that has none begins again.
+
+        There are none where readings were low-passed: no filter takes a low pass of trials.
+
+        Parameters
+        ----------
+        scales
+            Sizes of process noise beside white measurement noise, in units of the smallest.
+        """
+        guess = first_guess(calm.model, self.trials)
+        if not guess.std or any(t.low_pass_hz for t in self.trials):
+            return []
+        white = {n: (0.0,) * len(own) for n, own in calm.noise.ar.items()}
+        little = replace(calm.noise, std=guess.std, time=guess.time, still=())
+        return [little, *(replace(guess, std={n: k * v for n, v in guess.std.items()}, ar=white) for k in scales)]
 
     def likeliest(self, fitted: LikelihoodFit, begun: Sequence[StateSpaceNoise]) -> StateSpaceNoise:
         """Return the noise, of several start values, that is likeliest after one step at the parameters of a fit."""
