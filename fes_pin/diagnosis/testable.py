@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,11 +18,16 @@ from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.long_records import searched_part
 from fes_pin.diagnosis.search.library import Library
-from fes_pin.diagnosis.search.score import Scores, score_test
+from fes_pin.diagnosis.search.likelihood_screen import LikelihoodScreen
+from fes_pin.diagnosis.search.score import Scores
 from fes_pin.identify.feedback import is_fed_back
 from fes_pin.identify.fit import Fit, fit_multistart, rough_noise
+from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.identify.likelihood_fit import LikelihoodFit, fit_of
 from fes_pin.identify.problem import Problem
+from fes_pin.identify.process_noise import first_guess
 from fes_pin.infer.levels import ALIKE_COSINE, IDENTIFIABLE_SHARE, LEAST_SHIFT_S, REVERSED_LEAVES, SMALL_SHARE
+from fes_pin.infer.optimum import minimise
 from fes_pin.models.catalogue import Catalogue, installed
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
@@ -82,7 +87,7 @@ def testable_causes(study: Study, catalogue: Catalogue | None = None) -> Testabl
             if not math.isfinite(fitted.sse):
                 return "the nominal model diverges when it is simulated from its start values"
             library = Library(nominal, trials, effects)
-            scores = score_test(fitted.parts, library.probes(fitted, fitted.noise))
+            scores = LikelihoodScreen(library).scores(_by_likelihood(fitted))
             warnings = _given_away(nominal, trials, fitted)
         except (ArithmeticError, np.linalg.LinAlgError) as problem:
             return f"the nominal model cannot be fitted ({problem})"
@@ -126,6 +131,13 @@ def _to_fit(study: Study) -> tuple[Model, Sequence[Trial]]:
 
 def _fitted(model: Model, trials: Sequence[Trial]) -> Fit:
     return fit_multistart(Problem(model, trials, rough_noise(model, trials)), model.parameters())
+
+
+def _by_likelihood(fitted: Fit) -> LikelihoodFit:
+    """The same values as a fit by the likelihood without process noise, in white measurement noise."""
+    white = replace(first_guess(fitted.model, fitted.trials), std={}, time={})
+    problem = LikelihoodProblem(fitted.model, fitted.trials, white)
+    return fit_of(problem, minimise(problem, fitted.values, fitted.unknowns, 0))
 
 
 def _unexplained(fitted: Fit) -> float:

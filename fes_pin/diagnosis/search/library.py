@@ -11,13 +11,10 @@ import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.search.starts import near_null
-from fes_pin.identify.fit import Fit
-from fes_pin.identify.problem import Problem, answered_columns, measured_columns
-from fes_pin.infer.noise import NoiseModel
+from fes_pin.identify.problem import answered_columns, measured_columns
 from fes_pin.models.catalogue import installed
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
-from fes_pin.workers import in_parallel
 
 
 @dataclass(frozen=True)
@@ -62,7 +59,6 @@ class Library:
         self.effects = tuple(installed().effects_for(model.rig) if effects is None else effects)
         self.model, self.trials = Model(model.rig), tuple(trials)
         self.measured = (answered_columns if answered else measured_columns)(model, trials)
-        self._problems: dict[tuple, Problem] = {}
 
     def grid(self, effect: type[Effect]) -> list[Effect]:
         """Return the effect at its null with every combination of its shapes, in every form that a screen tries."""
@@ -75,16 +71,6 @@ class Library:
             for values in itertools.product(*(grids[n] for n in shapes))
         ]
 
-    def probes(self, fitted: Fit, noise: NoiseModel, exclude: Sequence[str] = ()) -> list[Probe]:
-        """Return every effect, linearized at the nominal parameters of a fit.
-
-        The effects that the fit has already are left out of the linearization, as `exclude` is of the result: their
-        influence on another effect's sensitivity is of second order.
-        """
-        nominal = Model(fitted.model.rig)
-        wanted = [e for e in self.effects if e.name not in exclude and self.felt(e)]
-        return [p for group in in_parallel(lambda e: self._probe(e, nominal, fitted, noise), wanted) for p in group]
-
     def not_excited(self) -> tuple[str, ...]:
         """Return the effects that act in none of the trials, as those of a joint where all trials are isometric."""
         return tuple(e.name for e in self.effects if not self.felt(e))
@@ -93,27 +79,3 @@ class Library:
         """Return the trials in which an effect acts."""
         rig = self.model.rig
         return [i for i, t in enumerate(self.trials) if effect.signal in rig.changeable(t.kind, rig.input_columns(t))]
-
-    def _probe(self, effect: type[Effect], nominal: Model, fitted: Fit, noise: NoiseModel) -> list[Probe]:
-        """Return the effect with every choice of its shapes; only the trials in which it acts are simulated."""
-        felt, out = self.felt(effect), []
-        for one in self.grid(effect):
-            problem = self._problem(nominal + one, noise)
-            ends = np.cumsum([0, *(problem.rows(t) for t in self.trials)])
-            columns = np.zeros((ends[-1], len(problem.free)))
-            parts = problem.linearize((nominal + one).parameters(), [fitted.unknowns[i] for i in felt])
-            for i, part in zip(felt, parts, strict=True):
-                columns[ends[i] : ends[i + 1]] = part.jacobian
-            out.append(Probe(one, columns))
-        return out
-
-    def _problem(self, model: Model, noise: NoiseModel) -> Problem:
-        """Return the problem of the nominal model with one effect, on the trials in which it acts."""
-        (one,) = model.effects
-        key = (one.name, tuple(one.unused().items()))
-        if key not in self._problems:
-            free = tuple(f"{one.name}.{n}" for n in one.amplitudes())
-            trials = [self.trials[i] for i in self.felt(type(one))]
-            self._problems[key] = Problem(model, trials, noise, free)
-        self._problems[key].noise = noise
-        return self._problems[key]
