@@ -1,7 +1,7 @@
 """Noise and log of a saved model: the tables `random` and `log` of a `model.toml`.
 
-A rig that is simulated freely has autoregressive noise by output column. A rig in closed loop has noise of each
-column, autoregressive where it is coloured, and first-order random processes.
+Noise of each output column, autoregressive where it is coloured, and first-order random processes. Models that older
+versions saved of rigs that are simulated freely have autoregressive noise by output column, `noise`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from fes_pin.data.log import Log
 from fes_pin.data.schema import NumberKey
 from fes_pin.data.toml import Document, read_toml
 from fes_pin.identify.ahead import Random
-from fes_pin.identify.fit import Fit
+from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.noise import Noise
 from fes_pin.models.predictor import StateSpaceNoise
 
@@ -34,9 +34,9 @@ _LOG = {
 _NOISE = {"std": NumberKey(""), "innovation_std": NumberKey(""), "step_s": NumberKey("s")}
 
 
-def stored_tables(fitted: Fit, log: Log) -> dict[str, dict[str, Any]]:
+def stored_tables(fitted: LikelihoodFit, log: Log) -> dict[str, dict[str, Any]]:
     """Return the tables of a fit's noise and of its log, for `model_toml`."""
-    return {KEY: _random_table(fitted), **({LOG_KEY: log_table(log)} if log != Log() else {})}
+    return {KEY: _random_table(fitted.noise), **({LOG_KEY: log_table(log)} if log != Log() else {})}
 
 
 def log_table(log: Log) -> dict[str, float]:
@@ -56,17 +56,11 @@ def load_log(path: str | Path) -> Log:
     return Log(**document.numbers(LOG_KEY, document.table(LOG_KEY), _LOG))
 
 
-def _random_table(fitted: Fit) -> dict[str, Any]:
-    if isinstance(fitted.noise, StateSpaceNoise):
-        parts = {part: {n: float(v) for n, v in getattr(fitted.noise, part).items()} for part in _PARTS}
-        ar = {n: [float(a) for a in own] for n, own in fitted.noise.ar.items() if own}
-        lag = float(fitted.noise.correlation_s)
-        return {**({"correlation_s": lag} if lag else {}), **parts, **({"ar": ar} if ar else {})}
-    return {"noise": {n: _noise_table(one) for n, one in fitted.noise.items()}}
-
-
-def _noise_table(noise: Noise) -> dict[str, Any]:
-    return {**{n: float(getattr(noise, n)) for n in _NOISE}, "ar": [float(a) for a in noise.ar]}
+def _random_table(noise: StateSpaceNoise) -> dict[str, Any]:
+    parts = {part: {n: float(v) for n, v in getattr(noise, part).items()} for part in _PARTS}
+    ar = {n: [float(a) for a in own] for n, own in noise.ar.items() if own}
+    lag = float(noise.correlation_s)
+    return {**({"correlation_s": lag} if lag else {}), **parts, **({"ar": ar} if ar else {})}
 
 
 def load_random(path: str | Path) -> Random | None:
