@@ -20,10 +20,12 @@ LOOK = {
     **{"svg.fonttype": "none", "svg.hashsalt": "fes_pin", "font.size": 10, "axes.labelsize": 11, "axes.linewidth": 0.8},
     **{"axes.edgecolor": INK, "axes.labelcolor": INK, "xtick.color": INK, "ytick.color": INK, "text.color": INK},
     **{"axes.spines.top": False, "axes.spines.right": False, "axes.facecolor": "none", "figure.facecolor": "none"},
-    "axes.xmargin": 0.0,
+    **{"axes.xmargin": 0.0, "path.simplify_threshold": 0.7},
 }
-"""matplotlib's settings: texts stay texts, in the page's own type, and two figures of the same data are alike."""
+"""matplotlib's settings: texts stay texts, in the page's own type; two figures of the same data are alike; a long curve
+is drawn with as many points as show on the page, and every extreme stays."""
 SHORTER = {
+    r"\s*\n\s*": " ",
     r' id="[\w.]+_\d+"': "",
     r"(\.\d\d)\d+": r"\1",
     r"font(?:-size)?: ([\d.]+px)[^;]*;(?: font-family: [^;]*;)?": r"font-size: \1;",

@@ -17,28 +17,15 @@ from fes_pin.infer.text import percent
 from fes_pin.view.chart import panels, svg
 from fes_pin.view.drawing import Drawing, rows_csv
 from fes_pin.view.missing import Missing, binned, explained, smoothed
-from fes_pin.view.style import COLOURS, WIDTHS, label, milli, thin_curve, unit_of
+from fes_pin.view.style import COLOURS, WIDTHS, label, milli, unit_of
 
 DOTS = 500
 """Dots of one panel."""
-PULSES = 400
-"""Single pulses that are drawn; more of them become a grey band."""
-POINTS = 350
-"""Stretches of a curve that keep their extremes."""
-FEWEST = 60
-"""Of these, in a study of so many trials that the page would be too large."""
-ON_PAGE = 25_000
-"""Stretches of all trials of a study together."""
 NARROW = 330.0
 """Width of a figure of the missing torque."""
 
 
-def points_of(trials: int) -> int:
-    """Stretches of each curve in a study of so many trials: the page stays within about 10 MB."""
-    return max(FEWEST, min(POINTS, ON_PAGE // max(trials, 1)))
-
-
-def trial_drawing(one: Replay, noise: NoiseModel, position_unit: str = "rad", points: int = POINTS) -> Drawing:
+def trial_drawing(one: Replay, noise: NoiseModel, position_unit: str = "rad") -> Drawing:
     """One trial: measured over simulated, the residual (measured - simulated) below, the stimulus as a strip.
 
     The residual is drawn as it is, faint, and smoothed.
@@ -51,8 +38,6 @@ def trial_drawing(one: Replay, noise: NoiseModel, position_unit: str = "rad", po
         Of each output; the residual's band is twice its standard deviation.
     position_unit
         "rad" or "m".
-    points
-        Stretches of each curve that keep their extremes.
     """
     time, inputs = one.measured.time, [n for n in one.measured.columns if n not in one.outputs]
     columns = {"time_s": time}
@@ -63,16 +48,16 @@ def trial_drawing(one: Replay, noise: NoiseModel, position_unit: str = "rad", po
         columns |= {f"{name}_{of}": values for of, values in reversed(curves.items())}
         panel = next(rows)
         for of, values in curves.items():
-            panel.plot(*thin_curve(time, values, points), color=COLOURS[of], linewidth=WIDTHS[of])
+            panel.plot(time, values, color=COLOURS[of], linewidth=WIDTHS[of])
         panel.set_ylabel(label(name, position_unit))
         factor, unit = milli(one.residuals(name)["nominal"], unit_of(name, position_unit))
         band = factor * 2.0 * noise[name].std if name in noise else 0.0
-        _residuals(next(rows), one, name, factor, band, points, f"residual\n({unit})")
+        _residuals(next(rows), one, name, factor, band, f"residual\n({unit})")
     for name in inputs:
         columns[name] = one.measured[name]
-        _strip(next(rows), one.measured, name, position_unit, points)
+        _strip(next(rows), one.measured, name, position_unit)
     axes[-1, 0].set_xlabel("time (s)")
-    return Drawing.of(svg(drawing, described(one, position_unit)), columns, 2 * points)
+    return Drawing.of(svg(drawing, described(one, position_unit)), columns)
 
 
 def described(one: Replay, position_unit: str) -> str:
@@ -91,29 +76,22 @@ def _short(value: float) -> str:
     return f"{float(value):.3g}"
 
 
-def _residuals(panel: Axes, one: Replay, name: str, factor: float, band: float, points: int, title: str) -> None:
+def _residuals(panel: Axes, one: Replay, name: str, factor: float, band: float, title: str) -> None:
     """Residuals of the models, as they are and smoothed."""
-    time, few = one.measured.time, max(FEWEST, round(0.6 * points))
-    residuals = {of: factor * r for of, r in one.residuals(name).items()}
+    time, residuals = one.measured.time, {of: factor * r for of, r in one.residuals(name).items()}
     panel.axhspan(-band, band, color=COLOURS["band"])
     panel.axhline(color=COLOURS["faint"], linewidth=0.8)
     for of, residual in residuals.items():
-        panel.plot(*thin_curve(time, residual, few), color=COLOURS[of], linewidth=0.6, alpha=0.45)
+        panel.plot(time, residual, color=COLOURS[of], linewidth=0.6, alpha=0.45)
     for of, residual in residuals.items():
-        panel.plot(*thin_curve(*smoothed(time, residual), few), color=COLOURS[of], linewidth=1.9)
+        panel.plot(*smoothed(time, residual), color=COLOURS[of], linewidth=1.9)
     limit = 1.1 * max(float(np.abs(r).max()) for r in residuals.values()) or 1.0
     panel.set(ylim=(-limit, limit), ylabel=title)
 
 
-def _strip(panel: Axes, trial: Trial, name: str, position_unit: str, points: int) -> None:
+def _strip(panel: Axes, trial: Trial, name: str, position_unit: str) -> None:
     """The stimulus, thin."""
-    pulses = trial.time[trial[name] > 0.5]
-    if name == "stim" and len(pulses) <= PULSES:
-        panel.vlines(pulses, 0.0, 1.0, color=COLOURS["stimulus"], linewidth=0.7)
-    else:
-        panel.fill_between(
-            *thin_curve(trial.time, trial[name], points), step="post", color=COLOURS["stimulus"], alpha=0.55
-        )
+    panel.plot(trial.time, trial[name], color=COLOURS["stimulus"], drawstyle="steps-post", linewidth=0.7)
     panel.locator_params(axis="y", nbins=2)
     words = label(name, position_unit).replace("pulse width", "width").replace(" (", "\n(")
     panel.set_ylabel(words, rotation=0.0, ha="right", va="center")
@@ -142,6 +120,7 @@ def missing_drawing(
     factor, unit = milli(value, before[0].unit)
     drawing, axes = panels([150.0], NARROW, 58.0)
     panel = axes[0, 0]
+    panel.set_xmargin(0.03)
     panel.axhline(color=COLOURS["faint"], linewidth=0.8)
     chosen = _spread(x, value)
     panel.plot(x[chosen], factor * value[chosen], ".", color=COLOURS["nominal"], markersize=2.4)
@@ -202,7 +181,7 @@ def stimulus_drawing(trial: Trial, position_unit: str = "rad") -> Drawing:
     """The inputs of a trial that is still to be run."""
     drawing, axes = panels([28.0] * len(trial.columns))
     for panel, name in zip(axes[:, 0], trial.columns, strict=True):
-        _strip(panel, trial, name, position_unit, POINTS)
+        _strip(panel, trial, name, position_unit)
     axes[-1, 0].set_xlabel("time (s)")
     ranges = ", ".join(
         f"{label(n, position_unit)} from {_short(v.min())} to {_short(v.max())}" for n, v in trial.columns.items()

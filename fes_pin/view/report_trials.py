@@ -13,7 +13,7 @@ from fes_pin.models.model import Model
 from fes_pin.models.tracking import can_track
 from fes_pin.view.missing import Missing, missing_along, missing_input
 from fes_pin.view.page import Markup, element, figure, folded, joined, key
-from fes_pin.view.plots import missing_drawing, points_of, share, trial_drawing
+from fes_pin.view.plots import missing_drawing, share, trial_drawing
 
 OPEN = 4
 """Trials that are drawn at once, those that the nominal model misses most; the others are folded."""
@@ -78,10 +78,10 @@ def _is_tracked(diagnosis: Diagnosis) -> bool:
 
 def trials_section(diagnosis: Diagnosis, replays: Sequence[Replay]) -> list[Markup]:
     """A figure of each trial, those with small errors folded."""
-    noise, unit, points = diagnosis.extended.noise, position_unit(diagnosis), points_of(len(replays))
+    noise, unit = diagnosis.extended.noise, position_unit(diagnosis)
 
     def drawn(k: int) -> Markup:
-        made = trial_drawing(replays[k], noise, unit, points)
+        made = trial_drawing(replays[k], noise, unit)
         return figure(made, _trial_caption(replays[k]), file=f"trial_{k + 1}")
 
     worst = set(sorted(range(len(replays)), key=lambda k: -replays[k].nominal_error)[:OPEN])

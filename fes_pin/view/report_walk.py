@@ -10,7 +10,7 @@ from fes_pin.view.chart import panels, svg
 from fes_pin.view.drawing import Drawing
 from fes_pin.view.page import Markup, element, figure, key, section
 from fes_pin.view.sections import Parts, not_testable
-from fes_pin.view.style import COLOURS, thin_curve
+from fes_pin.view.style import COLOURS
 from fes_pin.view.walk_playback import PLAYBACK_FILE, playback_html
 from fes_pin.walk.judge import CHANNELS
 from fes_pin.walk.result import BODY_FILE, WalkDiagnosis
@@ -75,7 +75,7 @@ def _drawing(trial: str, time: np.ndarray, curves: Mapping[str, np.ndarray], sin
         for begin, end in edges.reshape(-1, 2).tolist():
             panel.axvspan(time[begin], time[end - 1], color=COLOURS["band"])
         for of, values in own.items():
-            panel.plot(*thin_curve(time, values), color=COLOURS[of], linewidth=2.4 if of == "extended" else 1.2)
+            panel.plot(time, values, color=COLOURS[of], linewidth=2.4 if of == "extended" else 1.2)
         panel.set_ylabel(f"{name} ({unit})".replace(" about", "\nabout"))
         words.append(f"{name} from {own['measured'].min():.3g} to {own['measured'].max():.3g} {unit}")
     for panel in axes[-1]:

@@ -67,26 +67,6 @@ def unit_of(column: str, position_unit: str = "rad") -> str:
     return text.partition("(")[2].rstrip(")")
 
 
-def thin_curve(time: np.ndarray, values: np.ndarray, points: int = 350) -> tuple[np.ndarray, np.ndarray]:
-    """A curve drawn with few points that keeps every extreme: the least and the greatest of each stretch.
-
-    Parameters
-    ----------
-    time, values
-        Shape (n,).
-    points
-        At most twice as many are returned.
-    """
-    n, size = len(values), -(-len(values) // points)
-    if size < 3:
-        return time, values
-    stretches = np.pad(values, (0, -n % size), mode="edge").reshape(-1, size)
-    begins = size * np.arange(len(stretches))
-    extremes = begins + stretches.argmin(axis=1), begins + stretches.argmax(axis=1)
-    chosen = np.unique(np.concatenate([[0, n - 1], *extremes]))
-    return time[chosen], values[chosen]
-
-
 def milli(values: np.ndarray, unit: str) -> tuple[float, str]:
     """Factor and unit in which small values have short numbers: thousandths where they are below a twentieth."""
     largest = float(np.quantile(np.abs(values), 0.995)) if len(values) else 0.0
