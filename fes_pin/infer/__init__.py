@@ -1,1 +1,1 @@
-"""Inference, which knows no rig and no body: levels, tests, families, and the search over sets of candidates."""
+"""Inference without knowledge of rigs or bodies: levels, tests, families, search over sets of candidates, verdict."""

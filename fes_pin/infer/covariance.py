@@ -1,4 +1,4 @@
-"""What a fit's second derivatives say: how far its parameters are known, and what a further step could gain."""
+"""Covariance of fitted parameters, and the gain of a further step, from the second derivatives of a fit."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ import numpy as np
 from fes_pin.infer.problem import NormalEquations
 
 LOST = 1e-3
-"""Part of a parameter in a direction that is not identified from which on neither is the parameter."""
+"""Component of a parameter in a direction that is not identified above which the parameter is not identified either."""
 UNIDENTIFIED = 1e-10
 """Eigenvalue of the scaled information matrix, relative to the largest, below which a direction is not identified."""
 
 
 def covariance_of(hessian: np.ndarray, free: np.ndarray) -> np.ndarray:
-    """Inverse information of the free parameters; infinite variance along what is not identified, 0 at a bound."""
+    """Return the inverse information of the free parameters; infinite where not identified, 0 at a bound."""
     if not np.isfinite(hessian).all():
         return np.full_like(hessian, np.inf)
     out = np.zeros_like(hessian)
     inner = hessian[np.ix_(free, free)]
     diagonal = np.diag(inner).copy()
-    seen = diagonal > np.finfo(float).tiny  # the variance of what is felt less is no number
+    seen = diagonal > np.finfo(float).tiny  # below it a variance is not finite
     scale = np.sqrt(np.where(seen, diagonal, 1.0))
     values, vectors = np.linalg.eigh(inner / np.outer(scale, scale) + np.diag(np.where(seen, 0.0, 1.0)))
     weak = values <= UNIDENTIFIED * max(values.max(initial=0.0), 1e-300)
@@ -34,14 +34,14 @@ def covariance_of(hessian: np.ndarray, free: np.ndarray) -> np.ndarray:
 
 
 def single_gain(hessian: np.ndarray, gradient: np.ndarray, free: np.ndarray) -> float:
-    """Largest gain in twice the log-likelihood that a step of one free parameter alone still predicts."""
+    """Return the largest predicted gain in twice the log-likelihood of a step of one free parameter alone."""
     diagonal = np.diag(hessian)
     good = free & (diagonal > 0) & np.isfinite(gradient)
     return float(np.max(gradient[good] ** 2 / diagonal[good], initial=0.0))
 
 
 def step_gain(system: NormalEquations, free: Sequence[bool]) -> float:
-    """Gain in twice the log-likelihood that a Gauss-Newton step of all parameters that may move predicts."""
+    """Return the predicted gain in twice the log-likelihood of a Gauss-Newton step of all free parameters."""
     moving = np.flatnonzero(free)
     slope, curvature = system.gradient[moving], system.hessian[np.ix_(moving, moving)]
     if not (np.isfinite(slope).all() and np.isfinite(curvature).all()):
@@ -50,7 +50,7 @@ def step_gain(system: NormalEquations, free: Sequence[bool]) -> float:
 
 
 def least_squares_step(hessian: np.ndarray, gradient: np.ndarray, rcond: float = 1e-10) -> np.ndarray:
-    """The shortest x, in parameters scaled by their information, that maximises 2 gradient' x - x' hessian x.
+    """Return the shortest x, in parameters scaled by their information, that maximises 2 gradient' x - x' hessian x.
 
     Parameters
     ----------
@@ -64,16 +64,16 @@ def least_squares_step(hessian: np.ndarray, gradient: np.ndarray, rcond: float =
 
 
 def moved_with(covariance: np.ndarray, at: list[int], change: np.ndarray) -> np.ndarray:
-    """How far all parameters go where some are moved: their mean, given those, of a Gaussian.
+    """Return the change of all parameters where some are moved: the conditional mean of a Gaussian.
 
     Parameters
     ----------
     covariance
         Shape (n, n).
     at
-        Places of those that are moved.
+        Places of the moved parameters.
     change
-        By how much, shape (len(at),).
+        Their changes, shape (len(at),).
 
     Returns
     -------
@@ -89,14 +89,14 @@ def moved_with(covariance: np.ndarray, at: list[int], change: np.ndarray) -> np.
 
 
 def widened(covariance: np.ndarray, scores: np.ndarray) -> np.ndarray:
-    """The covariance of a fit, as wide as scores of pieces of the data scatter where a model is not quite right.
+    """Return the covariance of a fit, widened to that of the sandwich estimator where this is larger.
 
-    With C the inverse information and g_k the slopes of the log-likelihood of m pieces, the variances of a right model
-    are those of C; of another they are those of the sandwich
+    With C the inverse information and g_k the slopes of the log-likelihood of m pieces of the data, C has the variances
+    of a right model. Those of a wrong model are in the sandwich
 
         C (m / (m - 1) sum g_k g_k') C
 
-    and the larger counts, the correlations being those of C.
+    The larger variances are returned with the correlations of C.
 
     Source: White, Maximum likelihood estimation of misspecified models, Econometrica 50 (1982); by pieces of a record,
     Newey and West, A simple, positive semi-definite, heteroskedasticity and autocorrelation consistent covariance
@@ -118,14 +118,14 @@ def widened(covariance: np.ndarray, scores: np.ndarray) -> np.ndarray:
 
 
 def scattered(covariance: np.ndarray, scores: np.ndarray) -> np.ndarray:
-    """The sandwich of `widened`, shape (n, n); 0 of parameters that nothing is known of, or that do not move.
+    """Return the sandwich of `widened`, shape (n, n); 0 for parameters that are not identified or do not move.
 
     Parameters
     ----------
     covariance
         Inverse information, shape (n, n).
     scores
-        Of at least two pieces, shape (m, n).
+        Scores of at least two pieces, shape (m, n).
     """
     known, pieces = np.isfinite(np.diag(covariance)) & (np.diag(covariance) > 0.0), len(scores)
     spread = scores[:, known] @ covariance[np.ix_(known, known)]

@@ -13,26 +13,26 @@ from scipy import special
 
 
 def normal_quantile(p: float) -> float:
-    """Of the standard normal distribution."""
+    """Return a quantile of the standard normal distribution."""
     return float(special.ndtri(p))
 
 
 def chi2_tail(x: Any, degrees: float) -> Any:
-    """P(X > x) for chi-square of so many degrees of freedom; numbers or arrays of any shape."""
+    """Return P(X > x) for a chi-square distribution; numbers or arrays of any shape."""
     return special.gammaincc(0.5 * degrees, np.maximum(x, 0.0) * 0.5)
 
 
 def chi2_quantile(p: Any, degrees: float) -> Any:
-    """Of chi-square of so many degrees of freedom; numbers or arrays of any shape."""
+    """Return a quantile of a chi-square distribution; numbers or arrays of any shape."""
     return 2.0 * special.gammaincinv(0.5 * degrees, p)
 
 
 def f_tail(x: float, over: float, under: float) -> float:
-    """P(X > x) for Fisher's F of `over` and `under` degrees of freedom."""
+    """Return P(X > x) for Fisher's F of `over` and `under` degrees of freedom."""
     return float(special.fdtrc(over, under, max(x, 0.0)))
 
 
 def pearson3_tail(x: float, skewness: float) -> float:
-    """P(X > x) for the gamma distribution of mean 0, variance 1 and this skewness > 0 (Pearson type III)."""
+    """Return P(X > x) for the gamma distribution of mean 0, variance 1 and a skewness > 0 (Pearson type III)."""
     shape = 4.0 / skewness**2
     return float(special.gammaincc(shape, max(shape + math.sqrt(shape) * x, 0.0)))

@@ -17,25 +17,25 @@ DRAWS = 4000
 """Simulated score vectors; the 5 % quantile of the smallest p-value then has a standard error of 7 %."""
 
 SMALLEST_P = 1e-300
-"""What a p-value that double precision cannot tell from 0 is given as."""
+"""Smallest p-value that is returned: double precision cannot represent much smaller ones."""
 
 
 class Family:
-    """All scores of a library under the hypothesis that no candidate acts.
+    """The joint distribution of all scores of a library under the null that no candidate acts.
 
     The scores are jointly Gaussian. One simulation of them gives the distribution of the smallest p-value, and with it
-    the number of independent tests that the family amounts to.
+    the number of independent tests that is equivalent to the family.
 
     Parameters
     ----------
     gram
-        Shape (k, k): inner products of the candidates' columns, without the part that the fit takes up.
+        Shape (k, k): inner products of the candidates' columns, with the fitted parameters projected off.
     blocks
         Rows of `gram` of each test.
     seed
         Of the simulation.
     others
-        Further tests, which count as independent of all: the most that they can be.
+        Number of further tests, which are taken as independent: an upper bound.
     """
 
     def __init__(self, gram: np.ndarray, blocks: Sequence[slice], seed: int, others: int = 0) -> None:
@@ -44,18 +44,18 @@ class Family:
         self.tests = _effective_tests(gram * np.outer(scale, scale), blocks, seed) + others
 
     def p_value(self, gain: float, degrees: int) -> float:
-        """Family-wise p-value of a drop in twice the negative log-likelihood."""
+        """Return the family-wise p-value of a gain in twice the log-likelihood."""
         return self.adjusted(float(chi2_tail(max(gain, 0.0), degrees)))
 
     def adjusted(self, single: float) -> float:
-        """Family-wise p-value of the smallest of the family's p-values."""
+        """Return the family-wise p-value for the smallest p-value of the family."""
         return max(float(-np.expm1(self.tests * np.log1p(-min(single, 1 - 1e-16)))), SMALLEST_P)
 
 
 class SimulatedFamily:
-    """Family-wise p-values of the largest gain of a library, from its gains in data that are simulated without a cause.
+    """Family-wise p-values of the largest gain of a library, from its gains in data simulated without a cause.
 
-    The largest of many gains follows a Gumbel distribution; place and scale are taken from mean and standard deviation.
+    The largest of many gains follows a Gumbel distribution; its location and scale come from mean and deviation.
     Source: Gumbel, Statistics of Extremes, 1958.
 
     Parameters
@@ -69,14 +69,14 @@ class SimulatedFamily:
         self.place = float(np.mean(largest)) - float(np.euler_gamma) * self.scale
 
     def p_value(self, gain: float) -> float:
-        """Chance of at least this gain, 1 where nothing is gained."""
+        """Return the probability of at least this gain; 1 where nothing is gained."""
         if gain <= 0.0:
             return 1.0
         return max(float(-np.expm1(-np.exp(-(gain - self.place) / self.scale))), SMALLEST_P)
 
 
 def _effective_tests(gram: np.ndarray, blocks: Sequence[slice], seed: int) -> float:
-    """Independent tests that would make the smallest p-value as small."""
+    """Return the number of independent tests with the same distribution of the smallest p-value."""
     values, vectors = np.linalg.eigh(gram)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     draws = np.random.default_rng(seed).standard_normal((DRAWS, len(gram))) @ root.T

@@ -1,4 +1,4 @@
-"""Fits of sets of candidates by their names: extended, converged, ranked, with what most front ends answer a search."""
+"""Fits of sets of candidates by their names: extended, converged and ranked, with defaults for most front ends."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ S = TypeVar("S")
 
 @dataclass(frozen=True)
 class Candidate(Generic[S]):
-    """A candidate that a set may be extended by.
+    """A candidate by which a set may be extended.
 
     Attributes
     ----------
     gain
-        In twice the log-likelihood, by the score test; 0 where none is made.
+        Gain in twice the log-likelihood by the score test; 0 where none is made.
     start
-        Where a fit with it begins.
+        Start of a fit with the candidate.
     """
 
     gain: float
@@ -33,20 +33,20 @@ class Candidate(Generic[S]):
 
 
 class FittedSets(ABC, Generic[F, S]):
-    """Fits of sets of candidates to the same data; a front end says how they are made.
+    """Fits of sets of candidates to the same data, which a front end makes.
 
-    Methods that are not abstract suit linear models, of which each fit has converged.
+    The methods that are not abstract suit linear models, whose fits have all converged.
 
     Attributes
     ----------
     fits
-        By names in alphabetical order; `()` is the nominal model.
+        Fits by names in alphabetical order; `()` is the nominal model.
     most_candidates
-        Candidates in a set, at most; None for no bound.
+        Most candidates in a set; None for no bound.
     converged_sets
-        Best sets of a size that go on until they converge.
+        Number of best sets of a size that are fitted until they converge.
     family
-        Of the tests of all candidates.
+        Family of the tests of all candidates.
     """
 
     most_candidates: int | None = 3
@@ -60,90 +60,90 @@ class FittedSets(ABC, Generic[F, S]):
 
     @property
     def own(self) -> Self:
-        """These models, by the type that their front end knows."""
+        """These models, with the type of their front end."""
         return self
 
     @abstractmethod
     def candidates(self, base: F) -> Mapping[str, Candidate[S]]:
-        """Candidates that a set may be extended by."""
+        """Return the candidates by which a set may be extended."""
 
     @abstractmethod
     def begin(self, base: F, starts: Mapping[Names, S]) -> Mapping[Names, F]:
-        """First fits of sets that extend a base, each from its start."""
+        """Return first fits of sets that extend a base, each from its start."""
 
     @abstractmethod
     def without(self, names: Names, name: str) -> F:
-        """The fit of a set less one candidate."""
+        """Return the fit of a set without one candidate."""
 
     def noise_p_value(self, gain: float, degrees: int) -> float:
-        """Family-wise p-value of a gain in twice the log-likelihood against the noise."""
+        """Return the family-wise p-value of a gain in twice the log-likelihood against the noise."""
         return self.family.p_value(gain, degrees)
 
     def pairs(self, most: int) -> Mapping[Names, S]:
-        """Starts of the pairs of candidates of largest joint score in the nominal model."""
+        """Return starts of the pairs of candidates of largest joint score in the nominal model."""
         return {}
 
     def converged(self, fits: Sequence[F]) -> list[F]:
-        """Fits once they have converged."""
+        """Return the converged fits."""
         return list(fits)
 
     def step_gain(self, fitted: F) -> float:
-        """What a further step of a fit gains, by its slope and curvature."""
+        """Return the gain of a further step of a fit by its slope and curvature."""
         return 0.0
 
     def form_of(self, fitted: F) -> frozenset[Hashable]:
-        """In which form a fit has its candidates, where they have several."""
+        """Return the forms of the candidates in a fit, where they have several."""
         return frozenset()
 
     def is_possible(self, fitted: F) -> bool:
-        """Whether every size of a fit is physically possible."""
+        """Return whether every size of a fit is physically possible."""
         return True
 
     def excess_scatter(self, larger: F, smaller: F) -> float:
-        """How much more a gain scatters between pieces of the data than the likelihood says; 1 where it does not."""
+        """Return the ratio of a gain's scatter between pieces of the data to that of the likelihood; at least 1."""
         return 1.0
 
     def p_value(self, larger: F, smaller: F, gain: float | None = None) -> float:
-        """Family-wise p-value of what a larger set gains, or of a gain in its place, as far as pieces agree on it."""
+        """Return the family-wise p-value of the gain of a larger set, or of a given gain, corrected for scatter."""
         gain = smaller.sse - larger.sse if gain is None else gain
         return self.noise_p_value(gain / self.excess_scatter(larger, smaller), more_degrees(larger, smaller))
 
     def extension_p_value(self, fitted: F) -> float:
-        """Family-wise p-value of the score of the best further candidate; 0 where every candidate is fitted."""
+        """Return the family-wise p-value of the best further candidate's score; 0 where every candidate is fitted."""
         return 0.0
 
     def level(self, fitted: F) -> float:
-        """Family-wise level of a claim."""
+        """Return the family-wise level of a claim."""
         return CLAIM_LEVEL
 
     def is_error_of_form(self, larger: F, gain: float, explained: float) -> bool:
-        """Whether a gain is no more than an error in the form of the other candidates leaves of what all explain."""
+        """Return whether a gain is no more than an error in the form of the other candidates may leave."""
         return False
 
     def predicts_better(self, larger: F, smaller: F) -> bool:
-        """Whether what a set adds lessens the errors of prediction."""
+        """Return whether a larger set has smaller errors of prediction."""
         return True
 
     def leaves_noise(self, fitted: F) -> bool:
-        """Whether no lack of fit is found."""
+        """Return whether a fit has no lack of fit."""
         return True
 
     def better_form(self, fitted: F) -> F | None:
-        """The same set in another form that the data demand; None where they demand none."""
+        """Return the same set in another form that is significant; None where none is."""
         return None
 
     def other_form(self, fitted: F) -> F | None:
-        """The same set in a form that was reached another way, where that is better."""
+        """Return the same set in a form that another order of refinements reaches, where that is better; else None."""
         return None
 
     def begin_again(self, names: Names) -> bool:
-        """Fit a set and the nominal model under the noise that the set leaves; False where every fit has its own."""
+        """Fit a set and the nominal model under the noise of the set; return False where every fit has its own."""
         return False
 
     def extend(self, base: Names, most: int | None = None) -> None:
         """Fit a set with each further candidate, or with the `most` of largest score.
 
-        A set that is fitted begins once more where candidates of the base have another form than they have in it.
+        A fitted set is started again where candidates of the base have another form than in that set.
         """
         fitted = self.fits[base]
         known, forms = self.candidates(fitted), self.form_of(fitted)
@@ -154,14 +154,14 @@ class FittedSets(ABC, Generic[F, S]):
         self._add(fitted, missing)
 
     def extend_by_pairs(self, most: int) -> None:
-        """Fit the pairs of candidates of largest joint score in the nominal model that are not fitted yet."""
+        """Fit the pairs of candidates of largest joint score in the nominal model that are not yet fitted."""
         self._add(self.fits[()], {k: s for k, s in self.pairs(most).items() if k not in self.fits})
 
     def _has(self, names: Names, forms: frozenset[Hashable]) -> bool:
         return names in self.fits and forms <= self.form_of(self.fits[names])
 
     def _add(self, base: F, starts: Mapping[Names, S]) -> None:
-        """Begin sets side by side; of several fits of a set that of lowest price stays."""
+        """Start fits of sets in parallel; of several fits of a set the one of lowest criterion is kept."""
         for names, best in self.begin(base, starts).items():
             if names not in self.fits or best.criterion < self.fits[names].criterion:
                 self.fits[names] = best
@@ -170,12 +170,12 @@ class FittedSets(ABC, Generic[F, S]):
             self.converge(size)
 
     def converge(self, size: int, without: Sequence[Names] = ()) -> None:
-        """Let the best sets of a size converge, and those near it, but for some."""
+        """Fit the best sets of a size, and those near the best, until they converge, except some."""
         while slow := [n for n in self._hopeful(size, without) if n not in self._converged]:
             self._converge(slow)
 
     def converge_rivals(self, base: Names, name: str) -> None:
-        """Let the sets converge that have another candidate of about the same score in the place of one."""
+        """Fit the sets with another candidate of similar score in the place of one until they converge."""
         gains = {n: c.gain for n, c in self.candidates(self.fits[base]).items()}
         least = gains.get(name, math.inf) - SEPARABLE
         rivals = [tuple(sorted((*base, n))) for n, gain in gains.items() if gain > least]
@@ -186,7 +186,7 @@ class FittedSets(ABC, Generic[F, S]):
         self._converged.update(slow)
 
     def _hopeful(self, size: int, without: Sequence[Names]) -> list[Names]:
-        """The sets of a size that a further step would make the best, and those that come near the best."""
+        """Return the sets of a size that a further step may make the best, and those near the best."""
         near, ranked = self.near(size, without), [n for n in self.ranked(size) if n not in without]
         first = sorted(ranked, key=lambda n: self.fits[n].criterion - self._step_gain(n))[: self.converged_sets]
         return [n for n in ranked if n in first or n in near]
@@ -195,7 +195,7 @@ class FittedSets(ABC, Generic[F, S]):
         return 0.0 if names in self._converged else self.step_gain(self.fits[names])
 
     def near(self, size: int, without: Sequence[Names] = ()) -> list[Names]:
-        """Sets of a size, best first, that gain half of what the best gains over the best smaller set; the best."""
+        """Return the sets of a size, best first, with at least half of the best one's gain over the smaller sets."""
         ranked = [n for n in self.ranked(size) if n not in without]
         if not ranked:
             return []
@@ -204,11 +204,11 @@ class FittedSets(ABC, Generic[F, S]):
         return [n for n in ranked if n == ranked[0] or self.fits[n].criterion < half]
 
     def ranked(self, size: int) -> list[Names]:
-        """Sets of a size, lowest price first; those that have converged to what cannot be come last."""
+        """Return the sets of a size, lowest criterion first; those with physically impossible sizes come last."""
         absurd = {n for n in self._converged if not self.is_possible(self.fits[n])}
         return sorted((n for n in self.fits if len(n) == size), key=lambda n: (n in absurd, self.fits[n].criterion, n))
 
 
 def more_degrees(larger: Fitted, smaller: Fitted) -> int:
-    """Degrees of freedom that a larger set has more, at least 1."""
+    """Return the degrees of freedom that a larger set has more, at least 1."""
     return max(larger.degrees - smaller.degrees, 1)

@@ -1,4 +1,4 @@
-"""Gains on data that took no part in choosing or fitting: errors by unit of evidence, gains, likelihoods."""
+"""Gains on held-out data: errors by unit of evidence, gains with their intervals, likelihoods."""
 
 from __future__ import annotations
 
@@ -17,26 +17,26 @@ from fes_pin.infer.scatter import at_rest
 RESAMPLES = 2000
 """Bootstrap draws of a gain: the standard error of its 95 % bounds is 1.5 % of their distance, of a normal gain."""
 FAR = 1e6
-"""Whitened residuals count as no larger, in standard deviations."""
+"""Limit of whitened residuals, in standard deviations."""
 WIDE = 10.0
-"""Width of the prior of a parameter, in units of its value or scale: nothing is known beforehand but its size. Of what
-the data tell it cancels between the trials and their folds."""
+"""Width of the vague prior of a parameter, in units of its value or scale. For identified parameters it cancels between
+the trials and their folds."""
 
 FOLDS = 5
-"""Parts that units are dealt to: each is predicted by the other four, which hold most of what is known."""
+"""Number of folds: each is predicted from the other four, which hold most of the information."""
 
 
 def deal(order: Sequence[int], groups: Sequence[Hashable] | None = None, count: int = FOLDS) -> list[list[int]]:
-    """Units to hold out together, by their numbers; each group is dealt round, and stays in what is fitted.
+    """Return the units of each fold, by their numbers; every group is spread over the folds.
 
-    A unit that is alone in its group is never held out: the others say nothing of it.
+    A unit that is alone in its group is never held out, since the others do not predict it.
 
     Parameters
     ----------
     order
-        Numbers of the units as they are dealt: neighbours come to different folds.
+        Numbers of the units in the order in which they are spread: neighbours come to different folds.
     groups
-        Of each unit, by its number; by default all are of one.
+        Group of each unit, by its number; by default there is one group.
     """
     of = {i: None if groups is None else groups[i] for i in order}
     sizes = Counter(of.values())
@@ -45,7 +45,7 @@ def deal(order: Sequence[int], groups: Sequence[Hashable] | None = None, count: 
 
 
 def percent_of_spread(squares: ArrayLike, around: ArrayLike) -> float:
-    """E, percent.
+    """Return E, percent.
 
     Parameters
     ----------
@@ -66,9 +66,9 @@ class Errors:
     spread
         The same of the measurement about its trial's mean.
     noise
-        The same that noise alone leaves, by expectation: of white noise the number of samples.
+        Expectation of the same for noise alone: for white noise the number of samples.
     variances
-        Of that; None where it is white, which leaves twice the number of samples.
+        Variance of the same for noise alone; None for white noise, which has twice the number of samples.
     """
 
     squares: np.ndarray
@@ -77,20 +77,20 @@ class Errors:
     variances: np.ndarray | None = None
 
     def scatter(self) -> np.ndarray:
-        """Variance of what noise alone leaves in each unit."""
+        """Variance of the squared error of noise alone in each unit."""
         return 2.0 * self.noise if self.variances is None else self.variances
 
     def error_percent(self) -> float:
-        """E of eq. (2), pooled."""
+        """Return E of eq. (2), pooled."""
         return percent_of_spread(self.squares, self.spread)
 
     def ceiling_percent(self) -> float:
-        """E of a model that leaves the noise alone."""
+        """Return E of a model whose errors are noise alone."""
         return percent_of_spread(self.noise, self.spread)
 
 
 def held_out_gain(nominal: Errors, without: Errors, extended: Errors, seed: int) -> Gain:
-    """What the step from `without` to `extended` removes of the nominal model's error above the noise.
+    """Return the share of the nominal model's error above the noise that the step from `without` to `extended` removes.
 
     The interval is a bootstrap over the units of evidence.
     """
@@ -104,10 +104,10 @@ def held_out_gain(nominal: Errors, without: Errors, extended: Errors, seed: int)
 def _share(
     nominal: np.ndarray, without: np.ndarray, extended: np.ndarray, noise: np.ndarray, scatter: np.ndarray
 ) -> np.ndarray:
-    """Percent; the error above the noise is at least what the extension removes.
+    """Return the gain in percent of the error above the noise.
 
-    It is at least its own scatter, too, of which `scatter` is the variance: units of evidence in which there is next to
-    no error would else show gains of any size.
+    That error is taken as no less than the part which the extension removes, and no less than its own standard
+    deviation, the root of `scatter`: units with hardly any error would otherwise have gains of any size.
     """
     excess = np.maximum(np.maximum(nominal - noise, nominal - extended), np.sqrt(scatter))
     return np.asarray(100.0 * (without - extended) / excess)
@@ -115,16 +115,16 @@ def _share(
 
 @np.errstate(all="ignore")
 def marginal_cost(fitted: Optimum, scales: Mapping[str, float]) -> float:
-    """Twice the negative log of the probability of a fit's trials, integrated over its parameters (Laplace).
+    """Return twice the negative log of the marginal likelihood of a fit's trials by Laplace's method.
 
-    cost + log det(1 + H S^2), with H the information and S the widths of a prior. By Bayes' rule
-    p(held | others) = p(all) / p(others): of the fit to all trials less that to the others it is the cost of the held
-    ones, in which what the others leave uncertain of a parameter is uncertainty about the held ones as well.
+    It is cost + log det(1 + H S^2), with H the information and S the widths of a prior. By Bayes' rule
+    p(held | others) = p(all) / p(others): the value for all trials minus the value for the others is the cost of the
+    held-out ones, with the uncertainty of the parameters included.
 
     Parameters
     ----------
     scales
-        Of every parameter, by name.
+        Scale of every parameter, by name.
     """
     system = normal_equations(at_rest(fitted.parts))
     widths = [WIDE * max(abs(fitted.parameters[n]), scales[n]) for n in fitted.free]
@@ -133,37 +133,37 @@ def marginal_cost(fitted: Optimum, scales: Mapping[str, float]) -> float:
 
 
 def is_supported(evidence: Evidence | None, gain: Gain, alone: bool) -> bool:
-    """Whether trials that took no part speak for a cause.
+    """Return whether held-out trials support a cause.
 
-    By their likelihood where the model leaves only noise, by their errors over time where it does not; where other
-    causes stand beside it by both, for several flexible forms together come near to anything. A cause alone may have no
-    gain: if one trial of many reaches a stop, the others do not foretell it. None may be sure to do harm.
+    Where the model has no lack of fit, their likelihood must support it, else their errors. In a set of several causes
+    both must, since several flexible forms together fit nearly anything. A cause alone may have no gain: if one trial
+    of many reaches a stop, the others do not predict it. A significantly negative gain is never accepted.
 
     Parameters
     ----------
     evidence
-        By likelihood; None where the model leaves more than noise, and a likelihood says little.
+        Evidence of the likelihood; None where the model has a lack of fit, so that a likelihood says little.
     gain
-        Of its errors over time.
+        Gain in errors of prediction.
     alone
-        Whether no other cause stands beside it.
+        Whether the set has no other cause.
     """
     likely = evidence is None or evidence.low > 0.0
     return likely and (gain.is_material or (evidence is not None and alone and gain.high > 0.0))
 
 
 def within(errors: np.ndarray, most: float) -> np.ndarray:
-    """Errors, or readings, no larger than `most`; what is no number is as large."""
+    """Return errors or readings limited to `most`; values that are not finite become `most`."""
     return np.asarray(np.clip(np.nan_to_num(errors, nan=most, posinf=most, neginf=-most), -most, most))
 
 
 def added_likelihood(without: np.ndarray, extended: np.ndarray) -> Evidence:
-    """What a cause adds, from whitened residuals without it and with it."""
+    """Return the evidence for a cause from whitened residuals without it and with it."""
     without, extended = within(without, FAR), within(extended, FAR)
     difference = without - extended
     return Evidence(float(without @ without - extended @ extended), float(difference @ difference))
 
 
 def joined_errors(errors: Sequence[Errors]) -> Errors:
-    """Errors of several folds, all units of evidence together."""
+    """Return the errors of several folds, all units of evidence together."""
     return Errors(*(np.concatenate([getattr(e, name) for e in errors]) for name in ("squares", "spread", "noise")))

@@ -1,7 +1,7 @@
-"""The numbers that decide what is claimed: levels, penalties, shares and orders, each with its source.
+"""The constants that decide about claims: levels, penalties, shares and orders, each with its source.
 
-All other numbers of inference say how something is sought, guard arithmetic, or describe a sensor or a person; their
-kinds stand in docs/data/numbers.toml.
+All other constants of inference control an algorithm, guard arithmetic, or describe a sensor or a person; their kinds
+are in docs/data/numbers.toml.
 """
 
 from __future__ import annotations
@@ -20,92 +20,91 @@ DRIVEN_LEVEL = 1e-3
 Simulation: `scripts/accuracy driven --nulls` prints the p-values of rigs in which nothing is hidden; the least of 54
 was 0.002."""
 CERTAIN_LEVEL = 1e-6
-"""Level at which something acts whatever its name. Theory: a test that is repeated 10 000 times, in each of a
-cohort's studies, still alarms in less than `CLAIM_LEVEL` of all."""
+"""Level at which an effect is certain, even if its cause is not. Theory: a test that is repeated 10 000 times, in each
+study of a cohort, still alarms in less than `CLAIM_LEVEL` of all."""
 WALK_LEVEL = 1e-4
 """Family-wise error of a cause of a walk against the simulated null. Simulation: `scripts/accuracy walking --nulls`
-counts alarms in soft tissue of other laws than the null's, which are more."""
+counts alarms where soft tissue follows other laws than in the null; these are more."""
 CONFIDENCE_95 = normal_quantile(1.0 - 0.5 * UNUSUAL_LEVEL)
 """Half a 95 % interval of a normal variable, in standard deviations. Theory."""
 SURE = normal_quantile(1.0 - UNUSUAL_LEVEL)
-"""Standard deviations that 95 of 100 normal variables stay below. Theory."""
+"""95 % quantile of a normal variable, in standard deviations. Theory."""
 SEEN_POWER = 1.0 - UNUSUAL_LEVEL
-"""Power of a test at the size from which on a change is excluded. Theory: the error of the second kind is that of
-the first."""
+"""Power of a test at the size above which a change is excluded. Theory: the error of the second kind equals that of the
+first."""
 
 # Penalties and differences of twice the log-likelihood
 
 PARAMETER_PENALTY = float(chi2_quantile(1.0 - UNUSUAL_LEVEL, 1))
 """Penalty for a parameter, or a coefficient of the noise. Theory: a single test at `UNUSUAL_LEVEL` (Wilks 1938)."""
 SEPARABLE = SURE**2
-"""Difference at which a rival is told apart at 95 %. Theory: the square of `SURE`."""
+"""Difference at which a rival is distinguished at 95 %. Theory: the square of `SURE`."""
 CERTAIN_GAIN = float(chi2_quantile(1.0 - CERTAIN_LEVEL, 1))
 """Gain of one parameter at `CERTAIN_LEVEL`. Theory (Wilks 1938)."""
 STRONG_EVIDENCE = 6.0
 """Difference at which one set is preferred to another where sizes have priors: odds of 20 to 1. Literature: R. E.
 Kass and A. E. Raftery, Bayes factors, J. Am. Stat. Assoc. 90:773, 1995."""
 MISREAD_SCORE = 10.0
-"""Score of a trial that is looked at as misread. Theory: three standard deviations, rounded up."""
+"""Score at which a trial is tested for a misread condition. Theory: three standard deviations, squared, rounded up."""
 
 # Shares
 
 SMALL_SHARE = 0.1
-"""Share of a whole, in amplitude, that is small. Theory: it adds half a percent to a root mean square."""
+"""Small share of a whole, in amplitude. Theory: it adds half a percent to a root mean square."""
 FORM_SHARE = 0.0625
-"""Share of the gain of all causes that an error of form leaves. Theory: an error of a quarter in a cause's form
-leaves a quarter, squared, of its likelihood to whatever other cause comes near."""
+"""Share of the gain of all causes that an error of form may leave. Theory: an error of a quarter in a cause's form
+leaves a quarter, squared, of its likelihood to another, similar cause."""
 IDENTIFIABLE_SHARE = 0.04
 """Share of its norm that a sensitivity must keep, once fitted parameters are projected off, to be testable. Theory:
 a share s inflates a standard deviation by 1 / s, here 25 times (variance inflation: Belsley, Kuh and Welsch
 1980)."""
 UNFELT = 1e-4
-"""Share of the largest of several squares, or eigenvalues, below which one says nothing. Theory: a hundredth in
+"""Share of the largest of several squares, or eigenvalues, below which one is neglected. Theory: a hundredth in
 amplitude, a tenth of `SMALL_SHARE`."""
 SMALL_PERCENT = 100.0 * SMALL_SHARE**2
 """Error E that is small, in percent. Literature: a tenth of what Dombre, Fournier and Coiffet call a good fit."""
 NOTHING_PERCENT = SMALL_SHARE * SMALL_PERCENT
-"""Gain that is nothing, in percent. Theory: a small share of a small error."""
+"""Gain that is negligible, in percent. Theory: a small share of a small error."""
 RUNAWAY = 10.0
-"""Times the largest reading beyond which a prediction is lost. Theory: the inverse of `SMALL_SHARE`; how far a
-divergent simulation goes says nothing."""
+"""Limit of a prediction, in multiples of the largest reading: beyond it a simulation diverges. Theory: the inverse of
+`SMALL_SHARE`; the size of a divergent simulation has no meaning."""
 REVERSED_LEAVES = 0.3
-"""Share of the squared error that is left at most where an effort counts the other way. Theory: a model that leaves
-more than half of the amplitude says nothing of a sign."""
+"""Largest share of the squared error with the sign of an effort changed, for a warning about that sign. Theory: a model
+that leaves more than half of the amplitude says nothing about a sign."""
 ALIKE_COSINE = 0.99
-"""Cosine of two sensitivities from which on causes look alike. Theory: to tell them apart at 95 % either must stand
-out by 23 standard deviations, 1.645 sqrt(2 / (1 - cosine))."""
+"""Cosine of two sensitivities above which causes look alike. Theory: to distinguish them at 95 % either must be
+significant by 23 standard deviations, 1.645 sqrt(2 / (1 - cosine))."""
 EXPLAINED_AS_WELL = 2.0
-"""Ratio of mean squares from which on a restated trial is not explained as the others are. Theory: the upper 5 % of
+"""Ratio of mean squares above which a restated trial is explained worse than the others. Theory: the upper 5 % of
 Fisher's F of 20 and 20 degrees is 2.1."""
 EFFORT_NOISE_SHARE = 1e-3
-"""Share of the process noise's spectrum from which on white noise of the recorded effort counts. Theory: less
-changes no deviation by a thousandth."""
+"""Share of the process noise's spectrum above which white noise of the recorded effort counts. Theory: a smaller share
+changes no standard deviation by a thousandth."""
 
 # Numbers of trials, causes and samples
 
 FEWEST_STATED = 4
-"""Trials that state a condition, at least, to ask whether one is misread. Theory: Student's t needs the scatter of
-three others."""
+"""Least number of trials that state a condition, for a test whether one is misread. Theory: Student's t needs the
+scatter of three others."""
 MOST_CAUSES = 3
-"""Causes of a set, at most. Theory: each further one multiplies the sets that are searched by the library's size."""
+"""Most causes of a set. Theory: each further one multiplies the sets that are searched by the size of the library."""
 MOST_ITEMS = 5
-"""Common causes and changes of a set, at most. Theory: as `MOST_CAUSES`, with two changes."""
+"""Most common causes and changes of a set. Theory: as `MOST_CAUSES`, with two changes."""
 SHORT_NOISE = 2
-"""Order of the noise where bursts, repeats and uneven noise are tested. Theory: these tests hold for any spectrum,
+"""Order of the noise in tests of bursts, repeats and heteroscedastic noise. Theory: these tests hold for any spectrum,
 and a longer autoregression learns slow deviations as noise."""
 FULL_NOISE = 24
-"""Order of the noise where slips and play are tested. Simulation: `scripts/benchmarks/adequate.py`; it whitens a
-random torque down to the lowest frequencies, and at 4 ms a sample reaches back 0.1 s, too short to learn a jump that
-lasts."""
+"""Order of the noise in tests of slips and play. Simulation: `scripts/benchmarks/adequate.py`; it whitens a random
+torque down to the lowest frequencies, and at 4 ms a sample its memory is 0.1 s, too short to learn a permanent jump."""
 WHITE_SHARE = 0.003
-"""Share of the residual's variance that is taken for white noise on top of the autoregression. Theory: it bounds the
-depth of a notch, so that no filter becomes a resonator that swallows a misfit."""
+"""Share of the residual's variance that is white noise in addition to the autoregression. Theory: it bounds the depth
+of a notch, so that no filter becomes a resonator that removes a misfit."""
 SEEN_DEVIATIONS = 3.0
-"""Standard deviations by which a cause of plausible size must stand out to be testable in a walk. Theory: power 0.85
-at a two-sided level of 5 %."""
+"""Standard deviations by which a cause of plausible size must be significant to be testable in a walk. Theory: power
+0.85 at a two-sided level of 5 %."""
 POSSIBLE_SIZES = 3.0
-"""Times a plausible size beyond which a size of a cause of a walk is impossible. Theory: three standard deviations
-of its prior."""
+"""Multiple of a plausible size above which the size of a cause of a walk is impossible. Theory: three standard
+deviations of its prior."""
 
 # Times and lateness
 
@@ -113,28 +112,27 @@ HORIZON_S = 0.3
 """Default horizon of predictions, s. Literature: six time constants from stimulus to force of Dombre, Fournier and
 Coiffet's ankle."""
 AVERAGED_S = 0.05
-"""Time over which process noise is averaged before its size is judged, s. Literature: the time constant from
-stimulus to force of Dombre, Fournier and Coiffet's ankle; what is faster moves no limb."""
+"""Time over which process noise is averaged before its size is judged, s. Literature: the time constant from stimulus
+to force of Dombre, Fournier and Coiffet's ankle; faster noise moves no limb."""
 LEAST_SHIFT_S = 0.1
 """Shift of a trial's readings that is no lag of the rig, s. Literature: muscles answer within 0.1 s (Cavanagh and
 Komi, Eur. J. Appl. Physiol. 42, 1979)."""
 LEAST_LATE_ROWS = 0.25
-"""Rows of a log by which an effort is late, at least. Theory: a log of every second sample of a controller writes an
-effort that holds for half a row a quarter of a row late in the mean."""
+"""Least delay of an effort, in rows of a log. Theory: a log of every second sample of a controller records an effort
+that holds for half a row a quarter of a row late in the mean."""
 MOST_LATE_ROWS = 2.0
-"""Rows by which an effort may be late. Theory: it is held for one row when it is written, and for one until the
+"""Largest delay of an effort, in rows. Theory: it is held for one row when it is recorded, and for one until the
 next."""
 MOST_EARLY_ROWS = 0.5
-"""Rows by which an effort may act after it was written. Theory: an effort that is held acts half a row late in the
-mean; what is more is a lag."""
+"""Largest time by which an effort acts after it was recorded, in rows. Theory: a held effort acts half a row late in
+the mean; what is later is a lag."""
 
 # What a controller, or a filter, did to a record
 
 ANSWERED = 1.0 / 6.0
-"""Share of a stimulus, beyond what its past predicts, that readings predict where a controller answers them.
+"""Share of a stimulus, beyond what its past predicts, that readings predict in closed loop.
 Simulation: `tests/identify/test_feedback.py` (written by a script: 0.10 at most) and
 `tests/driven/test_stimulated.py` (a controller: 0.23 at least)."""
 SMOOTH = 0.3
-"""Noise from sample to sample, as a share of the residual, from which on a record is as it was read. Theory:
-averages of ten samples have 1 / sqrt(10) = 0.32 of white noise's; `tests/diagnosis/test_low_passed.py` holds both
-sides."""
+"""Noise from sample to sample, as a share of the residual, above which a record was not low-passed. Theory: averages of
+ten samples have 1 / sqrt(10) = 0.32 of that of white noise; `tests/diagnosis/test_low_passed.py` holds both sides."""

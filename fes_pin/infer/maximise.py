@@ -1,10 +1,10 @@
-"""The maximum of a likelihood with noise: parameters and noise by alternating maximisation, and then together.
+"""Maximisation of a likelihood with noise: parameters and noise in turn (ECM), and then together.
 
-Parameters move by Gauss-Newton steps with the filter's gains as they are (`infer.optimize`), the noise by Fisher
-scoring (`infer.scoring`), until neither gains. The likelihood demands gains that change with the parameters; the two
-are one only where a model is right, and it is the first that lead there from afar. Where their derivatives still
-predict a gain that none of their steps keeps, parameters and noise move together by Fisher scoring. Noise begins small:
-begun large it explains all that the model gets wrong.
+Parameters move by Gauss-Newton steps at constant filter gains (`infer.optimize`), the noise by Fisher scoring
+(`infer.scoring`), until neither gains. The gradient of the likelihood includes the change of the gains with the
+parameters. Both gradients agree only where the model is right, but the one at constant gains converges from afar. Where
+it still predicts a gain that no step reaches, parameters and noise move together by Fisher scoring. Noise starts small:
+started large, it explains every error of the model.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from fes_pin.infer.scatter import at_rest
 from fes_pin.infer.scoring import LITTLE, NoisyProblem, fisher_scoring
 
 ROUNDS = 12
-"""Alternations of parameters and noise, at most; and steps of both together."""
+"""Most alternations of parameters and noise, and most steps of both together."""
 ITERATIONS = 6
-"""Steps of the parameters before the noise moves again."""
+"""Steps of the parameters between those of the noise."""
 
 
 def alternate(
@@ -39,8 +39,8 @@ def alternate(
     Returns
     -------
     Optimum
-        `sse` is twice the negative log-likelihood. `converged` is False where the rounds ran out. The noise is the
-        problem's.
+        `sse` is twice the negative log-likelihood. `converged` is False where the rounds ran out. The noise is kept in
+        the problem.
     """
     fitted = minimise(problem, start, unknowns, iterations)
     for _ in range(rounds):
@@ -57,7 +57,7 @@ def alternate(
 def together(
     problem: NoisyProblem, start: Mapping[str, float], unknowns: Unknowns | None = None, with_noise: bool = True
 ) -> Optimum:
-    """Fit parameters and noise together, from near their end.
+    """Fit parameters and noise together, from near the maximum.
 
     Parameters
     ----------

@@ -18,7 +18,7 @@ ORDERS = (0, 1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48)
 on the ankle, order 12 leaves 2.2 times too much power below 0.5 Hz, order 24 none; a test would take it for a cause."""
 
 SAMPLES_EACH = 10
-"""Samples of the shortest trial for each coefficient, at least (Box and Jenkins)."""
+"""Least number of samples of the shortest trial for each coefficient (Box and Jenkins)."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Noise:
     std
         Standard deviation of the noise of a single sample.
     step_s
-        Time step of the coefficients, s: trials sampled faster are averaged to it. 0 takes samples as they are.
+        Time step of the coefficients, s: trials sampled faster are averaged to it. With 0 samples are not averaged.
     """
 
     innovation_std: float
@@ -49,12 +49,12 @@ class Noise:
         return Noise, (self.innovation_std, self.ar, self.std, self.step_s)
 
     def whiten(self, values: np.ndarray, dt: float) -> np.ndarray:
-        """Innovations in units of their standard deviation.
+        """Return innovations in units of their standard deviation.
 
         Parameters
         ----------
         values
-            Shape (n, ...): residuals, or sensitivities that go with them.
+            Shape (n, ...): residuals, or their sensitivities.
         dt
             Their time step, s.
 
@@ -70,12 +70,12 @@ class Noise:
         return out.reshape(len(out), *values.shape[1:])
 
     def innovations(self, samples: int, dt: float) -> int:
-        """How many innovations that many samples have: see `whiten`."""
+        """Return the number of innovations of `samples` samples: see `whiten`."""
         return max(samples // thinning(dt, self.step_s) - len(self.ar), 0)
 
     @cached_property
     def _stretch(self) -> np.ndarray:
-        """What whitens `BLOCK` samples from these and the p before, shape (BLOCK, p + BLOCK)."""
+        """Matrix that whitens `BLOCK` samples from these and the p before, shape (BLOCK, p + BLOCK)."""
         taps = [*(-a / self.innovation_std for a in reversed(self.ar)), 1.0 / self.innovation_std]
         made = np.array([[0.0] * k + taps + [0.0] * (BLOCK - 1 - k) for k in range(BLOCK)])
         made.setflags(write=False)
@@ -97,13 +97,13 @@ def estimate_noise(
     residuals
         One array of shape (n,) for each trial.
     used
-        Degrees of freedom that a fit has taken out of the residuals already.
+        Degrees of freedom of the fit whose residuals these are.
     std
         Standard deviation of single samples, where the residuals are averages.
     step_s
         Time step of the residuals, if they are averages.
     longest, least
-        Highest and lowest order that is tried; the highest that the trials are long enough for, if that is lower.
+        Highest and lowest order that is tried; the highest is limited by the length of the trials.
 
     Raises
     ------
@@ -114,7 +114,7 @@ def estimate_noise(
     gram, count = _gram(residuals, orders[-1])
     if not np.isfinite(gram).all():
         raise FloatingPointError("residuals whose squares are not finite")
-    if not gram[0, 0] > 0.0:  # a channel that is met exactly
+    if not gram[0, 0] > 0.0:  # a channel that is fitted exactly
         orders = [0]
     fits = {p: _autoregression(gram, p) for p in orders}
     best = min(orders, key=lambda p: count * np.log(fits[p][1] / count) + PARAMETER_PENALTY * p)
@@ -126,22 +126,22 @@ def estimate_noise(
 
 
 def _orders(shortest: int, longest: int, least: int) -> list[int]:
-    """Orders that are tried for trials of at least so many samples."""
+    """Return the orders that are tried for trials of at least `shortest` samples."""
     possible = [p for p in ORDERS if p <= min(longest, shortest // SAMPLES_EACH)]
     return [p for p in possible if p >= least] or possible[-1:]
 
 
 def _gram(residuals: Sequence[np.ndarray], order: int) -> tuple[np.ndarray, int]:
-    """Inner products of the residual and its past, shape (order + 1, order + 1), and how many samples they hold.
+    """Return inner products of the residual and its past, shape (order + 1, order + 1), and the samples they hold.
 
-    Of trials too short for the order alone, those of the residual with itself.
+    If all trials are too short for the order, they are those of the residual with itself.
     """
     lagged = [_lags(r, order) for r in residuals if len(r) > 2 * order + 2] or [_lags(r, 0) for r in residuals]
     return np.asarray(np.sum([m.T @ m for m in lagged], axis=0)), max(sum(len(m) for m in lagged), 1)
 
 
 def _autoregression(gram: np.ndarray, p: int) -> tuple[np.ndarray, float]:
-    """Coefficients of an order, and the sum of squares that they leave; with a little white noise: `WHITE_SHARE`."""
+    """Return coefficients of an order and their residual sum of squares, with some white noise: `WHITE_SHARE`."""
     around = gram[1 : p + 1, 1 : p + 1] + WHITE_SHARE * gram[0, 0] * np.eye(p)
     ar = scipy.linalg.solve(around, gram[1 : p + 1, 0], assume_a="pos") if p else np.zeros(0)
     power = (1.0 + WHITE_SHARE) * gram[0, 0]
@@ -149,31 +149,31 @@ def _autoregression(gram: np.ndarray, p: int) -> tuple[np.ndarray, float]:
 
 
 BLOCK = 16
-"""Rows that are whitened by one product: more multiply by more zeros, fewer are more products."""
+"""Rows that are whitened by one product: more rows multiply more zeros, fewer rows need more products."""
 FASTEST_S = 4e-3
-"""Shortest time step that noise is modelled at, s: 250 Hz keeps the mains, and 48 coefficients reach back 0.2 s."""
+"""Shortest time step at which noise is modelled, s: 250 Hz resolves the mains, and 48 coefficients span 0.2 s."""
 
 
 def thinning(dt: float, step_s: float) -> int:
-    """How many samples are averaged into one."""
+    """Return the number of samples that are averaged into one."""
     return max(1, round(step_s / dt)) if step_s > 0 else 1
 
 
 def noise_step(steps: Sequence[float]) -> float:
-    """Time step that the noise of trials with these sample steps is modelled at, s."""
+    """Return the time step at which the noise of trials with these sample steps is modelled, s."""
     slowest = max(steps)
     return max(1, math.floor(FASTEST_S / slowest + 1e-6)) * slowest
 
 
 def first_order_low_pass(values: np.ndarray, pole: float) -> np.ndarray:
-    """First-order low pass y_t = pole y_(t-1) + (1 - pole) x_t from rest, along an axis of shape (n,)."""
+    """Return the first-order low pass y_t = pole y_(t-1) + (1 - pole) x_t from rest, along an axis of shape (n,)."""
     bands = np.ones((2, len(values)))
     bands[1] = -pole
     return np.asarray(scipy.linalg.solve_banded((1, 0), bands, (1.0 - pole) * values))
 
 
 def thin(values: np.ndarray, count: int) -> np.ndarray:
-    """Means of `count` samples in a row along the first axis; samples at the end that fill no mean are dropped."""
+    """Return means of `count` successive samples along the first axis; an incomplete mean at the end is dropped."""
     if count == 1:
         return values
     end = len(values) // count * count
@@ -185,13 +185,13 @@ def thin(values: np.ndarray, count: int) -> np.ndarray:
 
 
 def _lags(residual: np.ndarray, order: int) -> np.ndarray:
-    """Shape (n - order, order + 1): the residual and its past."""
+    """Return the residual and its past, shape (n - order, order + 1)."""
     n = len(residual)
     return np.stack([residual[order - k : n - k] for k in range(order + 1)], axis=1)
 
 
 def _correlated(values: np.ndarray, stretch: np.ndarray) -> np.ndarray:
-    """A filter run over the columns of `values`, shape (n, columns), by one product for each stretch of rows."""
+    """Return the columns of `values`, shape (n, columns), filtered by one product for each stretch of rows."""
     block, reach = stretch.shape
     p, columns, (row, column) = reach - block, values.shape[1], values.strides
     count = max(len(values) - p, 0)
@@ -205,9 +205,9 @@ def _correlated(values: np.ndarray, stretch: np.ndarray) -> np.ndarray:
 
 
 def likeliest_autoregression(pieces: Sequence[np.ndarray], orders: Sequence[int]) -> tuple[float, ...]:
-    """The autoregression of several pieces, each of shape (n,), by Burg's method: of the order with the lowest price.
+    """Return the autoregression of several pieces, each of shape (n,), by Burg's method and of lowest criterion.
 
-    Such an autoregression is stationary, whatever the pieces.
+    Such an autoregression is always stationary.
 
     Source: Burg, Maximum entropy spectral analysis, PhD thesis, Stanford 1975; Brockwell and Davis, Time Series: Theory
     and Methods, 2nd ed., section 8.2.
@@ -222,7 +222,7 @@ def likeliest_autoregression(pieces: Sequence[np.ndarray], orders: Sequence[int]
 
 
 def _burg(pieces: Sequence[np.ndarray], most: int) -> Iterator[tuple[tuple[float, ...], float]]:
-    """Autoregressions of every order up to the highest, and the power of the residual of each.
+    """Yield autoregressions of every order up to the highest, and the power of the residual of each.
 
     With f the residual of an order forwards and b backwards, the next has the last coefficient
     2 sum f_t b_(t-1) / sum (f_t^2 + b_(t-1)^2), over all trials.
@@ -248,5 +248,5 @@ NoiseModel = Mapping[str, Noise]
 
 
 def as_white(noise: NoiseModel) -> dict[str, Noise]:
-    """The same noise, each sample as uncertain as before, taken for white."""
+    """Return white noise with the same variance of a sample."""
     return {n: Noise(max(m.std, 1e-12), (), m.std, m.step_s) for n, m in noise.items()}

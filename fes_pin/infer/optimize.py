@@ -19,23 +19,23 @@ from fes_pin.infer.problem import (
 )
 
 TOLERANCE = 0.01
-"""A fit ends when the predicted gain of the next step is less than this, in twice the log-likelihood: below what any
-test sees."""
+"""A fit ends when the predicted gain of the next step is less than this, in twice the log-likelihood: no test depends
+on it."""
 WORTH = 1.0
-"""Change of twice the log-likelihood that is worth more work, as where it is predicted and no step gains it: a standard
-deviation of one parameter."""
+"""Change of twice the log-likelihood that is worth further steps, as where it is predicted and no step reaches it: one
+standard deviation of one parameter."""
 TRIES = 12
-"""Steps that are tried, each ten times as damped as the last, before a point counts as the lowest there is."""
+"""Steps that are tried, each ten times as damped as the last, before a point counts as the minimum."""
 SHORTER = 0.5
-"""Share of the predicted gain of a failed step that a shorter one may predict where the end is not final: in directions
-that the data tell well, ten times the damping changes nothing at first."""
+"""Largest share of the predicted gain of a failed step that a shorter step may predict, where the end is not final: in
+well identified directions ten times the damping changes little at first."""
 LARGEST_DAMPING = 1e12
-"""Beyond it a step is none."""
+"""Largest damping: with more a step is zero."""
 
 
 @dataclass(frozen=True)
 class _Proposal:
-    """A step that a damping leads to, and its predicted gain in twice the log-likelihood."""
+    """The step at a damping, and its predicted gain in twice the log-likelihood."""
 
     damping: float
     x: np.ndarray
@@ -53,11 +53,11 @@ class Descent:
     Parameters
     ----------
     problem
-        What is fitted.
+        The problem that is fitted.
     start
         Value of every parameter.
     unknowns
-        Of each trial; by default the problem's own first guess.
+        Unknowns of each trial; by default the start values of the problem.
     """
 
     def __init__(self, problem: Problem, start: Mapping[str, float], unknowns: Unknowns | None) -> None:
@@ -81,18 +81,18 @@ class Descent:
         return {**self.fixed, **dict(zip(self.names, (float(v) for v in x), strict=True))}
 
     def free_now(self, gradient: np.ndarray) -> np.ndarray:
-        """Parameters that are not held by a bound."""
+        """Return which parameters are not held by a bound."""
         held = ((self.x <= self.lower) & (gradient < 0)) | ((self.x >= self.upper) & (gradient > 0))
         return ~held
 
     def run(self, max_iterations: int) -> bool:
-        """Go down so often at most; True if it ended at a minimum."""
+        """Take at most `max_iterations` steps; return whether the descent ended at a minimum."""
         return any(self.step() for _ in range(max_iterations)) and bool(np.isfinite(self.sse))
 
     def step(self) -> bool:
-        """Go down once; True when there is nothing left to gain.
+        """Take one step; return True at a minimum.
 
-        A step that gains nothing is tried again shorter, and what is shorter is first asked for its cost alone.
+        A step that gains nothing is tried again shorter; for shorter steps the cost alone is evaluated first.
         """
         if not np.isfinite(self.sse):
             return True
@@ -122,7 +122,7 @@ class Descent:
         return _Proposal(damping, self._end(move), self._moved(system.local_steps(move)), float(predicted))
 
     def _shorter(self, failed: _Proposal, count: int) -> list[_Proposal]:
-        """Proposals of growing damping, so many at most, to the first that is not worth a try."""
+        """Return at most `count` proposals of growing damping, up to the first that is not worth a try."""
         out: list[_Proposal] = []
         last = failed
         while len(out) < count and (not out or self._is_worth(last)):
@@ -137,7 +137,7 @@ class Descent:
         return not 0.0 <= shorter.predicted < (TOLERANCE if self.problem.is_final else WORTH)
 
     def _takes(self, one: _Proposal) -> bool:
-        """Go where a proposal leads, if that is down."""
+        """Take the step of a proposal if it lowers the cost; return whether it does."""
         parts = self._linearize(one.x, one.unknowns)
         sse = whitened_sse(parts)
         if not (one.predicted > 0.0 and np.isfinite(sse) and sse <= self.sse):
@@ -148,7 +148,7 @@ class Descent:
         return True
 
     def _bounded_move(self, system: NormalEquations, damping: float) -> np.ndarray:
-        """Marquardt's step inside the bounds: what would leave them first stops there."""
+        """Return Marquardt's step within the bounds: a parameter that would leave them stops there."""
         free, move = self.free_now(system.gradient), np.zeros(len(self.x))
         while free.any():
             gradient = system.gradient - system.hessian[:, ~free] @ move[~free]
@@ -163,7 +163,7 @@ class Descent:
         return np.asarray(np.clip(self.x + move, self.lower, self.upper) - self.x)
 
     def _end(self, move: np.ndarray) -> np.ndarray:
-        """Where a step leads that is straight in an amplitude k and in its product k r with a shape."""
+        """Return the end of a step that is straight in an amplitude k and in its product k r with a shape."""
         out = self.x + move
         for shape, k in self.products:
             if out[k] != 0.0:
@@ -182,12 +182,12 @@ class Descent:
 
 
 def _relief(kept: float) -> float:
-    """Factor on the damping after a step that gained this share of its prediction (Nielsen, IMM-REP-1999-05)."""
+    """Return the factor on the damping after a step that kept a share of its gain (Nielsen, IMM-REP-1999-05)."""
     return float(np.clip(1.0 - (2.0 * kept - 1.0) ** 3, 0.2, 2.0))
 
 
 def _damped(hessian: np.ndarray, gradient: np.ndarray, damping: float) -> np.ndarray:
-    """Marquardt's step in parameters scaled by the information that the data have of them."""
+    """Return Marquardt's step in parameters scaled by their information."""
     if not len(gradient):
         return gradient
     scale = np.sqrt(np.maximum(np.diag(hessian), 1e-300))

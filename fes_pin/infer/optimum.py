@@ -1,4 +1,4 @@
-"""Where a fit has ended: values with their covariance, and the derivatives there that everything else is made of."""
+"""The optimum of a fit: values with their covariance, and the derivatives from which all else follows."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fes_pin.infer.optimize import Descent
 from fes_pin.infer.problem import Linearized, Problem, Unknowns, normal_equations
 
 MAX_ITERATIONS = 60
-"""Steps of a fit, at most; what has not converged then says so."""
+"""Most steps of a fit; one that has not converged by then says so."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -26,24 +26,24 @@ class Optimum:
     free
         Names of the fitted parameters.
     parameters
-        Value of every parameter by name, of those that were not fitted too.
+        Value of every parameter by name, fitted or not.
     covariance
-        Shape (free, free); infinite where the data identify nothing, 0 of what is at its bound.
+        Shape (free, free); infinite for parameters that are not identified, 0 for those at a bound.
     at_bound
-        Names of the fitted parameters that ended at a bound, and would go beyond it.
+        Names of the fitted parameters that ended at a bound and would go beyond it.
     sse
-        Sum of squared whitened residuals and of their log-determinants: minus twice the log-likelihood, but for a
+        Sum of squared whitened residuals and of their log-determinants: minus twice the log-likelihood up to a
         constant.
     converged
         False where the steps ran out.
     gradient_norm
         Largest predicted gain of a step of a single free parameter, in twice the log-likelihood: 0 at an optimum.
     unknowns
-        Of each trial.
+        Unknowns of each trial.
     parts
         Whitened residuals and sensitivities at the optimum, by trial.
     together
-        True where the last steps moved parameters and noise together: derivatives for constant noise lead no further.
+        True where the last steps moved parameters and noise together: steps at constant noise gain nothing there.
     """
 
     free: tuple[str, ...]
@@ -59,7 +59,7 @@ class Optimum:
 
     @property
     def values(self) -> dict[str, float]:
-        """Every parameter by name."""
+        """Values of every parameter by name."""
         return dict(self.parameters)
 
     @property
@@ -78,25 +78,25 @@ class Optimum:
         return self.sse + PARAMETER_PENALTY * self.degrees
 
     def place(self, name: str) -> int:
-        """Where a fitted parameter stands in `free` and `covariance`."""
+        """Return the place of a fitted parameter in `free` and `covariance`."""
         return self.free.index(name)
 
     def std(self, name: str) -> float:
-        """Standard deviation of a fitted parameter: infinite where the data say nothing of it, NaN at its bound.
+        """Return the standard deviation of a fitted parameter: infinite if it is not identified, NaN at its bound.
 
-        An estimate at its bound does not scatter about it; `reach` says how far the parameter may be from there.
+        An estimate at its bound does not scatter about it; `reach` gives the largest distance of the parameter from it.
         """
         variance = self.covariance[(k := self.place(name)), k]
         return math.nan if name in self.at_bound else float(np.sqrt(variance))
 
     def reach(self, name: str) -> float:
-        """Half of a parameter's 95 % interval, all of it at a bound, by the parabola that the fit ended on."""
+        """Return half of a parameter's 95 % interval by the quadratic approximation; the whole interval at a bound."""
         if name not in self.at_bound:
             return CONFIDENCE_95 * self.std(name)
         return reach_at_bound(self.parts, self.place(name), [n in self.at_bound for n in self.free])
 
     def within(self, name: str, low: float, high: float) -> tuple[float, float]:
-        """A parameter's 95 % interval by the parabola that the fit ended on, cut at these bounds."""
+        """Return a parameter's 95 % interval by the quadratic approximation, cut at these bounds."""
         value, reach = self.parameters[name], self.reach(name)
         return max(value - reach, low), min(value + reach, high)
 
@@ -112,14 +112,14 @@ def minimise(
     Parameters
     ----------
     unknowns
-        Of each trial; by default the problem's own first guess.
+        Unknowns of each trial; by default the start values of the problem.
     max_iterations
-        Steps, at most.
+        Most steps.
 
     Returns
     -------
     Optimum
-        Also if it did not converge: then `converged` is False.
+        The end of the descent; if it has not converged, `converged` is False.
     """
     search = Descent(problem, start, unknowns)
     done = search.run(max_iterations)
@@ -141,19 +141,21 @@ def minimise(
 
 
 def reach_at_bound(parts: Sequence[Linearized], k: int, held: Sequence[bool]) -> float:
-    """How far a parameter at its bound may go by the parabola that the fit ended on; infinite if nothing is felt of it.
+    """Return the end of a one-sided interval by the quadratic approximation, as a distance from the bound.
 
-    With g and h the slope and curvature of half the sum of squares, what else moves gone with it: the s with
+    It is infinite where the parameter is not identified.
+
+    With g and h the slope and curvature of half the sum of squares, all other parameters refitted, it is the s with
     2 |g| s + h s^2 = 2.71.
 
     Parameters
     ----------
     parts
-        Of the fit, linearized at its end.
+        Trials of the fit, linearized at its optimum.
     k
         Place of the parameter.
     held
-        Which parameters stand at a bound.
+        Which parameters are at a bound.
     """
     system = normal_equations(parts)
     free = np.array([not at or j == k for j, at in enumerate(held)])

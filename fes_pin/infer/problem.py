@@ -10,11 +10,11 @@ from typing import Protocol
 import numpy as np
 
 Unknowns = list[dict[str, float]]
-"""Of each trial, the values by name of what is unknown about it alone."""
+"""For each trial, the values by name of its own unknowns."""
 SINGULAR = 1e-12
-"""Share of an unknown's own information added to it: two that the trial cannot tell apart do not stop a fit."""
+"""Share of an unknown's own information that is added to it, so that two confounded unknowns do not stop a fit."""
 STEEPEST = 1e120
-"""Sensitivities beyond this, in deviations of the noise per unit, count as infinite: their squares would be."""
+"""Sensitivities above this, in deviations of the noise per unit, count as infinite, as their squares overflow."""
 
 
 @dataclass(frozen=True)
@@ -26,11 +26,11 @@ class Linearized:
     residual
         Shape (m,).
     jacobian
-        Shape (m, parameters): derivative of the prediction, so the residual falls along it.
+        Shape (m, parameters): derivative of the prediction, which is minus that of the residual.
     local
         Shape (m, unknowns of the trial).
     log_determinant
-        Sum of the logarithms of the variances that the residuals were whitened with; 0 where these are given.
+        Sum of the logarithms of the variances that whiten the residuals; 0 where these are given.
     """
 
     residual: np.ndarray
@@ -40,16 +40,16 @@ class Linearized:
 
 
 class Problem(Protocol):
-    """What is fitted: a model of trials whose parameters move within limits.
+    """A problem of least squares: a model of trials with free parameters within limits.
 
     Attributes
     ----------
     free
-        Names of the parameters that move.
+        Names of the free parameters.
     limits
         Lower and upper bound of each, by name.
     unknown_names
-        Unknowns that each trial has of its own; they are eliminated.
+        Names of each trial's own unknowns, which are eliminated.
     """
 
     free: tuple[str, ...]
@@ -58,32 +58,32 @@ class Problem(Protocol):
 
     @property
     def products(self) -> Sequence[tuple[int, int]]:
-        """Places in `free` of a parameter, and of another that it is multiplied with where it enters the model."""
+        """Places in `free` of pairs of parameters that enter the model as a product."""
         return ()
 
     @property
     def batch(self) -> int:
-        """How many points `costs` evaluates in one run."""
+        """Number of points that `costs` evaluates in one run."""
         return 1
 
     @property
     def is_final(self) -> bool:
-        """False where the derivatives are approximate, and others lead further from the end of a descent."""
+        """False where derivatives are approximate: exact ones then lower the cost further at the end of a descent."""
         return True
 
     def start_unknowns(self) -> Unknowns:
-        """The unknowns of each trial that a fit begins with."""
+        """Return start values of the unknowns of each trial."""
 
     def linearize(self, values: Mapping[str, float], unknowns: Unknowns) -> list[Linearized]:
-        """Whitened residuals and sensitivities of every trial at values of all parameters."""
+        """Return whitened residuals and sensitivities of every trial at values of all parameters."""
 
     def costs(self, points: Sequence[tuple[Mapping[str, float], Unknowns]]) -> list[float]:
-        """A lower bound of the cost at several points: the cost itself where it needs no sensitivities."""
+        """Return a lower bound of the cost at several points: the cost itself where it needs no sensitivities."""
         return [0.0] * len(points)
 
 
 def completed(start: Unknowns, known: Unknowns | None) -> Unknowns:
-    """Unknowns that a fit begins with, at the values known of them from another model of the same trials."""
+    """Return start values of unknowns, with the known values from another model of the same trials."""
     if known is None:
         return start
     both = zip(start, known, strict=True)
@@ -92,14 +92,14 @@ def completed(start: Unknowns, known: Unknowns | None) -> Unknowns:
 
 @dataclass(frozen=True)
 class NormalEquations:
-    """Gauss-Newton system with the unknowns of each trial eliminated.
+    """The Gauss-Newton system with the unknowns of each trial eliminated.
 
     Attributes
     ----------
     sse
         Sum of squared whitened residuals.
     gradient, hessian
-        Of half of it, shape (parameters,) and (parameters, parameters), after elimination.
+        Gradient and Hessian of half of it, shape (parameters,) and (parameters, parameters), after elimination.
     local_gain
         Predicted fall of the cost by steps of the trials' unknowns alone.
     """
@@ -111,15 +111,15 @@ class NormalEquations:
     eliminated: tuple[tuple[np.ndarray, np.ndarray], ...]
 
     def local_steps(self, step: np.ndarray) -> list[np.ndarray]:
-        """Steps of each trial's unknowns that go with a step of the parameters."""
+        """Return the steps of each trial's unknowns for a step of the parameters."""
         return [constant - slope @ step for constant, slope in self.eliminated]
 
 
 @np.errstate(all="ignore")
 def normal_equations(parts: Sequence[Linearized], damping: float = 0.0) -> NormalEquations:
-    """Sum the trials; each trial's unknowns are eliminated by its Schur complement, damped as Marquardt does.
+    """Return the sum over trials, each trial's unknowns eliminated by its Schur complement with Marquardt's damping.
 
-    Of a model that runs away the sums are no numbers; `whitened_sse` is infinite there.
+    For a model that diverges the sums are not finite; `whitened_sse` is infinite there.
     """
     size = parts[0].jacobian.shape[1]
     sse, gradient, hessian, local_gain = 0.0, np.zeros(size), np.zeros((size, size)), 0.0
@@ -143,14 +143,14 @@ def normal_equations(parts: Sequence[Linearized], damping: float = 0.0) -> Norma
 
 
 def _solved(own: np.ndarray, right: np.ndarray, damping: float) -> np.ndarray:
-    """Solution of a trial's own system, damped and scaled; an unknown that is not felt stays where it is."""
+    """Return the solution of a trial's own system, damped and scaled; an unidentified unknown does not move."""
     scale = 1.0 / np.sqrt(np.maximum(np.diag(own), 1e-150))
     scaled = own * np.outer(scale, scale) + (damping + SINGULAR) * np.eye(len(own))
     return np.asarray(scale[:, None] * np.linalg.solve(scaled, scale[:, None] * right))
 
 
 def whitened_sse(parts: Sequence[Linearized]) -> float:
-    """Sum of squared whitened residuals and log-determinants; infinite where a prediction or its slopes run away."""
+    """Return the sum of squared whitened residuals and log-determinants; infinite where a prediction diverges."""
     with np.errstate(over="ignore", invalid="ignore"):
         total = float(sum(p.residual @ p.residual + p.log_determinant for p in parts))
     tame = all(float(np.abs(x).max(initial=0.0)) < STEEPEST for p in parts for x in (p.jacobian, p.local))

@@ -1,4 +1,4 @@
-"""Intervals by profile likelihood: how far one parameter may go, all others fitted again, before the fit is too bad.
+"""Confidence intervals by profile likelihood: the range of one parameter, all others fitted again.
 
 An interval holds the values x of a parameter with
 
@@ -6,7 +6,7 @@ An interval holds the values x of a parameter with
 
 where c is the 95 % quantile of a chi-square with one degree of freedom, 3.84. Unlike value +- 1.96 std it need not be
 symmetric, and it is right where the sum of squares is no parabola. At a bound the interval is one-sided, and c is the
-square of the normal's 95 % quantile, 2.71: a value beyond its end is as unlikely as 5 %.
+square of the normal's 95 % quantile, 2.71.
 
 Source: Venzon and Moolgavkar, A method for computing profile-likelihood-based confidence intervals, Applied Statistics
 37 (1988); at a bound, Self and Liang, Asymptotic properties of maximum likelihood estimators and likelihood ratio tests
@@ -26,26 +26,26 @@ from fes_pin.infer.problem import Problem, Unknowns
 RISE = CONFIDENCE_95**2
 """95 % quantile of a chi-square with one degree of freedom."""
 STEPS = 20
-"""Fits of the other parameters, at most, for each value of the one; they begin near their end."""
+"""Most steps of the other parameters for each value of the one; they start near their optimum."""
 DOUBLINGS = 30
-"""An interval whose end is not found within so many doublings of the first step has none."""
+"""Most doublings of the first step; an interval without an end within these is unbounded."""
 EXACT = 1e-4
-"""Ends are found to this share of the interval's half."""
+"""Accuracy of the ends, as a share of half the interval."""
 
 
 def profile_interval(
     problem: Problem, name: str, values: Mapping[str, float], unknowns: Unknowns, step: float, at_bound: bool
 ) -> tuple[float, float]:
-    """The 95 % interval of one parameter by profile likelihood; a bound where there is no end before it.
+    """Return the 95 % interval of one parameter by profile likelihood; it ends at a bound where nothing ends it before.
 
     Parameters
     ----------
     problem
-        What was fitted.
+        The problem that was fitted.
     values, unknowns
-        Where the fit ended.
+        The optimum of the fit.
     step
-        About how far an end is away; only the time depends on it.
+        Approximate distance of an end; only computing time depends on it.
     """
     rise = SEPARABLE if at_bound else RISE
     here, limits = values[name], problem.limits
@@ -63,7 +63,7 @@ def profile_interval(
 
 
 def _end(too_far: Callable[[float], float], here: float, bound: float, step: float) -> float:
-    """Where a cost crosses zero between a value and a bound; the bound if it does not."""
+    """Return where a function crosses zero between a value and a bound; the bound if it does not."""
     inner = here
     for _ in range(DOUBLINGS):
         outer = max(here + step, bound) if step < 0.0 else min(here + step, bound)

@@ -1,4 +1,4 @@
-"""Projection of columns off a fit, and the inner products that score tests are made of.
+"""Projection of fitted parameters off columns, and the inner products of score tests.
 
 C. R. Rao, Math. Proc. Camb. Phil. Soc. 44:50 (1948).
 """
@@ -15,26 +15,26 @@ from fes_pin.infer.problem import Linearized
 from fes_pin.workers import in_parallel
 
 LARGEST = float(np.finfo(float).max) ** 0.25
-"""Largest entry of a column: products of inner products stay floating-point numbers. What runs away says nothing."""
+"""Largest entry of a column, so that products of inner products stay finite; a column that diverges has no score."""
 
 DEPENDENT = 1e-10
-"""Eigenvalue of the Gram matrix of scaled columns, relative to the largest, below which one depends on the others."""
+"""Relative eigenvalue of the Gram matrix of scaled columns below which these are linearly dependent."""
 
 
 @dataclass(frozen=True)
 class Products:
-    """Inner products of columns without the part that a fit takes up.
+    """Inner products of columns with the fitted parameters projected off.
 
     Attributes
     ----------
     gram
         Shape (k, k).
     along
-        Shape (k,): with the residual.
+        Shape (k,): inner products with the residual.
     before
-        Shape (k,): squared norms of the whole columns.
+        Shape (k,): squared norms of the columns before projection.
     by_trial
-        Columns of each trial without what its own unknowns take up.
+        Columns of each trial with its own unknowns projected off.
     """
 
     gram: np.ndarray
@@ -44,21 +44,21 @@ class Products:
 
 
 class Projection:
-    """Columns without the part that a fit's parameters and its trials' unknowns take up.
+    """Projection of a fit's parameters and its trials' unknowns off columns.
 
     Parameters
     ----------
     parts
-        Of the fit.
+        The linearized trials of the fit.
 
     Attributes
     ----------
     residual
-        What the fit leaves, all trials end to end, shape (m,).
+        Residual of the fit, all trials end to end, shape (m,).
     trials
         Rows of each trial.
     shared
-        Orthonormal basis of what the parameters take up, shape (m, rank).
+        Orthonormal basis of the sensitivities to the parameters, shape (m, rank).
     """
 
     def __init__(self, parts: Sequence[Linearized]) -> None:
@@ -75,12 +75,12 @@ class Projection:
         return out
 
     def __call__(self, columns: np.ndarray) -> np.ndarray:
-        """Columns of shape (m, k) without the part that the fit could take up."""
+        """Return columns of shape (m, k) with the fitted parameters projected off."""
         partly = self._without_locals(columns)
         return np.asarray(partly - self.shared @ (self.shared.T @ partly))
 
     def taken(self, rows: slice) -> list[np.ndarray]:
-        """Orthonormal vectors, cut to rows of one trial, that are taken from columns which are zero elsewhere."""
+        """Return the orthonormal vectors, cut to rows of one trial, that are projected off columns of that trial."""
         own = [
             basis[rows.start - where.start : rows.stop - where.start]
             for basis, where in zip(self._own, self.trials, strict=True)
@@ -89,7 +89,7 @@ class Projection:
         return [*own, self.shared[rows]]
 
     def products(self, columns: Sequence[np.ndarray]) -> Products:
-        """Inner products of columns, each of shape (m, any), trial by trial."""
+        """Return inner products of columns, each of shape (m, any), computed trial by trial."""
         begun = in_parallel(lambda k: self._partly(columns, k), range(len(self.trials)))
         before, shared = (np.sum([b[j] for b in begun], axis=0) for j in (1, 2))
         left = in_parallel(lambda k: self._left(begun[k][0], shared, k), range(len(self.trials)))
@@ -97,8 +97,8 @@ class Projection:
         return Products(gram, along, before, [b[0] for b in begun])
 
     def _partly(self, columns: Sequence[np.ndarray], k: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """One trial's part of all columns without what its own unknowns take up; what it was, squared; its share in
-        the inner products with the basis of what all trials share."""
+        """Return one trial's part of all columns with its own unknowns projected off, its squared norm before, and its
+        part of the inner products with the basis that all trials share."""
         rows, own = self.trials[k], self._own[k]
         joined = np.concatenate([c[rows] for c in columns], axis=1)
         joined[~(np.abs(joined) < LARGEST)] = 0.0
@@ -107,18 +107,18 @@ class Projection:
         return joined, before, self.shared[rows].T @ joined
 
     def _left(self, partly: np.ndarray, shared: np.ndarray, k: int) -> tuple[np.ndarray, np.ndarray]:
-        """One trial's part of the Gram matrix of projected columns, and of their products with the residual."""
+        """Return one trial's part of the Gram matrix of projected columns, and of their products with the residual."""
         left = partly - self.shared[self.trials[k]] @ shared
         return left.T @ left, left.T @ self.residual[self.trials[k]]
 
 
 def local_basis(part: Linearized) -> np.ndarray:
-    """Orthonormal basis of what a trial's own unknowns take up, shape (m, unknowns that are felt)."""
+    """Return an orthonormal basis of the sensitivities to a trial's own unknowns, shape (m, rank)."""
     return np.linalg.qr(_scaled(part.local[:, part.local.any(axis=0)]))[0]
 
 
 def without_locals(part: Linearized, columns: np.ndarray) -> np.ndarray:
-    """Columns of a trial, shape (m, ...), without what its own unknowns take up."""
+    """Return columns of a trial, shape (m, ...), with its own unknowns projected off."""
     own = local_basis(part)
     return np.asarray(columns - own @ (own.T @ columns))
 
@@ -129,7 +129,7 @@ def _scaled(columns: np.ndarray) -> np.ndarray:
 
 
 def _basis(columns: np.ndarray) -> np.ndarray:
-    """Orthonormal basis of the span of columns, shape (m, rank)."""
+    """Return an orthonormal basis of the span of columns, shape (m, rank)."""
     if not columns.shape[1]:
         return columns
     scaled = _scaled(columns)

@@ -1,4 +1,4 @@
-"""What an inference found, whatever was measured: estimates, gains, causes and changes, lack of fit."""
+"""Results of an inference, whatever was measured: estimates, gains, causes and changes, lack of fit."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ CELLS = ("value", "std", "unit", "low", "high", "at_bound")
 DIGITS = 6
 """Significant digits printed: the last that does not depend on how sums are ordered."""
 LEAST_P = 1e-300
-"""Replaces a p-value that is too small for a number: it is at most this."""
+"""Replaces a p-value that underflows: it is at most this."""
 
 
 def shown(value: float | None, digits: int = DIGITS) -> float | None:
-    """A number as printed, with so many significant digits; None for what is not finite."""
+    """Return a number rounded to significant digits; None if it is not finite."""
     return None if value is None or not math.isfinite(value) else float(f"{value:.{digits}g}")
 
 
 def p_shown(value: float) -> float | None:
-    """A p-value as printed: none is zero."""
+    """Return a p-value rounded for print; none is zero."""
     return shown(max(value, LEAST_P)) if math.isfinite(value) else None
 
 
 class EstimatedFit(Protocol):
-    """What an estimate needs of a fit."""
+    """The part of a fit that an estimate needs."""
 
     @property
     def values(self) -> Mapping[str, float]:
-        """Every parameter by name."""
+        """Values of every parameter by name."""
 
     @property
     def free(self) -> tuple[str, ...]:
@@ -44,10 +44,10 @@ class EstimatedFit(Protocol):
         """Names of those that ended at a bound."""
 
     def std(self, name: str) -> float:
-        """Standard deviation of a fitted parameter."""
+        """Return the standard deviation of a fitted parameter."""
 
     def interval(self, name: str) -> tuple[float, float]:
-        """95 % interval of a fitted parameter."""
+        """Return the 95 % interval of a fitted parameter."""
 
 
 @dataclass(frozen=True)
@@ -57,12 +57,12 @@ class ParameterEstimate:
     Attributes
     ----------
     std
-        Infinite of a value that is not identified, 0 of one that is held; NaN of one at its bound.
+        Standard deviation: infinite if the value is not identified, 0 if it is held, NaN at a bound.
     at_bound
-        True of a value at a bound of what the parameter can be. Then its 95 % interval is one-sided: from the bound to
-        the other end.
+        Whether the value is at a bound of the parameter. Its 95 % interval is then one-sided: from the bound to the
+        other end.
     ends
-        Of its 95 % interval, where that is not 1.96 deviations to either side.
+        Ends of its 95 % interval, where these are not 1.96 standard deviations to either side.
     """
 
     value: float
@@ -73,7 +73,7 @@ class ParameterEstimate:
 
     @classmethod
     def of(cls, fitted: EstimatedFit, name: str, unit: str, wider: float = 1.0) -> ParameterEstimate:
-        """A parameter of a fit by name, with its deviation so many times."""
+        """Return the estimate of a parameter of a fit, with its standard deviation times `wider`."""
         value = fitted.values[name]
         if name not in fitted.free:
             return cls(value, 0.0, unit)
@@ -89,7 +89,7 @@ class ParameterEstimate:
         return self.ends or (self.value - half, self.value + half)
 
     def one_sided(self) -> str:
-        """The end of the interval of a value at its bound that is not the bound, in words."""
+        """The end of a one-sided interval that is not the bound, in words."""
         low, high = self.interval
         word, end = ("most", high) if high - self.value >= self.value - low else ("least", low)
         return f"at {word} {end:.3g}" if math.isfinite(end) else "not identified"
@@ -100,19 +100,19 @@ class ParameterEstimate:
         return f"{self.value:.4g} {self.unit} (at its bound, {self.one_sided()})".replace("  ", " ")
 
     def cells(self) -> tuple[Any, ...]:
-        """What tables hold of it, by `CELLS`."""
+        """Return its cells of a table, in the order of `CELLS`."""
         return self.value, self.std, self.unit, *self.interval, self.at_bound
 
     def record(self) -> dict[str, Any]:
-        """As JSON files have it: `at_bound` stands only where it is true, with the interval."""
+        """Return the estimate for JSON; `at_bound` and the interval are in it only at a bound."""
         low, high = (shown(end) for end in self.interval)
         own = {"at_bound": True, "low": low, "high": high} if self.at_bound else {}
         return {"value": shown(self.value), "std": shown(self.std), **own}
 
 
 HELD_OUT, CROSS_VALIDATED, FITTED, STOPPED = "held_out", "cross_validated", "fitted", "stopped"
-"""What data a gain is found on: a part that was held out from the start, each part by fits without it, the data that
-were fitted, or those because a limit ended the search before any part could be held out."""
+"""Data on which a gain is found: a part that was held out from the start, each part by fits without it, the fitted
+data, or the fitted data because a limit ended the search before any part was held out."""
 ON = {
     HELD_OUT: "held out",
     CROSS_VALIDATED: "cross-validated",
@@ -121,20 +121,20 @@ ON = {
 }
 """The same in words."""
 ERROR, LIKELIHOOD = "squared error above the noise", "twice the log-likelihood"
-"""Measures of the gain of a cause: what the nominal model errs by, less what noise alone makes; or by how much twice
-the log-likelihood grows with it."""
+"""Measures of the gain of a cause: the nominal model's squared error minus that of noise alone, or the increase of
+twice the log-likelihood."""
 
 
 @dataclass(frozen=True)
 class Gain:
-    """What a cause gains: the share of what the model gets wrong without it, percent, with its 95 % interval.
+    """Gain of a cause: the share of the nominal model's error that it removes, percent, with its 95 % interval.
 
     Attributes
     ----------
     ahead_s
-        How far ahead, where that is further than the horizon; s.
+        Horizon of the predictions, s, where that is longer than the usual one.
     on
-        What data it is found on: a key of `ON`.
+        Data on which it is found: a key of `ON`.
     """
 
     percent: float
@@ -166,7 +166,7 @@ class Gain:
 
     @property
     def is_held_out(self) -> bool:
-        """Whether it is found on data that took no part."""
+        """Whether it is found on held-out data."""
         return self.on in (HELD_OUT, CROSS_VALIDATED)
 
     def record(self) -> dict[str, Any]:
@@ -176,12 +176,12 @@ class Gain:
 
 
 NO_GAIN = Gain(math.nan, math.nan, math.nan)
-"""Of a cause that no error is computed of."""
+"""Gain of a cause for which no error is computed."""
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """What a cause adds to the likelihood of data that took no part.
+    """Evidence for a cause: what it adds to twice the log-likelihood of held-out data.
 
     The residual without it is the residual with it plus a difference Delta of predictions, all whitened:
     |r + Delta|^2 - |r|^2 = |Delta|^2 + 2 r'Delta, which scatters by 2 |Delta| where r is noise.
@@ -189,11 +189,11 @@ class Evidence:
     Attributes
     ----------
     added
-        Twice the log-likelihood.
+        The increase of twice the log-likelihood.
     squares
         |Delta|^2.
     on
-        As in `Gain`.
+        Data on which it is found, as in `Gain`.
     """
 
     added: float
@@ -207,7 +207,7 @@ class Evidence:
 
     @classmethod
     def of(cls, added: float) -> Evidence:
-        """From a ratio of likelihoods alone: that of a true cause scatters by twice the root of its mean."""
+        """Return the evidence of a likelihood ratio: that of a true cause scatters by twice the root of its mean."""
         return cls(added, max(added, 0.0)) if math.isfinite(added) else cls(0.0, 0.0)
 
     def __add__(self, other: Evidence) -> Evidence:
@@ -247,18 +247,18 @@ class Remainder:
 
 @dataclass(frozen=True)
 class Explained:
-    """What all causes together gain: squared errors of a constant, of the fitted nominal and of the extended model.
+    """Gain of all causes together: errors of a constant, of the fitted nominal model and of the extended model.
 
-    Errors are E: squares in percent of those of the measurement about its mean. So a constant has 100.
+    Errors are E: squares in percent of those of the measurement about its mean. A constant has therefore 100.
 
     Attributes
     ----------
     what
-        What is predicted, in words.
+        The predictions, in words.
     on
-        What data: a key of `ON`.
+        Data on which errors are found: a key of `ON`.
     noise
-        What noise alone leaves; None where that is not known.
+        Error of noise alone; None where that is not known.
     """
 
     what: str
@@ -269,12 +269,12 @@ class Explained:
     constant: float = 100.0
 
     def of(self, reference: float) -> float:
-        """Share of a model's error that the extended model does not make, percent; below 0 where it makes more."""
+        """Return the share of a model's error that the extended model removes, percent; below 0 where it adds some."""
         return 100.0 * (reference - self.extended) / max(reference, 1e-300)
 
     @property
     def above_noise(self) -> float:
-        """Share of the nominal model's error above the noise that the extended model does not make, percent."""
+        """Share of the nominal model's error above the noise that the extended model removes, percent."""
         gone = self.nominal - self.extended
         return 100.0 * gone / max(self.nominal - (self.noise or 0.0), gone, 1e-300)
 
@@ -306,7 +306,7 @@ V_co = TypeVar("V_co", covariant=True)
 
 
 class Held(Mapping[str, V_co]):
-    """A mapping that cannot be changed, also after it was copied or pickled."""
+    """A mapping that cannot be changed, not even after it was copied or pickled."""
 
     def __init__(self, values: Mapping[str, V_co]) -> None:
         self._values = dict(values)
@@ -326,24 +326,24 @@ class Held(Mapping[str, V_co]):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Named:
-    """What is named: a cause, or a change. Two are equal if their records are.
+    """A named cause or change. Two are equal if their records are.
 
     Attributes
     ----------
     parameters
-        By name.
+        Estimates by name.
     equivalents
-        What these data cannot tell from it: to be read as one set with it.
+        Candidates that these data cannot distinguish from it: to be read as one set with it.
     p_value
-        Of such a gain where nothing is there, over all candidates (family-wise).
+        Family-wise p-value of its gain, over all candidates.
     site
-        Where it acts, of what has several places; empty where there is one.
+        Where it acts, if it can act at several places; empty if there is one.
     trial
-        The only trial that it concerns, if it is not the rig's.
+        The only trial that it concerns, if it does not concern all.
     words
-        What happened, in plain words, where the name alone does not say it.
+        The change in words, where the name alone does not state it.
     evidence
-        By how much the likelihood of data that took no part grows with it; None where a likelihood says little.
+        Its evidence in held-out data; None where the model has a lack of fit.
     """
 
     name: str
@@ -355,9 +355,9 @@ class Named:
     words: str = ""
     evidence: Evidence | None = None
     PLACE: ClassVar[tuple[str, ...]] = ("stage", "site")
-    """What says where it acts."""
+    """Attribute that says where it acts."""
     CELL: ClassVar[tuple[str, ...]] = ("parameter",)
-    """What says which of its values one is."""
+    """Columns that say which of its values an estimate is."""
     GAIN: ClassVar[tuple[str, ...]] = ()
     """Columns of its gain."""
 
@@ -367,26 +367,26 @@ class Named:
 
     @property
     def judged(self) -> Gain | Evidence | None:
-        """The gain that it is named by, which states its measure; None where it is named by its p-value alone."""
+        """The gain by which it is named, with its measure; None where it is named by its p-value alone."""
         return self.evidence
 
     def estimates(self) -> list[tuple[tuple[str, ...], ParameterEstimate]]:
-        """Every estimate of it, with what `CELL` says of it."""
+        """Return every estimate of it, with its cells of `CELL`."""
         raise NotImplementedError
 
     def row(self) -> tuple[str, ...]:
-        """Cells of a table to be read."""
+        """Return its cells of a printed table."""
         raise NotImplementedError
 
     def columns(self) -> list[tuple[Any, ...]]:
-        """Rows of a table to be computed with, one an estimate."""
+        """Return its rows of a table for computation, one an estimate."""
         place = [getattr(self, n) for n in self.PLACE if n not in self.CELL]
         last = (self.p_value, *self._gain_cells(), ", ".join(self.equivalents))
         return [(self.name, *place, *cell, *one.cells(), *last) for cell, one in self.estimates()]
 
     @classmethod
     def head(cls) -> tuple[str, ...]:
-        """Names of `columns`."""
+        """Return the names of `columns`."""
         place = [n for n in cls.PLACE if n not in cls.CELL]
         return (cls.__name__.lower(), *place, *cls.CELL, *CELLS, "p_value", *cls.GAIN, "equivalents")
 
@@ -419,18 +419,18 @@ class Cause(Named):
     Attributes
     ----------
     stage
-        Of the signal path.
+        Stage of the signal path.
     gain_fit
-        In percent, on the data that were fitted.
+        Gain in percent on the fitted data.
     gain_held_out
-        On data that took no part; on those that were fitted where nothing could be held out.
+        Gain on held-out data; on the fitted data where nothing could be held out.
     chosen_again
-        In how many folds it, or an equivalent, was chosen without the data that were held out there, and of how many.
+        Number of folds in which it, or an equivalent, was chosen without the held-out data, and number of folds.
     elsewhere
-        Other sites of the same cause that would do as well.
+        Other sites of the same cause that explain the data as well.
     further
-        Other gains by name, percent: of walking "other_leg", that on one leg's single supports of sizes fitted to the
-        other's, of what is of neither leg.
+        Other gains by name, percent: for walking "other_leg", the gain on one leg's single supports of sizes fitted to
+        those of the other leg, for causes that belong to neither leg.
     """
 
     parameters: Mapping[str, ParameterEstimate]
@@ -448,21 +448,21 @@ class Cause(Named):
 
     @property
     def judged(self) -> Gain | Evidence:
-        """The gain that it is named by: of the likelihood, or of the errors where a likelihood says little."""
+        """The gain by which it is named: evidence of the likelihood, or the gain in errors where there is none."""
         return self.evidence or self.gain_held_out
 
     @property
     def chosen_in_some(self) -> tuple[int, int] | None:
-        """`chosen_again` where some folds choose something else; None where none does."""
+        """`chosen_again` where some folds choose another set; None where none does."""
         again = self.chosen_again
         return again if again is not None and again[0] < again[1] else None
 
     def estimates(self) -> list[tuple[tuple[str, ...], ParameterEstimate]]:
-        """Every parameter by name."""
+        """Return every parameter by name."""
         return [((n,), one) for n, one in self.parameters.items()]
 
     def row(self) -> tuple[str, ...]:
-        """Name, where it acts, values, gain, what it cannot be told from."""
+        """Return name, site, values, gain and equivalents."""
         values = "\n".join(f"{n} {one}" for n, one in self.parameters.items())
         where = f"trial {self.trial}" if self.trial is not None else self.site or self.stage
         return self.name, where, values, str(self.gain_held_out), ", ".join(self.equivalents) or "-"
@@ -491,7 +491,7 @@ class Cause(Named):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Change(Named):
-    """One thing that differs between groups.
+    """One change between groups.
 
     Attributes
     ----------
@@ -510,14 +510,14 @@ class Change(Named):
     CELL: ClassVar[tuple[str, ...]] = ("parameter", "group")
 
     def estimates(self) -> list[tuple[tuple[str, ...], ParameterEstimate]]:
-        """Every parameter by name and group."""
+        """Return every parameter by name and group."""
         return [((n, g), one) for n, groups in self.parameters.items() for g, one in groups.items()]
 
     def _parameters(self) -> dict[str, Any]:
         return {n: {g: one.record() for g, one in groups.items()} for n, groups in self.parameters.items()}
 
     def row(self) -> tuple[str, ...]:
-        """Name, what happened, values by group, p, what it cannot be told from."""
+        """Return name, kind of change, values by group, p-value and equivalents."""
         lines = [
             f"{name}: " + ", ".join(f"{g} {one if one.std else 'none'}" for g, one in groups.items())
             for name, groups in self.parameters.items()

@@ -1,9 +1,9 @@
-"""How much more the scores of pieces of the data scatter than a right model's would: errors of form are no white noise.
+"""Corrections for errors of form: scatter of scores between pieces of the data, against that of a right model.
 
 Where a model is right, twice the gain in log-likelihood of k more parameters is a chi-square of k degrees of freedom.
-Where it is not, it is a sum of k of one degree each, times the eigenvalues of V C^-1, with C what the information says
-of the parameters' covariance and V how they scatter (`covariance.widened`). Gains are divided by their mean, if that is
-above 1.
+Where it is wrong, it is a sum of k chi-squares of one degree, times the eigenvalues of V C^-1, with C the inverse
+information and V the sandwich covariance of the parameters (`covariance.widened`). Gains are divided by the mean of
+these eigenvalues, if that is above 1.
 
 Source: Kent, Robust properties of likelihood ratio tests, Biometrika 69 (1982); Satorra and Bentler, A scaled
 difference chi-square test statistic for moment structure analysis, Psychometrika 66 (2001).
@@ -28,24 +28,24 @@ from fes_pin.infer.projection import without_locals
 F = TypeVar("F", bound=Optimum)
 
 PIECES = 40
-"""Pieces of the data by whose scores a model's errors of form show: as many as tell a deviation within a tenth, and so
-as long as they can be."""
+"""Pieces of the data whose scores show a model's errors of form: enough to estimate a standard deviation within a
+tenth, and no more, so that each is long."""
 
 
 def with_honest_intervals(fitted: F) -> F:
-    """The fit with intervals as wide as the scores of its trials, cut into `PIECES` pieces, scatter."""
+    """Return the fit with intervals of the sandwich estimator, from the scores of its trials in `PIECES` pieces."""
     return replace(fitted, covariance=widened(*_information_and_scores(fitted)))
 
 
 def as_wide_as_trials_differ(fitted: F, again: Sequence[Optimum]) -> F:
-    """The fit with intervals of parameters that trials differ in by more than each is sure of as wide as they differ.
+    """Return the fit with jackknife intervals of the parameters that differ more between trials than is expected.
 
-    Of fits without one of k parts of the trials each, the jackknife's variance is
+    From fits without one of k parts of the trials each, the jackknife's variance is
 
         (k - 1) / k sum (p_i - mean p)^2
 
-    which over that of the fit is a chi-square over its k - 1 degrees of freedom where it is sure as it says; it counts
-    where that is unusual.
+    Its ratio to that of the fit is a chi-square over its k - 1 degrees of freedom if the latter is right. The jackknife
+    is used where that ratio is unusually large.
 
     Source: Miller, The jackknife - a review, Biometrika 61 (1974); of intervals that are widened as measurements
     differ, Birge, The calculation of errors by the method of least squares, Physical Review 40 (1932).
@@ -53,7 +53,7 @@ def as_wide_as_trials_differ(fitted: F, again: Sequence[Optimum]) -> F:
     Parameters
     ----------
     again
-        Fits of the same model without one part of the trials each; of fewer than two nothing follows.
+        Fits of the same model without one part of the trials each; fewer than two change nothing.
     """
     if len(again) < 2:
         return fitted
@@ -68,18 +68,18 @@ def as_wide_as_trials_differ(fitted: F, again: Sequence[Optimum]) -> F:
 
 
 def as_wide_as_estimates_differ(fitted: F, other: Optimum) -> F:
-    """The fit with intervals that hold another estimate of the same parameters where chance does not set both apart.
+    """Return the fit with intervals that include the difference to another estimate, where that is significant.
 
-    Both estimate the same where the model is right, and the other no better: their difference varies by less than that
-    does. Where it is unusually large, the model is not right, by about as much as both are apart; either may be off
-    by that.
+    Where the model is right both estimate the same, and the variance of their difference is at most that of the less
+    efficient one. Where the difference is unusually large, the model is wrong by about that difference, and either
+    estimate may be off by it.
 
     Source: Hausman, Specification tests in econometrics, Econometrica 46 (1978).
 
     Parameters
     ----------
     other
-        A fit of the same causes to the same trials by what is not the likeliest.
+        A fit of the same causes to the same trials by a less efficient estimator.
     """
     known = dict(zip(other.free, np.diag(with_honest_intervals(other).covariance), strict=True))
     varies = np.array([known.get(n, np.inf) for n in fitted.free])
@@ -91,7 +91,7 @@ def as_wide_as_estimates_differ(fitted: F, other: Optimum) -> F:
 
 
 def excess_scatter(larger: Optimum, smaller: Optimum) -> float:
-    """How many times wider than of a right model that is scattered what a larger fit has besides; at least 1."""
+    """Return the variance ratio of a larger fit's further parameters to that of a right model; at least 1."""
     more = [k for k, n in enumerate(larger.free) if n not in smaller.free]
     if not more:
         return 1.0
@@ -104,13 +104,12 @@ def excess_scatter(larger: Optimum, smaller: Optimum) -> float:
 
 
 def least_apart(likelier: Optimum, other: Optimum) -> float:
-    """Twice the log-likelihood by which a fit must be likelier than another of the same trials to be distinguished.
+    """Return the lead in twice the log-likelihood above which a fit is distinguished from another of the same trials.
 
-    With Delta the difference of their whitened residuals, what the right one of two is likelier by, in twice the
-    log-likelihood, has the mean |Delta|^2 and scatters by 2 |Delta|, or as pieces of the data show where that is more.
-    The wrong one is likelier by `SEPARABLE` in no more than 5 % of cases, however far apart they are. Where one is
-    likelier by less than it must be if it were right, at `CLAIM_LEVEL`, neither is right, and the nearer one is
-    distinguished where the pieces agree on it.
+    With Delta the difference of their whitened residuals, the lead of the right one of two has the mean |Delta|^2 and
+    the standard deviation 2 |Delta|, or that between pieces of the data if it is larger. The wrong one leads by
+    `SEPARABLE` in at most 5 % of cases, however different they are. Where the lead is smaller than that of a right
+    model, at `CLAIM_LEVEL`, neither is right, and the nearer one is distinguished if the pieces agree.
 
     Source: Cox, Tests of separate families of hypotheses, 4th Berkeley Symposium 1, 1961; Vuong, Likelihood ratio tests
     for model selection and non-nested hypotheses, Econometrica 57 (1989).
@@ -126,15 +125,15 @@ def least_apart(likelier: Optimum, other: Optimum) -> float:
 
 
 def _information_and_scores(fitted: Optimum) -> tuple[np.ndarray, np.ndarray]:
-    """The inverse information of a fit that has ended, and the slopes of the log-likelihood of its pieces."""
+    """Return the inverse information of a fit, and the slopes of the log-likelihood of its pieces."""
     parts, free = at_rest(fitted.parts), np.array([n not in fitted.at_bound for n in fitted.free])
     return covariance_of(normal_equations(parts).hessian, free), scores_of(parts)
 
 
 def scores_of(parts: Sequence[Linearized]) -> np.ndarray:
-    """The slopes of the log-likelihood of `PIECES` pieces of some trials, shape (pieces, parameters).
+    """Return the slopes of the log-likelihood of `PIECES` pieces of some trials, shape (pieces, parameters).
 
-    What is each trial's own goes with the parameters.
+    Each trial's own unknowns are eliminated.
     """
     lengths = [len(p.residual) for p in parts]
     shares = [min(n, max(1, round(PIECES * n / sum(lengths)))) for n in lengths]
@@ -149,20 +148,20 @@ def scores_of(parts: Sequence[Linearized]) -> np.ndarray:
 
 
 def _beginnings(part: Linearized, count: int) -> np.ndarray:
-    """Where pieces of a trial begin, shape (count,)."""
+    """Return the first samples of the pieces of a trial, shape (count,)."""
     return np.linspace(0, len(part.residual), count, endpoint=False, dtype=int)
 
 
 def in_pieces(values: np.ndarray, trials: int) -> np.ndarray:
-    """Sums of the values of one trial of so many over its pieces."""
+    """Return sums of the values of one trial over its pieces, where there are `trials` trials."""
     return np.array([piece.sum() for piece in np.array_split(values, max(1, PIECES // trials)) if len(piece)])
 
 
 def at_rest(parts: Sequence[Linearized]) -> list[Linearized]:
-    """The trials of a fit that has ended, without what its sensitivities have along the residual as a whole.
+    """Return the trials of a fit with sensitivities made orthogonal to the residual as a whole.
 
-    A slope at an end from which no step gains is roughness of the cost, as of friction that jumps: it says nothing of a
-    parameter.
+    A slope at an optimum from which no step gains is roughness of the cost, as by friction that jumps. It carries no
+    information on a parameter.
     """
     power = sum(float(p.residual @ p.residual) for p in parts)
     along = sum(p.residual @ p.jacobian for p in parts) / max(power, 1e-300)

@@ -1,12 +1,12 @@
-"""Parameters of a model and of its noise, made more likely by Fisher scoring.
+"""Fisher scoring for the parameters of a model and of its noise.
 
-In parameters and in logarithms of those of the noise, with e_k = r_k / sqrt(V_k) the innovations over their deviations,
-less what noise predicts of itself, e_i and V_i their derivatives and the variances' by differences, in which the
-filter's gains change with the parameters, and N_k the noise of what is read n_k times in a row
-(`identify.likelihood`):
+Parameters of the noise are in logarithms. With e_k = r_k / sqrt(V_k) the standardised innovations, whitened by the
+autoregression of noise, e_i and V_i the derivatives of these and of the variances by finite differences, which include
+the change of the filter's gains, and N_k the noise of a reading that is repeated n_k times in a row
+(`identify.likelihood`), gradient and expected information of half the cost are
 
     g_i = sum e e_i + V_i / (2 V) - (1 - 1 / n) N_i / (2 N)
-    I_ij = sum s_i s_j + V_i V_j / (2 n V^2),    s_i = e_i + e V_i / (2 V),    which is r_i / sqrt(V) of white noise
+    I_ij = sum s_i s_j + V_i V_j / (2 n V^2),    s_i = e_i + e V_i / (2 V),    which is r_i / sqrt(V) for white noise
 
 Source: Kristensen, Madsen and Jorgensen, Parameter estimation in stochastic grey-box models, Automatica 40 (2004).
 """
@@ -24,15 +24,15 @@ from fes_pin.infer.optimize import WORTH
 from fes_pin.infer.problem import Problem, Unknowns
 
 LITTLE = 0.1
-"""Fall of twice the log-likelihood with which alternation ends: a third of a standard deviation of one parameter."""
+"""Fall of the cost at which alternation ends: a third of a standard deviation of one parameter."""
 STEPS = (1e-3, 0.03)
-"""Steps of the differences in logarithms: the second where the first predicts a gain that no step has, as where a cost
-is rough: that of a filter which takes for linear what bends sharply."""
+"""Steps of the finite differences in logarithms. The second is used where the first predicts a gain that no step
+reaches, as where a cost is rough: a filter linearizes a model with kinks."""
 DEVIATIONS = 10.0
-"""How many deviations of a parameter, as far as it is known with gains as they are, count as one of a logarithm: a
-difference is then 0.01 of them, or 0.3."""
+"""Standard deviations of a parameter, at constant gains, that are scaled to one unit of a logarithm: a difference is
+then 0.01 of them, or 0.3."""
 LONGEST_MOVE = 1.5
-"""Longest step of a logarithm: noise changes by a factor of 4.5 at most before parameters move again."""
+"""Longest step of a logarithm: noise changes by a factor of at most 4.5 between steps of the parameters."""
 
 
 Point = tuple[Mapping[str, float], Unknowns, Mapping[str, float]]
@@ -41,9 +41,10 @@ Point = tuple[Mapping[str, float], Unknowns, Mapping[str, float]]
 
 @dataclass(frozen=True)
 class Evaluation:
-    """What was measured at a point, all trials end to end, each array of shape (m,); and its cost.
+    """One-step predictions at a point, all trials end to end, each array of shape (m,); and their cost.
 
-    Innovations over their deviations, variances, 1 - 1 / n; and of repeated readings, the noise in their variance.
+    The arrays are standardised innovations, variances and 1 - 1 / n; and for repeated readings, the noise in their
+    variance.
     """
 
     cost: float
@@ -54,7 +55,7 @@ class Evaluation:
 
     @classmethod
     def joined(cls, parts: Sequence[Evaluation]) -> Evaluation:
-        """Those of several sets of trials, end to end."""
+        """Return the evaluations of several sets of trials, end to end."""
         arrays = ([getattr(p, n) for p in parts] for n in ("innovations", "variances", "noise", "again"))
         return cls(float(sum(p.cost for p in parts)), *(np.concatenate(each) for each in arrays))
 
@@ -64,17 +65,17 @@ class NoisyProblem(Problem, Protocol):
 
     @property
     def noise_parameters(self) -> Mapping[str, float]:
-        """Those of the noise that may change, by name."""
+        """Parameters of the noise that may change, by name."""
 
     @property
     def noise_limits(self) -> Mapping[str, tuple[float, float]]:
-        """How small and how large each may become."""
+        """Bounds of each, by name."""
 
     def evaluate(self, points: Sequence[Point]) -> list[Evaluation]:
-        """One-step predictions of all trials at each of several points."""
+        """Return one-step predictions of all trials at each of several points."""
 
     def noise_step(self, values: Mapping[str, float], unknowns: Unknowns) -> float:
-        """Improve the noise in place, parameters held; returns by how much that lowers the cost."""
+        """Improve the noise in place, parameters held; return by how much the cost falls."""
 
     def set_noise(self, parameters: Mapping[str, float]) -> None:
         """Change parameters of the noise, in place."""
@@ -82,7 +83,7 @@ class NoisyProblem(Problem, Protocol):
 
 @dataclass(frozen=True)
 class Reached:
-    """Where steps have led to.
+    """The end of some steps.
 
     Attributes
     ----------
@@ -91,11 +92,11 @@ class Reached:
     gained
         By how much the cost has fallen.
     held
-        Parameters that a bound holds there.
+        Parameters that are held by a bound.
     left
-        What a further step would gain.
+        Predicted gain of a further step.
     converged
-        False where steps ran out.
+        False where the steps ran out.
     """
 
     values: dict[str, float]
@@ -108,23 +109,23 @@ class Reached:
 
 @dataclass(frozen=True)
 class _Slopes:
-    """Gradient and expected information of half the cost at a point, with what is held by a bound there."""
+    """Gradient and expected information of half the cost at a point, and the parameters that a bound holds there."""
 
     gradient: np.ndarray
     information: np.ndarray
     held: np.ndarray
 
     def step(self, damping: float) -> np.ndarray:
-        """What to take away."""
+        """Return the step to subtract."""
         return _damped_step(self.information, self.gradient, ~self.held, damping)
 
     def predicted(self, step: np.ndarray) -> float:
-        """By how much a step lowers the cost, if it is the parabola that it seems to be."""
+        """Return by how much a step lowers the cost in the quadratic approximation."""
         return float(2.0 * self.gradient @ step - step @ self.information @ step)
 
 
 class _Scale:
-    """Where parameters and those of the noise are on an axis each: in `DEVIATIONS` of them, and in logarithms."""
+    """Coordinates of the parameters, in units of `DEVIATIONS`, and of those of the noise, in logarithms."""
 
     def __init__(
         self, problem: NoisyProblem, values: Mapping[str, float], sizes: Mapping[str, float], with_noise: bool
@@ -141,7 +142,7 @@ class _Scale:
         self.here = np.clip(here, self.low, self.high)
 
     def values(self, z: np.ndarray) -> dict[str, float]:
-        """The parameters at a point: exactly at a bound that one has come to."""
+        """Return the parameters at a point; one that has reached a bound is exactly there."""
         out = {}
         for (name, unit), v, low, high in zip(self.units.items(), z, self.low, self.high, strict=False):
             ends = self.limits[name]
@@ -149,15 +150,15 @@ class _Scale:
         return out
 
     def noise(self, z: np.ndarray) -> dict[str, float]:
-        """Parameters of the noise there."""
+        """Return parameters of the noise at a point."""
         return {n: float(np.exp(v)) for n, v in zip(self.of_noise, z[len(self.units) :], strict=True)}
 
     def held(self, z: np.ndarray, gradient: np.ndarray) -> np.ndarray:
-        """What a bound holds where the cost has a gradient."""
+        """Return which parameters a bound holds, given the gradient of the cost."""
         return np.asarray(((z <= self.low) & (gradient > 0)) | ((z >= self.high) & (gradient < 0)))
 
     def end(self, z: np.ndarray, step: np.ndarray) -> np.ndarray:
-        """Where a step leads, no longer than `LONGEST_MOVE` in the noise."""
+        """Return the end of a step, limited to `LONGEST_MOVE` in the noise."""
         longest = float(np.abs(step[len(self.units) :]).max(initial=0.0))
         return np.asarray(np.clip(z - step * min(1.0, LONGEST_MOVE / max(longest, 1e-300)), self.low, self.high))
 
@@ -170,16 +171,16 @@ def fisher_scoring(
     steps: int,
     with_noise: bool = True,
 ) -> Reached:
-    """Lower the cost, until what a step has missed of its predicted gain is `LITTLE`: no further one gains more.
+    """Lower the cost until actual and predicted gain of a step differ by no more than `LITTLE`.
 
     Parameters
     ----------
     problem, values, unknowns
-        Where to begin.
+        The problem and its start values.
     sizes
-        Of each parameter that moves, one over its deviation as far as it is known with gains as they are.
+        For each parameter that moves, the inverse of its standard deviation at constant gains.
     steps
-        At most.
+        Most steps.
     with_noise
         Whether the noise moves.
     """
@@ -192,7 +193,7 @@ def fisher_scoring(
 
 
 class _Scoring:
-    """A way down the cost, from where a scale begins."""
+    """A descent of the cost, from the origin of a scale."""
 
     def __init__(self, scale: _Scale, at_all: Callable[[np.ndarray], list[Evaluation]], batch: int) -> None:
         self.scale, self.at_all, self.batch = scale, at_all, batch
@@ -201,15 +202,15 @@ class _Scoring:
         self.held, self.left = np.zeros(len(self.z), dtype=bool), 0.0
 
     def _widths(self) -> np.ndarray:
-        """Of differences along each axis: away from a bound."""
+        """Return the widths of differences along each axis, away from a bound."""
         return np.where(self.z + self.lengths[0] > self.scale.high, -self.lengths[0], self.lengths[0])
 
     def _neighbours(self) -> np.ndarray:
-        """The points of differences, one a row."""
+        """Return the points of the differences, one a row."""
         return np.asarray(self.z + np.diag(self._widths()))
 
     def run(self, steps: int) -> Reached:
-        """Take so many steps at most."""
+        """Take at most `steps` steps, and return their end."""
         begin, scale = self.now.cost, self.scale
         done = not math.isfinite(begin)
         while not done and steps > 0:
@@ -223,9 +224,9 @@ class _Scoring:
         return Reached(scale.values(self.z), scale.noise(self.z), fallen, held, self.left, done)
 
     def _step(self) -> bool:
-        """Go down once, or look at longer differences; True where there is nothing left to gain."""
+        """Take one step, or change to longer differences; return True at the end of the descent."""
         gradient, information = _scored(self.now, self.moved, self._widths())
-        lost = ~(np.isfinite(gradient) & np.isfinite(np.diag(information)))  # a prediction runs away there
+        lost = ~(np.isfinite(gradient) & np.isfinite(np.diag(information)))  # a prediction diverges there
         gradient[lost], information[lost], information[:, lost] = 0.0, 0.0, 0.0
         self.held = self.scale.held(self.z, gradient)
         slopes = _Slopes(gradient, information, self.held | lost)
@@ -247,9 +248,9 @@ class _Scoring:
         return min(gained, self.left) < LITTLE
 
     def _leap(self) -> bool:
-        """Go as far as a step may in one logarithm of the noise; False if that leads nowhere.
+        """Take the longest step in one logarithm of the noise that lowers the cost; return False if none does.
 
-        Where a prediction goes another way at every change of its gains, as of friction that flips, slopes are of that.
+        It serves where slopes are meaningless, as a prediction with dry friction changes abruptly with the gains.
         """
         axes = np.eye(len(self.z))[len(self.scale.units) :] * LONGEST_MOVE
         ends = np.array([np.clip(self.z + m, self.scale.low, self.scale.high) for m in (*axes, *-axes)])
@@ -264,7 +265,7 @@ class _Scoring:
 def _first_below(
     now: Evaluation, ends: np.ndarray, at_all: Callable[[np.ndarray], list[Evaluation]], batch: int
 ) -> tuple[int, np.ndarray, Evaluation] | None:
-    """The lowest of the first points in a run that has one below: its place, itself, and what it tells."""
+    """Return the lowest point of the first batch that has one below the present cost: place, point and evaluation."""
     for k in range(0, len(ends), batch):
         after = at_all(ends[k : k + batch])
         best = int(np.argmin([one.cost for one in after]))
@@ -275,7 +276,7 @@ def _first_below(
 
 @np.errstate(over="ignore", invalid="ignore")
 def _scored(now: Evaluation, moved: Sequence[Evaluation], widths: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Gradient and expected information of half the cost, from differences of such widths; see the module."""
+    """Return gradient and expected information of half the cost, from differences of `widths`; see the module."""
     e, v, width = now.innovations, now.variances, widths[:, None]
     de = (np.array([m.innovations for m in moved]) - e) / width
     dv = (np.array([m.variances for m in moved]) - v) / width / v
@@ -288,7 +289,7 @@ def _scored(now: Evaluation, moved: Sequence[Evaluation], widths: np.ndarray) ->
 
 
 def _damped_step(information: np.ndarray, gradient: np.ndarray, free: np.ndarray, damping: float) -> np.ndarray:
-    """A step of what is free."""
+    """Return a step of the free parameters."""
     step = np.zeros(len(gradient))
     if free.any():
         inner = information[np.ix_(free, free)]

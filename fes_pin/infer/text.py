@@ -1,24 +1,24 @@
-"""Numbers in words: what a p-value, a percentage and an estimate look like wherever they are printed."""
+"""Numbers in words: p-values, percentages and estimates as they are printed everywhere."""
 
 from __future__ import annotations
 
 import math
 
 LEAST_P, LEAST_PERCENT = 1e-12, 1e-3
-"""Below these a p-value and a percentage are printed as smaller than that."""
+"""Least p-value and percentage that are printed; smaller ones are printed as below these."""
 LARGE, DIGITS = 1e5, 6
-"""From this value on, and with more digits behind the point, a number is printed with a power of ten."""
+"""Larger values, and values with more decimals, are printed with a power of ten."""
 
 
 def probability(value: float) -> str:
-    """A p-value as printed; never zero."""
+    """Return a p-value as printed; it is never zero."""
     if math.isnan(value):
         return "not tested"
     return f"p < {LEAST_P:g}" if value < LEAST_P else f"p = {value:.2g}"
 
 
 def percent(value: float | None) -> str:
-    """A percentage as printed, "-" for none."""
+    """Return a percentage as printed; "-" for None."""
     if value is None or not math.isfinite(value):
         return "-"
     if 0.0 <= value < LEAST_PERCENT:
@@ -28,7 +28,7 @@ def percent(value: float | None) -> str:
 
 
 def rounded(value: float, std: float) -> str:
-    """A value with the digits that its standard deviation leaves it: two of the uncertain ones."""
+    """Return a value with its significant digits: two of them are uncertain by its standard deviation."""
     if not math.isfinite(std) or std <= 0.0:
         return f"{value:.4g}"
     digits = 1 - math.floor(math.log10(std))
@@ -39,12 +39,12 @@ def rounded(value: float, std: float) -> str:
 
 
 def quantity(value: float, std: float, unit: str) -> str:
-    """A value with its standard deviation, rounded to what it means."""
+    """Return a value with its standard deviation, both rounded to significant digits."""
     if math.isfinite(std) and std > 0.0:
         return f"{rounded(value, std)} +- {rounded(std, std)} {unit}".strip()
     return f"{value:.4g} {unit} ({'held' if std <= 0.0 else 'not identified'})".replace("  ", " ")
 
 
 def listed(names: list[str], last: str = "and") -> str:
-    """Words in a row: a, b and c; "-" for none."""
+    """Return words in a row: a, b and c; "-" for none."""
     return f" {last} ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names) or "-"

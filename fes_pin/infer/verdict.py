@@ -1,7 +1,7 @@
-"""The verdict on what a search found: a table of claims in a stated order, each of which may change that.
+"""The verdict on what a search found: a table of claims in a stated order, each of which may change the set.
 
-A claim looks at a state and returns another one, or None where it has nothing to object. After each change the table is
-gone through from its beginning; the state that no claim objects to is the verdict.
+A claim takes a state and returns another one, or None if it has no objection. After each change the table is applied
+from its beginning. The state to which no claim objects is the verdict.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ CAUSES_FOUND, UNEXPLAINED, ADEQUATE, STOPPED = "causes_found", "unexplained", "a
 
 
 class LackOfFit(Protocol):
-    """What the tests of lack of fit say of a fit."""
+    """The result of the tests of lack of fit."""
 
     @property
     def unexplained(self) -> bool:
@@ -30,16 +30,16 @@ class LackOfFit(Protocol):
 
 @dataclass(frozen=True)
 class Rejected:
-    """A candidate that was significant in the fit, and is not claimed.
+    """A candidate that was significant in the fit, and is not named.
 
     Attributes
     ----------
     p_value
-        Family-wise, of what it added.
+        Family-wise p-value of its gain.
     share
-        Of what all candidates together added to the log-likelihood.
+        Its share of the gain of all candidates in log-likelihood.
     gain
-        On the data that it was judged by.
+        Its gain on the data by which it was judged.
     """
 
     p_value: float
@@ -49,16 +49,16 @@ class Rejected:
 
 @dataclass(frozen=True)
 class Weighed:
-    """What the data say of each candidate of a set.
+    """Evidence of the data on each candidate of a set.
 
     Attributes
     ----------
     gains
-        On data held out; on the data that were fitted where none could be.
+        Gains on held-out data; on the fitted data where none could be held out.
     evidence
-        What each candidate adds to the likelihood of data held out; empty where none could be.
+        Evidence in the likelihood of held-out data; empty where none could be held out.
     lack_of_fit
-        Of the set.
+        Lack of fit of the set.
     """
 
     gains: Mapping[str, Gain]
@@ -71,18 +71,18 @@ W = TypeVar("W", bound=Weighed)
 
 @dataclass(frozen=True)
 class State(Generic[F, M, W]):
-    """A verdict on its way.
+    """A state of the verdict between claims.
 
     Attributes
     ----------
     search
-        The search, by one estimator, that the set is of.
+        The search, by one estimator, to which the set belongs.
     found
-        A set of candidates, its rivals, and the set less each candidate.
+        A set of candidates, its rivals, and the set without each candidate.
     weighed
-        What the data say of it.
+        Evidence of the data on the set.
     rejected
-        Candidates that no answer may hold.
+        Candidates that no answer may contain.
     settled
         The set for which rivals were searched last.
     formed
@@ -90,7 +90,7 @@ class State(Generic[F, M, W]):
     steps
         The claims that changed the state, in their order.
     replaced
-        The state of another estimator of the same data, in whose place this one is; None if no estimator was replaced.
+        The state of another estimator of the same data that this one replaces; None if no estimator was replaced.
     """
 
     search: Search[F, M]
@@ -117,12 +117,12 @@ Claim = Callable[[State[F, M, W]], State[F, M, W] | None]
 
 
 class Verdict(ABC, Generic[F, M, W]):
-    """The claims of one front end, in `claims` by their order, and what they are made of.
+    """The claims of one front end, in the order of `claims`, and the decisions that they use.
 
     Parameters
     ----------
     search
-        That has run.
+        A search that has run.
     """
 
     def __init__(self, search: Search[F, M]) -> None:
@@ -137,14 +137,14 @@ class Verdict(ABC, Generic[F, M, W]):
 
     @abstractmethod
     def weigh(self, found: SearchResult[F]) -> W:
-        """What data held out, and the tests of lack of fit, say of a set."""
+        """Return the evidence of held-out data and of the tests of lack of fit on a set."""
 
     def lack_of_fit(self, state: State[F, M, W]) -> LackOfFit:
-        """What is left by a set, and by the candidates that were rejected beside it."""
+        """Return the lack of fit of a set, in view of the rejected candidates."""
         return state.weighed.lack_of_fit
 
     def unsupported(self, state: State[F, M, W]) -> list[str]:
-        """Candidates that data held out do not speak for."""
+        """Return the candidates that held-out data do not support."""
         weighed, names = state.weighed, state.names
         if not weighed.evidence:
             return [n for n in names if len(names) > 1 and not weighed.gains[n].is_material]
@@ -153,30 +153,30 @@ class Verdict(ABC, Generic[F, M, W]):
         return [n for n, e in known.items() if not is_supported(e, weighed.gains[n], alone=len(names) == 1)]
 
     def is_rarely_chosen(self, state: State[F, M, W], name: str) -> bool:
-        """Whether most folds of the data choose a set without a candidate."""
+        """Return whether most folds of the data choose a set without a candidate."""
         return False
 
     def by_another_estimator(self, state: State[F, M, W]) -> State[F, M, W] | None:
-        """The verdict by another estimator of the same data; None where there is none, or where it has no say."""
+        """Return the verdict of another estimator of the same data; None where there is none."""
         return None
 
     def prediction_error(self, state: State[F, M, W]) -> float:
-        """Error of the fitted data, each predicted by a fit to the others: by it an estimator is chosen."""
+        """Return the cross-validated error of the fitted data, by which an estimator is chosen."""
         raise NotImplementedError
 
     def of(
         self, found: SearchResult[F], search: Search[F, M] | None = None, replaced: State[F, M, W] | None = None
     ) -> State[F, M, W]:
-        """The state that no claim objects to.
+        """Return the state to which no claim objects.
 
         Parameters
         ----------
         found
-            A set that a search found.
+            The result of a search.
         search
             That search; by default the verdict's own.
         replaced
-            The state by another estimator, in whose place this one may be.
+            The state by another estimator that this one may replace.
         """
         weighed, settled = self.weigh(found), frozenset(found.without)
         state = State(search or self.search, found, weighed, {}, settled, replaced=replaced)
@@ -189,22 +189,22 @@ class Verdict(ABC, Generic[F, M, W]):
                 return state
 
     def drop_unsupported(self, state: State[F, M, W]) -> State[F, M, W] | None:
-        """Refuse the weakest of the candidates that data held out do not speak for."""
+        """Reject the weakest of the candidates that held-out data do not support."""
         return self._without_weakest(state, self.unsupported(state))
 
     def settle(self, state: State[F, M, W]) -> State[F, M, W] | None:
-        """Search the rivals of a set that candidates were taken from."""
+        """Search the rivals of a set from which candidates were rejected."""
         if state.names == state.settled:
             return None
         found = state.search.settle(tuple(sorted(state.names)), state.rejected)
         return replace(state, found=found, weighed=self.weigh(found), settled=state.names)
 
     def drop_rarely_chosen(self, state: State[F, M, W]) -> State[F, M, W] | None:
-        """Refuse the weakest of the candidates that most folds of the data do not choose."""
+        """Reject the weakest of the candidates that most folds of the data do not choose."""
         return self._without_weakest(state, [n for n in state.names if self.is_rarely_chosen(state, n)])
 
     def try_another_form(self, state: State[F, M, W]) -> State[F, M, W] | None:
-        """Where a lack of fit remains, give the set a form that was reached another way; rejected causes may return."""
+        """Give a set with a lack of fit another form; rejected candidates may return."""
         names = tuple(sorted(state.names))
         if not self.lack_of_fit(state).unexplained or state.names in state.formed:
             return None
@@ -215,9 +215,9 @@ class Verdict(ABC, Generic[F, M, W]):
         return replace(state, found=found, weighed=self.weigh(found), rejected={}, settled=settled, formed=formed)
 
     def switch_estimator(self, state: State[F, M, W]) -> State[F, M, W] | None:
-        """Take the verdict of another estimator of the same data where that predicts them better; this is tried once.
+        """Take the verdict of another estimator of the same data if it predicts them better; this is tried once.
 
-        Data that the study itself holds out have no say in it: gains on them would be optimistic.
+        Data that the study itself holds out are not used: gains on them would be optimistic.
         """
         other = None if state.replaced else self.by_another_estimator(state)
         if other is None or not self.prediction_error(other) < self.prediction_error(state):
@@ -225,7 +225,7 @@ class Verdict(ABC, Generic[F, M, W]):
         return replace(other, steps=(*state.steps, *other.steps))
 
     def _without_weakest(self, state: State[F, M, W], some: Sequence[str]) -> State[F, M, W] | None:
-        """The set less the weakest of some of its candidates; None if these are none."""
+        """Return the state without the weakest of some candidates; None if there are none."""
         weakest = next((n for n in state.weak if n in some), None)
         if weakest is None:
             return None
@@ -235,18 +235,18 @@ class Verdict(ABC, Generic[F, M, W]):
 
 
 def rejection_from(found: SearchResult[F], name: str, gain: Gain) -> Rejected:
-    """What is kept of a candidate that is taken from a set."""
+    """Return the record of a candidate that is rejected from a set."""
     return Rejected(found.p_values[name], share_in(found, name), gain)
 
 
 def share_in(found: SearchResult[F], name: str) -> float:
-    """Share of a candidate in what all that were found add to the log-likelihood."""
+    """Return the share of a candidate in the gain of all candidates in log-likelihood."""
     whole = found.nominal.sse - found.best.sse
     return (found.without[name].sse - found.best.sse) / max(whole, 1e-9)
 
 
 def word_of(has_candidates: bool, lack_of_fit: LackOfFit, stopped: bool = False) -> str:
-    """The verdict in a word."""
+    """Return the verdict in a word."""
     if stopped:
         return STOPPED
     return CAUSES_FOUND if has_candidates else UNEXPLAINED if lack_of_fit.unexplained else ADEQUATE
