@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shlex
 import sys
-from collections.abc import Mapping
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -81,8 +81,8 @@ def new_study(
     from fes_pin.data.new_body_study import new_body_study
     from fes_pin.data.new_study import new_study as make
     from fes_pin.data.schema import IMPOSED
+    from fes_pin.data.wanted import Wanted
     from fes_pin.diagnosis.checked import odd_lines
-    from fes_pin.models.catalogue import load_library
     from fes_pin.models.nominal import guess_start
 
     template = _template(pendulum, rod, slide, upright)
@@ -95,34 +95,43 @@ def new_study(
         Outputs("new-study", force).write(out or Path(), {template.name: read_bytes(template)})
         typer.echo(f"wrote {(out or Path()) / template.name}")
         return
-    catalogue = load_library(*(library or []))
-    given: dict[str, dict[str, str]] = {"columns": pairs("--column", column), "settings": pairs("--set", setting)}
-    given |= {"role": pairs("--role", role), "group": pairs("--group", group)}
-    wanted = _wanted(files, rig, out, name, catalogue, believed, resample, fill, given)
-    check_folder(wanted.folder)
-    if os.path.lexists(wanted.folder / "study.toml") and not force:
-        raise InputError("is there already; --force writes over it", file=wanted.folder / "study.toml")
-    if wanted.schema.owner is None:
+    catalogue, columns, settings = catalogue_with(library), pairs("--column", column), pairs("--set", setting)
+    schema = _schema(rig, catalogue, believed, (columns, resample, fill))
+    if resample == 0.0:
+        raise InputError("expected a rate above 0 Hz", column="--resample")
+    folder = _folder(files, out, force)
+    wanted = Wanted(
+        tuple(files),
+        schema,
+        folder,
+        name or folder.absolute().name or "study",
+        urdf=believed,
+        columns=columns,
+        kind=None if schema.owner is None else settings.pop("kind", None),
+        settings=settings,
+        labels={"role": pairs("--role", role), "group": pairs("--group", group)},
+        resample_hz=resample,
+        fill=fill,
+        ask=_ask if sys.stdin.isatty() and sys.stdout.isatty() else None,
+    )
+    if schema.owner is None:
         made = new_body_study(wanted)
     else:
-        made = make(wanted, lambda known: guess_start(wanted.schema.owner, known, believed))
+        made = make(wanted, lambda known: guess_start(schema.owner, known, believed))
     outputs = Outputs("new-study", force)
-    outputs.check(wanted.folder, made.contents)
+    outputs.check(folder, made.contents)
     study, warnings = _tried(made, wanted, catalogue)
-    outputs.write(wanted.folder, made.contents)
+    outputs.write(folder, made.contents)
     for own, theirs, unit in made.taken:
         typer.echo(f"{own:16s} is {theirs}{f', in {unit}' if unit else ''}")
-    schema = wanted.schema
     if "motion" in made.kinds and schema.outputs.get(IMPOSED) in {own for own, _, _ in made.taken}:
         typer.echo(
             f"{schema.outputs[IMPOSED]} is taken as what drives it; where the motion drives: --set kind={IMPOSED}"
         )
     typer.echo("\n".join(odd_lines(study, warnings)))
-    place = wanted.folder / "study.toml"
-    typer.echo(
-        f"wrote {place}: look at it, then run\n  {shlex.join(['fes-pin', 'check', str(wanted.folder)])}\n"
-        f"  {shlex.join(['fes-pin', 'diagnose', str(wanted.folder)])} --out answer"
-    )
+    place = shlex.quote(str(folder))
+    typer.echo(f"wrote {folder / 'study.toml'}: look at it, then run")
+    typer.echo(f"  fes-pin check {place}\n  fes-pin diagnose {place} --out answer")
 
 
 def check(
@@ -161,51 +170,26 @@ def _template(
     return None
 
 
-def _wanted(
-    files: list[Path],
-    rig: str | None,
-    out: Path | None,
-    name: str | None,
-    catalogue: Catalogue,
-    urdf: Path | None,
-    resample: float | None,
-    fill: bool,
-    given: Mapping[str, Mapping[str, str]],
-) -> Wanted:
-    from fes_pin.data.wanted import Wanted
-
-    schema = _schema(rig, catalogue, urdf)
-    if schema.owner is None and (urdf is not None or given["columns"] or resample or fill or catalogue.origins()):
-        raise InputError("expected no URDF, --column, --resample, --fill or --library for walking", column="--rig")
-    if resample == 0.0:
-        raise InputError("expected a rate above 0 Hz", column="--resample")
+def _folder(files: list[Path], out: Path | None, force: bool) -> Path:
+    """The study's folder, which can be written, and has no study.toml that must not be written over."""
     doubles = [f for k, f in enumerate(files) if f.absolute() in [g.absolute() for g in files[:k]]]
     if doubles:
         raise InputError("was named twice", file=doubles[0])
     folder = out or Path(os.path.commonpath([file.absolute().parent for file in files]))
-    settings = dict(given["settings"])
-    return Wanted(
-        files=tuple(files),
-        schema=schema,
-        folder=folder,
-        name=name or folder.absolute().name or "study",
-        urdf=urdf,
-        columns=given["columns"],
-        settings=settings,
-        kind=None if schema.owner is None else settings.pop("kind", None),
-        labels={key: given[key] for key in ("role", "group")},
-        resample_hz=resample,
-        fill=fill,
-        ask=_ask if sys.stdin.isatty() and sys.stdout.isatty() else None,
-    )
+    check_folder(folder)
+    if os.path.lexists(folder / "study.toml") and not force:
+        raise InputError("is there already; --force writes over it", file=folder / "study.toml")
+    return folder
 
 
-def _schema(rig: str | None, catalogue: Catalogue, urdf: Path | None) -> RigSchema:
-    """What is known of the rig, whose URDF is there where it needs one."""
+def _schema(rig: str | None, catalogue: Catalogue, urdf: Path | None, of_rigs: Sequence[object]) -> RigSchema:
+    """What is known of the rig, whose URDF is there where it needs one; walking takes no options `of_rigs`."""
     from fes_pin.data.schema import known_rigs, one_of
 
     rigs = known_rigs(catalogue.schemas())
     schema = rigs[one_of(rig or "joint", tuple(rigs), partial(InputError, column="--rig"))]
+    if schema.owner is None and (urdf is not None or catalogue.origins() or any(of_rigs)):
+        raise InputError("expected no URDF, --column, --resample, --fill or --library for walking", column="--rig")
     if schema.owner is not None and ("urdf" in schema.files) != (urdf is not None):
         wanted = "--urdf FILE, or --pendulum LENGTH MASS, --rod or --slide" if urdf is None else "no URDF"
         raise InputError(f"expected {wanted} for rig {schema.name}", column="--urdf")

@@ -9,9 +9,8 @@ process noise and the measurement noise of the force.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
-from hashlib import blake2b
 
 import numpy as np
 
@@ -86,30 +85,17 @@ def driving_values(trial: Trial, name: str, columns: tuple[str, ...]) -> np.ndar
 
 
 def _smoothed(trial: Trial, columns: tuple[str, ...]) -> ImposedMotion:
-    measured = [_Reading.of(trial, n) for n in columns if n in trial]
-    values, std, bandwidth = _rates(measured[0])
+    measured = [(trial[n].tobytes(), trial.time.tobytes()) for n in columns if n in trial]
+    values, std, bandwidth = _rates(*measured[0])
     if len(measured) > 1:
-        rate, rate_std, bandwidth = _rates(measured[1])
+        rate, rate_std, bandwidth = _rates(*measured[1])
         values, std = np.stack([values[0], rate[0], rate[1]]), np.array([std[0], rate_std[0], rate_std[1]])
     return ImposedMotion(values, (float(std[0]), float(std[1]), float(std[2])), bandwidth)
 
 
-@dataclass(frozen=True)
-class _Reading:
-    """A column with its times, known by what they hold: a trial with some outputs hidden has the same motion."""
-
-    content: bytes
-    values: np.ndarray = field(compare=False)
-    time: np.ndarray = field(compare=False)
-
-    @classmethod
-    def of(cls, trial: Trial, name: str) -> _Reading:
-        values, time = (np.ascontiguousarray(x, dtype=float) for x in (trial[name], trial.time))
-        return cls(blake2b(values.tobytes() + time.tobytes()).digest(), values, time)
-
-
 @lru_cache(maxsize=REMEMBERED)
-def _rates(reading: _Reading) -> tuple[np.ndarray, np.ndarray, float]:
+def _rates(reading: bytes, time: bytes) -> tuple[np.ndarray, np.ndarray, float]:
+    """What `smoothed_rates` gives of numbers and times; a trial with some outputs hidden has the same motion."""
     from fes_pin.data.smooth import smoothed_rates  # noqa: PLC0415 - half a second of SciPy, for imposed motion alone
 
-    return smoothed_rates(reading.values, reading.time)
+    return smoothed_rates(np.frombuffer(reading), np.frombuffer(time))

@@ -15,7 +15,7 @@ from typing import Any
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import inside, read_bytes
-from fes_pin.data.read_only import ReadOnly
+from fes_pin.data.read_only import ReadOnly, as_dicts
 from fes_pin.data.study import Study
 from fes_pin.settings import source_date
 
@@ -50,8 +50,7 @@ class Provenance(ReadOnly):
 
     def record(self) -> dict[str, Any]:
         """As a dictionary for JSON."""
-        found = {"date": self.date, "versions": dict(self.versions), "inputs": dict(self.inputs), "seed": self.seed}
-        return {**found, "command": self.command} if self.command else found
+        return {name: value for name, value in as_dicts(vars(self)).items() if name != "command" or value}
 
 
 def this_command() -> str:
