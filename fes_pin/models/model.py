@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from fes_pin.data.errors import InputError, fault_at
 from fes_pin.data.numbers import instance, shortened
 from fes_pin.data.schema import check_known
-from fes_pin.data.show import frame, table_html
+from fes_pin.data.show import by_columns, frame, table_html
 from fes_pin.data.trial import Trial
 from fes_pin.models.parameters import ParameterInfo
 from fes_pin.models.rigs.base import Rig
@@ -142,15 +142,9 @@ class Model:
 
     def to_frame(self) -> pandas.DataFrame:
         """Every parameter with its value, unit and bounds as a frame of pandas; see `data.show.frame`."""
-        info, values = self.parameter_info(), self.parameters()
-        columns = {
-            "parameter": list(values),
-            "value": list(values.values()),
-            "unit": [info[n].unit for n in values],
-            "lower": [info[n].lower for n in values],
-            "upper": [info[n].upper for n in values],
-        }
-        return frame(columns, index="parameter")
+        info, head = self.parameter_info(), ("parameter", "value", "unit", "lower", "upper")
+        rows = [(n, v, info[n].unit, info[n].lower, info[n].upper) for n, v in self.parameters().items()]
+        return frame(by_columns(head, rows), index="parameter")
 
     def __str__(self) -> str:
         info = self.parameter_info()
