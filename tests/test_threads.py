@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
-from models.cases import RIGS, trial
+from models.cases import RIGS, forget_programs, trial
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from fes_pin import workers
@@ -100,7 +100,7 @@ def test_models_are_compiled_and_run_side_by_side(engine, monkeypatch):
         return np.column_stack([simulated[n] for n in model.rig.outputs(one.kind)])
 
     alone = [run(case) for case in cases]
-    program.forget_programs()
+    forget_programs()
     with ThreadPoolExecutor(THREADS) as pool:
         together = list(pool.map(run, cases))
     for one, other in zip(alone, together, strict=True):

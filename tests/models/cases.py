@@ -3,6 +3,7 @@
 import numpy as np
 
 from fes_pin.data.trial import Trial
+from fes_pin.models.compile import program
 from fes_pin.models.effects import EFFECTS, effects_for
 from fes_pin.models.model import Model
 from fes_pin.models.rigs import Ankle, Joint, Muscle
@@ -116,3 +117,9 @@ def jitter(rng, values, info):
         away = value + 0.2 * info[name].scale * rng.uniform(-1.0, 1.0) if info[name].fitted else value
         out[name] = min(max(away, info[name].lower), info[name].upper)
     return out
+
+
+def forget_programs():
+    """Drop the programs that are kept in memory, as if this process had just begun; those on disk stay."""
+    program._PROGRAMS.clear()
+    program._say_slow.cache_clear()

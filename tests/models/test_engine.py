@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import llvmlite.binding as llvm
 import numpy as np
 import pytest
-from models.cases import CASES, KINDS, RIGS, everything, jitter, name_of, trial, with_effect
+from models.cases import CASES, KINDS, RIGS, everything, forget_programs, jitter, name_of, trial, with_effect
 
 from fes_pin import settings
 from fes_pin.data.errors import InputError
@@ -87,7 +87,7 @@ def test_the_guess_is_not_written_to():
 @pytest.fixture
 def fresh(monkeypatch, tmp_path):
     """No program in memory, and a cache folder of its own."""
-    program.forget_programs()
+    forget_programs()
     monkeypatch.setenv("FES_PIN_CACHE", str(tmp_path / "cache"))
     return tmp_path / "cache"
 
@@ -136,7 +136,7 @@ def test_all_effects_at_once_are_the_same_in_generic_code(monkeypatch, rig, kind
 @pytest.mark.parametrize("error", [RuntimeError("no such\nprocessor"), NotImplementedError("CasADi operation 99")])
 def test_where_nothing_compiles_the_virtual_machine_runs_and_says_so_once(fresh, monkeypatch, caplog, error):
     expected = answer()
-    program.forget_programs()
+    forget_programs()
 
     def broken(*_):
         raise error
@@ -154,7 +154,7 @@ def test_where_nothing_compiles_the_virtual_machine_runs_and_says_so_once(fresh,
 def test_programs_are_kept_on_disk(fresh, monkeypatch):
     expected = answer()
     assert len(list(fresh.iterdir())) == 1
-    program.forget_programs()
+    forget_programs()
     monkeypatch.setattr(native, "compile_equations", None)  # would raise if called
     assert np.array_equal(answer(), expected)
 
@@ -167,14 +167,14 @@ def test_a_damaged_cache_is_ignored_and_mended(fresh, damage):
     flipped = bytearray(whole)
     flipped[len(whole) // 2] ^= 0x10
     entry.write_bytes({"empty": b"", "cut": whole[:-100], "flipped": bytes(flipped), "text": b"no"}[damage])
-    program.forget_programs()
+    forget_programs()
     assert np.array_equal(answer(), expected)
     assert entry.read_bytes() == whole
 
 
 def test_a_cache_that_cannot_be_written_is_no_error(fresh, monkeypatch):
     expected = answer()
-    program.forget_programs()
+    forget_programs()
     fresh.parent.joinpath("a file").write_text("")
     monkeypatch.setenv("FES_PIN_CACHE", str(fresh.parent / "a file" / "cache"))
     assert np.array_equal(answer(), expected)

@@ -75,13 +75,6 @@ def compiled_program(model: Model, layout: Layout) -> Program:
     return _PROGRAMS[key]
 
 
-def forget_programs() -> None:
-    """Drop the programs that are kept in memory, as if this process had just begun; those on disk stay."""
-    with _LOCK:
-        _PROGRAMS.clear()
-        _say_slow.cache_clear()
-
-
 def derived(model: Model, layout: Layout) -> Equations:
     """The equations of a simulation, or of a predictor where the layout has measured outputs.
 
