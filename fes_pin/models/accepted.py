@@ -1,4 +1,4 @@
-"""What a model is simulated on or fitted to: checked once, where a public verb is entered."""
+"""Checks of the trials on which a model is simulated or fitted, made once where a public function is entered."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from fes_pin.models.model import Model
 
 
 def accepted_trials(model: Model, trials: Trial | Iterable[Trial], inputs_only: bool = True) -> tuple[Trial, ...]:
-    """The trials, if the model's rig can have them; see `check_trial`.
+    """Return the trials, if the model's rig can have them; see `check_trial`.
 
     Parameters
     ----------
     trials
-        One, or any number but none.
+        One trial, or several.
     inputs_only
-        Do not require what is measured.
+        Whether outputs may be missing.
 
     Raises
     ------
     InputError
-        No model, no trials; a kind, a column or a condition that the rig does not have, or lacks; values in another
-        unit.
+        If there is no model or no trial; for a kind, column or condition that the rig does not have, or that is
+        missing; for values in another unit.
     """
     instance(model, Model, "model")
     given = (trials,) if isinstance(trials, Trial) else tuple(trials) if isinstance(trials, Iterable) else (trials,)

@@ -1,9 +1,9 @@
-"""Autoregressive measurement noise: a model of a filter's innovations, in units of their deviation.
+"""Autoregressive measurement noise: a model of standardised innovations x_t.
 
     x_t = a_1 x_(t-1) + ... + a_p x_(t-p) + e_t,    e_t of unit variance
 
-Where nothing acts at random on a rig the filter is the free simulation, and x is the noise of the reading itself. Where
-something does, x is white if the reading's noise is.
+Without process noise the filter is a free simulation, and x is the measurement noise itself. With process noise, x is
+white if the measurement noise is.
 
 The first samples, which have fewer before them, are predicted by the best predictors of lower orders k, with errors of
 variances v_k (Levinson's recursion backwards, c the last coefficient of each):
@@ -20,11 +20,11 @@ from functools import cache
 import numpy as np
 
 REACH = 400
-"""Samples ahead after which past noise predicts nothing: a sensor's noise has a correlation time of tens."""
+"""Samples ahead beyond which past noise predicts nothing: the noise of a sensor is correlated over tens of samples."""
 
 
 def innovations_of(x: np.ndarray, ar: tuple[float, ...]) -> np.ndarray:
-    """Innovations of autoregressive noise, or their sensitivities from those of the noise; shape (n, ...)."""
+    """Return innovations of autoregressive noise, or their sensitivities from those of the noise; shape (n, ...)."""
     if x.ndim == 1:
         out = np.convolve(x, [1.0, *(-a for a in ar)])[: len(x)]
     else:
@@ -38,7 +38,7 @@ def innovations_of(x: np.ndarray, ar: tuple[float, ...]) -> np.ndarray:
 
 @cache
 def _first(ar: tuple[float, ...]) -> np.ndarray:
-    """The map from the first samples to their innovations, shape (p, p): row t is a predictor of order t."""
+    """Return the map from the first samples to their innovations, shape (p, p): row t is a predictor of order t."""
     predictors, variances = beginning(ar)
     out = np.eye(len(ar))
     for t, own in enumerate(predictors):
@@ -48,12 +48,12 @@ def _first(ar: tuple[float, ...]) -> np.ndarray:
 
 @cache
 def beginning(ar: tuple[float, ...]) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
-    """The best predictors of each of the first samples from those before, and the variances of their errors.
+    """Return the best predictors of each of the first samples from those before, and the variances of their errors.
 
     Returns
     -------
     predictors
-        Of orders 0, 1, ... below that of the autoregression.
+        Predictors of orders 0, 1, ... below that of the autoregression.
     variances
         Shape (p,).
     """
@@ -68,12 +68,12 @@ def beginning(ar: tuple[float, ...]) -> tuple[tuple[np.ndarray, ...], np.ndarray
 
 
 def stationary_variance(ar: tuple[float, ...]) -> float:
-    """Of noise whose innovations have unit variance."""
+    """Return the stationary variance of noise whose innovations have unit variance."""
     return float(beginning(ar)[1][0]) if ar else 1.0
 
 
 def weights_ahead(ar: tuple[float, ...], count: int) -> np.ndarray:
-    """Weights of past samples, the newest first, in predictions of the next `count` samples, shape (count, p).
+    """Return weights of past samples, the newest first, in predictions of the next `count` samples, shape (count, p).
 
     Row k is the first row of the companion matrix to the power of k + 1.
     """
@@ -87,23 +87,23 @@ def weights_ahead(ar: tuple[float, ...], count: int) -> np.ndarray:
 
 @cache
 def _ahead(ar: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """`weights_ahead`, and the variance of their errors, shape (`REACH`,)."""
+    """Return `weights_ahead`, and the variance of the errors, shape (`REACH`,)."""
     rows = weights_ahead(ar, REACH)
     return rows, np.cumsum(np.append(1.0, rows[:-1, 0] if ar else np.zeros(REACH - 1)) ** 2)
 
 
 def noise_ahead(x: np.ndarray, seen: np.ndarray, ar: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """Prediction of noise from its past where that was measured, and the variance of the error, shape (n,) each.
+    """Return the prediction of noise from its measured past, and the variance of its error, shape (n,) each.
 
     Parameters
     ----------
     x
-        Shape (n,); anything where it was not seen.
+        The noise, shape (n,); arbitrary where it was not measured.
     seen
-        Shape (n,).
+        Whether it was measured, shape (n,).
     """
     order, (rows, growth) = len(ar), _ahead(ar)
-    known = np.append(np.zeros(order), np.where(seen, x, 0.0))  # nothing is known of what was before
+    known = np.append(np.zeros(order), np.where(seen, x, 0.0))  # samples before the trial are unknown
     ends = np.flatnonzero(np.diff(np.concatenate([[True], seen, [True]]).astype(int)))
     for begin, end in ends.reshape(-1, 2):
         count = min(end - begin, REACH)

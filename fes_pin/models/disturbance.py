@@ -1,8 +1,8 @@
-"""What acts on a rig at random: an effort that no cause explains, and slow wandering of a reading.
+"""Process noise of a rig: a random effort, and a slowly wandering reading.
 
-Both are first-order processes, e' = -e / time + white noise, of stationary deviation std. They are effects like any
-other, but of no library: noise is never named as a cause. Their deviations and times are no parameters of a model;
-they are constants of a predictor (`models.predictor.StateSpaceNoise`), as reading noise is.
+Both are first-order processes, e' = -e / time + white noise, of stationary standard deviation std. They are effects
+that belong to no library, as noise is never named as a cause. Their deviations and times are no parameters of a model
+but constants of a predictor (`models.predictor.StateSpaceNoise`), as measurement noise is.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from fes_pin.models.stage import Effect, Stage
 
 @dataclass(frozen=True)
 class RandomProcess(Effect):
-    """A process of first order that is added to a signal."""
+    """A first-order process that is added to a signal."""
 
     def apply(self, value: Any, s: Any) -> Any:
         return value + getattr(s.own, self.states[0])
@@ -45,7 +45,7 @@ class RandomEffort(RandomProcess):
 
 @dataclass(frozen=True)
 class RandomForce(RandomProcess):
-    """A random force of a muscle that is held."""
+    """A random force of an isometric muscle."""
 
     name, stage, signal, rigs = "random_force", Stage.MUSCLE, "pull", ("ankle", "muscle")
     states, random = ("force",), ("std.force", "time.force")
@@ -64,7 +64,7 @@ DISTURBANCES = (RandomEffort, RandomForce, WanderingReading)
 
 
 def disturbed(model: Model, kind: str, processes: Sequence[str]) -> Model:
-    """The model with those of the processes that a kind of trial can feel; a random force only where no joint moves."""
+    """Return the model with the processes that act in a kind of trial; a random force only where no joint moves."""
     signals = model.rig.signals(kind)
     for one in DISTURBANCES:
         moves = one is RandomForce and RandomEffort.signal in signals and model.rig.takes(RandomEffort)

@@ -1,8 +1,7 @@
-"""Functions of a rig's own state, input and time as efforts and as errors of the reading, to seek a remainder by.
+"""Features of the test of lack of fit: functions of state, input and time that act as efforts or on the reading.
 
-They are effects like any other, of no library. They are functions of what the model itself holds at each instant. In a
-one-step predictor that is what was known before the sample it predicts, so that features are independent of the noise
-that they are judged against.
+They are effects that belong to no library, and functions of the states of the model at each instant. In a one-step
+predictor these are estimated from earlier samples, so that features are independent of the noise of the test.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ from fes_pin.models.parameters import parameter
 from fes_pin.models.stage import Effect, Stage
 
 SHARP = 10.0
-"""Of a smoothed sign: it turns within a tenth of the range."""
+"""Steepness of a smoothed sign: it changes within a tenth of the range."""
 
 FeatureFunction = Callable[[Any], Any]
 
@@ -76,7 +75,7 @@ READINGS: Mapping[str, FeatureFunction] = {
 }
 """Features as a part of the reading."""
 SCALES = ("centre", "reach", "speed", "drive", "duration")
-"""What the variables are counted from and in: see `_Features.scaled`."""
+"""Origins and units of the variables: see `_Features.scaled`."""
 
 
 class _Features(Effect):
@@ -92,7 +91,7 @@ class _Features(Effect):
         return value
 
     def scaled(self, s: Any) -> SimpleNamespace:
-        """Angle, rate, drive, activation and time, each from about -1 to 1."""
+        """Return angle, rate, drive, activation and time, each from about -1 to 1."""
         drive = next((getattr(s.u, n) for n in ("effort", "pulse_width_us", "stim") if hasattr(s.u, n)), 0.0)
         centre, reach, speed, most, duration = (getattr(self, n) for n in SCALES)
         return SimpleNamespace(

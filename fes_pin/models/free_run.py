@@ -1,4 +1,4 @@
-"""Measured trials by free simulation: one-step predictions where nothing acts at random on a rig."""
+"""One-step predictions of measured trials without process noise: a free simulation."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from fes_pin.models.simulate import EachTrial, Simulator, Values
 
 
 class FreeRun:
-    """A model structure on measured trials, simulated from its inputs alone for any values of its parameters.
+    """A free simulation of measured trials for any values of a model's parameters.
 
-    It gives what `Predictor` gives where a state is known exactly: nothing that is read changes it.
+    It gives the same as a `Predictor` without process noise, in which readings do not correct the state.
 
     Parameters
     ----------
     model
         Its structure and constants are used; the values of its parameters are given to `run`.
     trials
-        What was measured; a sample that is NaN was not.
+        Measured trials; samples that were not measured are NaN.
     columns
-        Parameters, and unknowns of trials and effects, to give sensitivities for.
+        Parameters, and unknowns of trials and effects, of the sensitivities.
     correlation_s
-        How long the noise of a reading lasts; see `StateSpaceNoise`.
+        Correlation time of measurement noise, s; see `StateSpaceNoise`.
     """
 
     def __init__(
@@ -56,6 +56,6 @@ class FreeRun:
 
 
 def with_noise(one: PredictedTrial, noise: StateSpaceNoise) -> PredictedTrial:
-    """A trial that was simulated under another noise of its readings."""
+    """Return a simulated trial with another measurement noise."""
     white, ar = tuple(noise.white[n] for n in one.outputs), tuple(noise.ar.get(n, ()) for n in one.outputs)
     return replace(one, variances=one.variances * np.square(np.divide(white, one.white)), white=white, ar=ar)

@@ -1,4 +1,4 @@
-"""Linear least squares that ends with an answer, whatever the columns' sizes."""
+"""Linear least squares that does not fail for columns of extreme sizes."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import numpy as np
 
 
 def least_squares(columns: np.ndarray, wanted: np.ndarray, rcond: float = 1e-9) -> np.ndarray:
-    """The shortest x, in units of the columns' sizes, with the least squares of `columns @ x - wanted`.
+    """Return the shortest x, in units of the columns' sizes, that minimises |`columns @ x - wanted`|.
 
-    Columns are scaled to a largest entry of 1 first: squares of huge sensitivities, as of a joint that falls, would
-    leave the floating-point numbers, and the singular value decomposition with them.
+    Columns are first scaled to a largest entry of 1: squares of huge sensitivities, as of a joint that falls, would
+    overflow, and the singular value decomposition would fail.
 
     Parameters
     ----------

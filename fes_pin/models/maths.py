@@ -50,7 +50,7 @@ def power(x: Any, exponent: Any, least: float) -> Any:
 
 
 def play(follower: Any, position: Any, half_width: Any) -> Any:
-    """What follows a position once the slack on its side is taken up: clip(follower, position -+ half_width).
+    """Return the position of a follower with play: clip(follower, position -+ half_width).
 
     Strict comparisons, unlike those of `clip`, keep the derivative of the side that pulls also at half width 0.
     """
@@ -59,7 +59,7 @@ def play(follower: Any, position: Any, half_width: Any) -> Any:
 
 
 def lag(target: Any, state: Any, time_constant: Any, step: Any) -> tuple[Any, Any]:
-    """First-order low pass of `target` that is exact at time constant 0 and never stiff.
+    """Return a first-order low pass of `target` that is exact at time constant 0 and never stiff.
 
     With e = (T^8 + (h/2)^8)^(1/8), h the integration step: x' = (target - x) / e, out = target - T x'.
     The transfer function (1 + (e - T) s) / (1 + e s) has the low pass's delay T. It differs from the low pass where T
@@ -76,7 +76,7 @@ def lag(target: Any, state: Any, time_constant: Any, step: Any) -> tuple[Any, An
 
 
 def lag_time(time_constant: Any, step: Any) -> Any:
-    """By how much the state of `lag` is late: e, s."""
+    """Return the delay of the state of `lag`: e, s."""
     shortest = 0.5 * step
     ratio = time_constant / shortest
     fourth = ratio * ratio * ratio * ratio

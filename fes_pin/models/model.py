@@ -64,42 +64,42 @@ class Model:
         return Model(self.rig, tuple(e for e in self.effects if e.name != name))
 
     def parameters(self) -> dict[str, float]:
-        """The value of every parameter that all trials share, by name."""
+        """Return the value of every parameter that all trials share, by name."""
         values = {n: float(getattr(self.rig, n)) for n in self.rig.parameters()}
         return values | {f"{e.name}.{n}": float(getattr(e, n)) for e in self.effects for n in e.common()}
 
     def parameter_info(self) -> dict[str, ParameterInfo]:
-        """Every parameter's unit, null, bounds and scale, by name."""
+        """Return unit, null, bounds and scale of every parameter, by name."""
         own = {f"{e.name}.{n}": e.parameters()[n] for e in self.effects for n in e.common()}
         return {n: one.in_units(self.rig.units()) for n, one in {**self.rig.parameters(), **own}.items()}
 
     def own_unknowns(self) -> tuple[str, ...]:
-        """Names of what each trial must estimate for itself because an effect says so."""
+        """Return the names of each trial's own unknowns that belong to effects."""
         return tuple(f"{e.name}.{n}" for e in self.effects for n in e.unknowns())
 
     def unknowns(self, kind: str) -> tuple[str, ...]:
-        """Names of what each trial of a kind must estimate for itself: its initial state, and what effects say."""
+        """Return the names of each trial's own unknowns: of its initial state, and of effects."""
         return (*self.rig.unknowns(kind), *self.own_unknowns())
 
     def own_nulls(self) -> dict[str, float]:
-        """What is known before of those that effects bring: their nulls."""
+        """Return start values of the unknowns of effects: their nulls."""
         return {f"{e.name}.{n}": float(getattr(e, n)) for e in self.effects for n in e.unknowns()}
 
     def initial_unknowns(self, trial: Trial) -> dict[str, float]:
-        """Unknowns of a trial as its first samples suggest, and what is known before of those of effects."""
+        """Return start values of a trial's unknowns, from its first samples, and those of effects at their nulls."""
         return {**self.rig.initial_unknowns(trial), **self.own_nulls()}
 
     def fitted_parameters(self) -> tuple[str, ...]:
-        """What a fit moves: the rig's fitted parameters, and of the effects' all but choices and unused forms."""
+        """Return the parameters that a fit moves: those of the rig and of effects, without choices and unused forms."""
         own = (f"{e.name}.{n}" for e in self.effects for n in e.fitted_parameters())
         return (*self.rig.fitted_parameters(), *own)
 
     def unused_parameters(self) -> dict[str, float]:
-        """Values, by name, of the parameters that belong to forms of effects that are switched off."""
+        """Return the values, by name, of parameters of effects' forms that are switched off."""
         return {f"{e.name}.{n}": value for e in self.effects for n, value in e.unused().items()}
 
     def with_parameters(self, values: Mapping[str, float]) -> Model:
-        """The same model with other values.
+        """Return the same model with other values.
 
         Raises
         ------
@@ -117,17 +117,17 @@ class Model:
         return Model(rig, tuple(effects))
 
     def acting(self, kind: str, inputs: tuple[str, ...] | None = None) -> Model:
-        """The same model without the effects that a kind of trial, with these input columns, cannot feel."""
+        """Return the same model without the effects that do not act in a kind of trial with these input columns."""
         signals = self.rig.signals(kind) if inputs is None else self.rig.changeable(kind, inputs)
         return Model(self.rig, tuple(e for e in self.effects if e.signal in signals))
 
     def driven_by(self, trial: Trial) -> tuple[str, ...]:
-        """Names of what drives the rig in a trial, and of columns that effects which it can feel read besides."""
+        """Return the columns that drive the rig in a trial, and those that effects which act in it read."""
         felt = self.acting(trial.kind, self.rig.input_columns(trial)).effects
         return tuple(dict.fromkeys([*self.rig.driven_by(trial), *(n for e in felt for n in e.inputs)]))
 
     def structure(self) -> tuple[str, ...]:
-        """The rig and the effects, not their values."""
+        """Return the names of the rig and of the effects."""
         return (self.rig.name, *(f"{e.name} of each trial" if e.each_trial else e.name for e in self.effects))
 
     def __repr__(self) -> str:
@@ -141,7 +141,7 @@ class Model:
         return table_html(f"{' + '.join(self.structure())} model", ("parameter", "value", "unit"), rows)
 
     def to_frame(self) -> pandas.DataFrame:
-        """Every parameter with its value, unit and bounds as a frame of pandas; see `data.show.frame`."""
+        """Return every parameter with its value, unit and bounds as a pandas frame; see `data.show.frame`."""
         info, head = self.parameter_info(), ("parameter", "value", "unit", "lower", "upper")
         rows = [(n, v, info[n].unit, info[n].lower, info[n].upper) for n, v in self.parameters().items()]
         return frame(by_columns(head, rows), index="parameter")

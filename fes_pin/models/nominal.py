@@ -1,4 +1,4 @@
-"""The model that a study believes: its rig with the start values."""
+"""The nominal model of a study: its rig with the start values."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from fes_pin.models.rigs.rigid import joint_inertia, load_urdf
 from fes_pin.models.session import session_of
 
 RUN_OUT_S = 10.0
-"""Seconds in which a joint of a laboratory about runs out: inertia over damping, a start value."""
+"""Typical time constant in s of a laboratory's joint, inertia over damping: a start value."""
 
 
 def nominal_model(study: Study) -> Model:
-    """The nominal model of a study, with its start values.
+    """Return the nominal model of a study, with its start values.
 
     Raises
     ------
@@ -35,7 +35,7 @@ def nominal_model(study: Study) -> Model:
 
 
 def rig_of(study: Study) -> type[Rig]:
-    """The rig that a study is of.
+    """Return the rig of a study.
 
     Raises
     ------
@@ -49,14 +49,14 @@ def rig_of(study: Study) -> type[Rig]:
 
 
 def guess_start(rig: type[Rig], known: Mapping[str, float], urdf: Path | None = None) -> dict[str, float]:
-    """Start values of what a rig's nominal model fits, where nobody gave any: only their size matters.
+    """Return start values of a rig's fitted parameters where none are given: only their size matters.
 
     Parameters
     ----------
     known
-        Numbers of the rig that were given.
+        Given numbers of the rig.
     urdf
-        Of a joint.
+        The URDF of a joint.
 
     Raises
     ------

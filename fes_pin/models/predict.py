@@ -11,11 +11,11 @@ from fes_pin.models.simulate import simulate
 
 
 def predict(model: Model, trial: Trial) -> Trial:
-    """What the model predicts for a trial: its time and the predicted output columns.
+    """Predict a trial from its inputs: return its time and the predicted output columns.
 
-    A joint begins where the model, its sensor included, reads the first sample of `position`, at the first sample of
-    `velocity`; or at the conditions `position0` and `velocity0`, which are the joint's own, not readings. A velocity
-    that is missing is estimated from the first 0.2 s. Nothing else of the outputs is used.
+    The initial state of a joint is that at which the model, its sensor included, reads the first samples of `position`
+    and `velocity`; or it is given by the conditions `position0` and `velocity0`, which are not readings. A missing
+    velocity is estimated from the first 0.2 s. Outputs are not used otherwise.
 
     Raises
     ------

@@ -13,10 +13,7 @@ from fes_pin.models.autoregression import beginning, innovations_of
 
 
 class PredictedOutput(NamedTuple):
-    """Prediction of an output, measured or not, and the variance of its error if the model is right.
-
-    Both have shape (n,).
-    """
+    """Prediction of an output, measured or not, and the variance of its error by noise alone; shape (n,) each."""
 
     values: np.ndarray
     variances: np.ndarray
@@ -24,18 +21,18 @@ class PredictedOutput(NamedTuple):
 
 @dataclass(frozen=True)
 class Readings:
-    """The readings of one trial, whatever their prediction.
+    """The readings of one trial that enter the likelihood.
 
     Attributes
     ----------
     outputs
         The measured columns, in the order of the arrays.
     seen
-        Shape (n, outputs): True where something was measured that is judged: a reading that hunts between two counts is
-        only followed, see `fes_pin.data.counts.hunts`.
+        Shape (n, outputs): True where a measurement enters the likelihood. A reading that hunts between two counts does
+        not: the filter follows it only, see `fes_pin.data.counts.hunts`.
     repeats
-        Shape (n, outputs): how often the same count was read in a row, n; together they are one reading. 1 for outputs
-        that are not read in counts: a value that a log holds or interpolates is constant for other reasons.
+        Shape (n, outputs): number of equal counts in a row, n, which together are one reading. It is 1 for outputs that
+        are not read in counts: a value that a log holds or interpolates is constant for other reasons.
     """
 
     outputs: tuple[str, ...]
@@ -44,21 +41,21 @@ class Readings:
 
     @cached_property
     def all_seen(self) -> bool:
-        """Whether every sample of every output is judged."""
+        """Whether every sample of every output enters the likelihood."""
         return bool(self.seen.all())
 
     @cached_property
     def again(self) -> np.ndarray:
-        """Share of each reading's noise that repeats an earlier one, 1 - 1 / n, shape (m,) of what is seen."""
+        """Share of each seen reading's noise that repeats an earlier one, 1 - 1 / n, shape (m,)."""
         return np.asarray(1.0 - 1.0 / self.of_seen(self.repeats))
 
     @cached_property
     def repeated(self) -> np.ndarray:
-        """Places, among what is seen, of readings whose noise repeats an earlier one."""
+        """Places, among the seen readings, of those whose noise repeats an earlier one."""
         return np.flatnonzero(self.again)
 
     def of_seen(self, array: np.ndarray) -> np.ndarray:
-        """What is seen of an array of shape (n, outputs, ...), sample by sample; a view of it where that is all."""
+        """Return the seen entries of an array (n, outputs, ...), sample by sample; a view where all are seen."""
         return array.reshape(self.seen.size, *array.shape[2:]) if self.all_seen else array[self.seen]
 
 
@@ -69,17 +66,17 @@ class PredictedTrial:
     Attributes
     ----------
     readings
-        What was measured.
+        The readings that enter the likelihood.
     values
-        Shape (n, outputs): measurements minus their one-step predictions; 0 where that is not judged.
+        Shape (n, outputs): innovations, measurements minus their one-step predictions; 0 where there is no reading.
     variances
-        Shape (n, outputs).
+        Shape (n, outputs): variances of the innovations.
     sensitivities
-        Shape (n, outputs, columns): derivatives of `values`, for gains as they are.
+        Shape (n, outputs, columns): derivatives of `values` at constant filter gains.
     white
-        Deviation of the reading noise of each output.
+        Standard deviation of the measurement noise of each output.
     ar
-        Autoregression of each output's `values` over their deviations; all are white if there is none.
+        Autoregression of each output's standardised `values`; all are white if there is none.
     """
 
     readings: Readings
@@ -96,12 +93,12 @@ class PredictedTrial:
 
     @property
     def seen(self) -> np.ndarray:
-        """Shape (n, outputs): True where something was measured that is judged."""
+        """Shape (n, outputs): True where a measurement enters the likelihood."""
         return self.readings.seen
 
     @property
     def repeated_noise(self) -> np.ndarray:
-        """Variances of repeated noise as `variances` holds them, by reading: the variance of one reading times n."""
+        """Variances of repeated noise, as they are in `variances`, by reading: the variance of one reading times n."""
         at = self.readings.repeated
         return np.asarray(self.of_seen(self.readings.repeats * np.square(self.white))[at]) if len(at) else np.zeros(0)
 
@@ -111,26 +108,26 @@ class PredictedTrial:
 
     @cached_property
     def seen_variances(self) -> np.ndarray:
-        """Variances of what was seen, shape (m,)."""
+        """Variances of the seen readings, shape (m,)."""
         return np.ascontiguousarray(self.of_seen(self.variances))
 
     def cost(self) -> float:
-        """Twice the negative log-likelihood, but for n log(2 pi); infinite where the prediction runs away."""
+        """Return twice the negative log-likelihood without n log(2 pi); infinite where the prediction diverges."""
         with np.errstate(all="ignore"):
             total = float(np.sum(self.costs()))
         return total if math.isfinite(total) and bool((self.seen_variances > 0).all()) else math.inf
 
     def costs(self) -> np.ndarray:
-        """The cost of every reading that was seen, shape (m,)."""
+        """Return the cost of every seen reading, shape (m,)."""
         residual, logs = self.whitened
         return np.asarray(residual**2 + logs)
 
     @cached_property
     def whitened(self) -> tuple[np.ndarray, np.ndarray]:
-        """Residuals over deviations and logarithms of variances; of what was seen.
+        """Standardised innovations and logarithms of variances of the seen readings.
 
-        n equal readings have one error, and the determinant holds its logarithm n times: the repeated ones are taken
-        off.
+        n equal readings have one error, and the determinant has its logarithm n times: the repeated ones are
+        subtracted.
         """
         logs = np.log(self.seen_variances)
         if any(self.ar):
@@ -140,7 +137,7 @@ class PredictedTrial:
         return self.over_deviations(self.values), logs
 
     def _growth(self) -> np.ndarray:
-        """Logarithms of variances of the first innovations, which have fewer samples before them: (n, outputs)."""
+        """Return logarithms of variances of the first innovations, predicted from fewer samples: (n, outputs)."""
         out = np.zeros(self.variances.shape)
         for k, ar in enumerate(self.ar):
             first = np.log(beginning(ar)[1])[: len(out)]
@@ -148,7 +145,7 @@ class PredictedTrial:
         return out
 
     def over_deviations(self, array: np.ndarray) -> np.ndarray:
-        """What is seen of an array (n, outputs, ...) over deviations, less its prediction by autoregressive noise."""
+        """Return the seen entries of an array (n, outputs, ...), standardised and whitened by autoregressive noise."""
         if not any(self.ar):
             deviations = self._deviations.reshape(-1, *[1] * (array.ndim - 2))
             return np.asarray(self.of_seen(array) / deviations)

@@ -1,4 +1,4 @@
-"""One-step-ahead prediction of measured trials, with sensitivities: innovations and their variances."""
+"""One-step predictions of measured trials with sensitivities: innovations and their variances."""
 
 from __future__ import annotations
 
@@ -26,25 +26,25 @@ from fes_pin.models.simulate import Block, EachTrial, OnTrials, Values, max_step
 class StateSpaceNoise(ReadOnly, Mapping[str, Noise]):
     """Process noise of a rig, and measurement noise of its readings.
 
-    By output column it holds the noise of a reading.
+    As a mapping it holds the measurement noise by output column.
 
     Attributes
     ----------
     white
         Standard deviation of the white noise of each output, in its unit, by column name.
     std, time
-        Stationary standard deviation and time constant (s) of each first-order random process that acts, by its name:
-        "effort" at the joint, "force" of a held muscle, "reading" of the first output.
+        Stationary standard deviation and time constant (s) of each first-order random process, by its name: "effort"
+        at the joint, "force" of a held muscle, "reading" of the first output.
     correlation_s
-        How long the noise of a reading lasts, s: what is read within that time says nothing new, see
-        `identify.correlation_time`. 0 where the noise of every sample is its own.
+        Correlation time of measurement noise, s: one reading in that time enters the likelihood, see
+        `identify.correlation_time`. It is 0 where the noise of every sample is new.
     ar
-        Autoregression of what the filter leaves of each output, by column name; `white` is then the deviation of its
-        innovations. See `models.autoregression`.
+        Autoregression of the innovations of each output, by column name; `white` is then the standard deviation of its
+        own innovations. See `models.autoregression`.
     still
-        Random processes that stay as small as they are.
+        Names of random processes whose size is fixed at a negligible value.
     timed
-        Those whose time constant is given, and stays.
+        Names of random processes whose time constant is fixed.
     """
 
     white: Mapping[str, float]
@@ -57,16 +57,16 @@ class StateSpaceNoise(ReadOnly, Mapping[str, Noise]):
 
     @property
     def processes(self) -> tuple[str, ...]:
-        """The random processes that there are."""
+        """Names of the random processes."""
         return tuple(self.std)
 
     @property
     def acting(self) -> tuple[str, ...]:
-        """Those that do something: all but `still`."""
+        """Names of the random processes that have an effect: all but `still`."""
         return tuple(n for n in self.std if n not in self.still)
 
     def with_values(self, values: Mapping[str, float]) -> StateSpaceNoise:
-        """The same with other values, by name as in `parameters`."""
+        """Return the same noise with other values, by name as in `parameters`."""
         parts = {part: dict(getattr(self, part)) for part in ("white", "std", "time")}
         for name, value in values.items():
             part, _, which = name.partition(".")
@@ -91,27 +91,27 @@ class StateSpaceNoise(ReadOnly, Mapping[str, Noise]):
         return self.correlation_s
 
     def parameters(self) -> dict[str, float]:
-        """Every value by name: white.position, std.effort, time.effort."""
+        """Return every value by name: white.position, std.effort, time.effort."""
         return {f"{part}.{n}": v for part in ("white", "std", "time") for n, v in getattr(self, part).items()}
 
 
 class Predictor(OnTrials):
-    """A model structure on measured trials, ready to foretell them for any values of its parameters.
+    """One-step predictions of measured trials for any values of a model's parameters.
 
     Parameters
     ----------
     model
         Its structure and constants are used; the values of its parameters are given to `run`.
     trials
-        What was measured; a sample that is NaN was not.
+        Measured trials; samples that were not measured are NaN.
     columns
-        Parameters, and unknowns of effects, to give sensitivities for.
+        Parameters, and unknowns of effects, of the sensitivities.
     processes
-        Names of the random processes that act; see `StateSpaceNoise`.
+        Names of the random processes; see `StateSpaceNoise`.
     priors
-        Of each trial, standard deviation of each unknown of its start about what its first samples say.
+        For each trial, the prior standard deviation of each initial state about the estimate from its first samples.
     correlation_s
-        How long the noise of a reading lasts; see `StateSpaceNoise`.
+        Correlation time of measurement noise, s; see `StateSpaceNoise`.
     """
 
     def __init__(
@@ -128,22 +128,22 @@ class Predictor(OnTrials):
         self._blocks = [_Prediction(self, lanes) for lanes in self.side_by_side()]
 
     def key(self, trial: Trial) -> tuple[Any, ...]:
-        """What trials share that can share a block: also what was measured."""
+        """Return what trials of one block have in common: also their measured outputs."""
         return (*super().key(trial), measured_outputs(self.model, trial))
 
     def run(
         self, values: Values, noise: StateSpaceNoise | Sequence[StateSpaceNoise], unknowns: EachTrial
     ) -> list[PredictedTrial]:
-        """Foretell every trial.
+        """Predict every trial one step ahead, with sensitivities.
 
         Parameters
         ----------
         values
-            Every parameter of the model, by name; one for all trials, or one for each.
+            Every parameter of the model, by name; one mapping for all trials, or one for each.
         noise
-            Of every output that a trial has; one for all trials, or one for each.
+            Noise of every output; one for all trials, or one for each.
         unknowns
-            For each trial its start, and what effects have of each trial's own.
+            For each trial its own unknowns: its initial state and those of effects.
         """
         out: dict[int, PredictedTrial] = {}
         noises = [noise] * len(self.trials) if isinstance(noise, StateSpaceNoise) else list(noise)
@@ -154,7 +154,7 @@ class Predictor(OnTrials):
         return [out[i] for i in range(len(self.trials))]
 
     def predict(self, values: Values, noise: StateSpaceNoise, unknowns: EachTrial) -> list[dict[str, PredictedOutput]]:
-        """What is foretold of every output of every trial, by name; see `run`."""
+        """Return the prediction of every output of every trial, by name; see `run`."""
         out: dict[int, dict[str, PredictedOutput]] = {}
         for block in self._blocks:
             y, _ = block.run(values, [noise.parameters()] * len(self.trials), unknowns)
@@ -163,23 +163,23 @@ class Predictor(OnTrials):
 
 
 def _lanes_first(array: np.ndarray) -> np.ndarray:
-    """An array whose last axis is lanes with that axis first."""
+    """Return an array with its last axis, the lanes, first."""
     return np.ascontiguousarray(np.moveaxis(array, -1, 0))
 
 
 class ReadColumns(NamedTuple):
-    """What was read of the outputs of a trial, each of shape (n, outputs).
+    """Measured outputs of a trial, each of shape (n, outputs).
 
     Attributes
     ----------
     followed
-        Whether a sample was measured that a prediction follows.
+        Whether a sample corrects the state of the filter.
     measured
-        What was read; 0 elsewhere.
+        The measured values; 0 elsewhere.
     repeated
-        How often the value was read in a row.
+        Number of equal values in a row.
     readings
-        What is judged of it.
+        The readings that enter the likelihood.
     """
 
     followed: np.ndarray
@@ -189,7 +189,7 @@ class ReadColumns(NamedTuple):
 
 
 def read_columns(rig: Rig, trial: Trial, outputs: tuple[str, ...], correlation_s: float) -> ReadColumns:
-    """What was read of the outputs of a trial, where the noise of a reading lasts so long."""
+    """Return the measured outputs of a trial, at a correlation time of measurement noise."""
     columns = np.column_stack([trial[name] for name in outputs])
     hunting = np.column_stack([hunts(trial[name]) for name in outputs])
     often = np.column_stack([repeated(c, h) for c, h in zip(columns.T, hunting.T, strict=True)])
@@ -200,12 +200,12 @@ def read_columns(rig: Rig, trial: Trial, outputs: tuple[str, ...], correlation_s
 
 
 def measured_outputs(model: Model, trial: Trial) -> tuple[str, ...]:
-    """The outputs that a trial has, in the order of its rig."""
+    """Return the outputs that a trial has, in the order of its rig."""
     return tuple(n for n in model.rig.outputs(trial.kind) if n in trial.columns)
 
 
 class _Prediction(Block):
-    """A block with what was measured."""
+    """A block of trials with their measurements."""
 
     def __init__(self, all_of: Predictor, lanes: list[int]) -> None:
         first = all_of.trials[lanes[0]]
@@ -224,18 +224,18 @@ class _Prediction(Block):
             self.readings.append(read.readings)
 
     def _inputs(self, shift: tuple[int, ...]) -> np.ndarray:
-        """Inputs of all lanes, later by whole samples, beside what was measured and whether it was."""
+        """Return inputs of all lanes, delayed by whole samples, with measurements and whether there are any."""
         return np.concatenate([super()._inputs(shift), self.measured, self.seen.astype(float), self.repeated], axis=1)
 
     def run(self, values: Values, noises: EachTrial, unknowns: EachTrial) -> tuple[np.ndarray, np.ndarray]:
-        """What the program gives of all lanes; see `Program`. Everything is that of all trials."""
+        """Run the program of all lanes; see `Program`. Arguments are those of all trials."""
         known = {n: [noises[i][n] for i in self.lanes] for n in self.noise_names}
         return self._run(values, unknowns, **known)
 
     def innovations(
         self, y: np.ndarray, s: np.ndarray, width: int, noises: Sequence[StateSpaceNoise]
     ) -> Iterator[PredictedTrial]:
-        """The innovations of each lane at its noise, with sensitivities to `width` columns."""
+        """Yield the innovations of each lane at its noise, with sensitivities to `width` columns."""
         k, rows, by_lane = len(self.outputs), _lanes_first(y), _lanes_first(s)
         for lane, readings in enumerate(self.readings):
             n = len(readings.seen)
@@ -246,9 +246,9 @@ class _Prediction(Block):
             yield PredictedTrial(readings, values, rows[lane, :n, k:], sensitivities, white, ar)
 
     def predicted(self, y: np.ndarray, noise: StateSpaceNoise) -> Iterator[dict[str, PredictedOutput]]:
-        """What is foretold in each lane, by output: what was given as measured less the innovation.
+        """Yield the predictions of each lane, by output: measurements minus innovations.
 
-        What noise that was seen foretells of itself is part of it.
+        They include the prediction of autoregressive noise from its measured past.
         """
         count = len(self.outputs)
         for lane, trial in enumerate(self.trials):
@@ -270,9 +270,10 @@ def _with_noise_ahead(
 
 
 def are_news(trial: Trial, correlation_s: float) -> np.ndarray:
-    """Samples so far apart that the noise of each is its own, shape (n,).
+    """Return which samples have independent noise, one in each correlation time, shape (n,).
 
-    Where noise lasts, those within twice its time of an end are left out: what made it last had less to average there.
+    Where noise is correlated, samples within two correlation times of an end are left out: a smoother has less to
+    average there.
     """
     step, k = max(1, round(correlation_s / trial.dt)), np.arange(len(trial))
     inner = 2 * (step - 1)
@@ -280,15 +281,15 @@ def are_news(trial: Trial, correlation_s: float) -> np.ndarray:
 
 
 def repeated(column: np.ndarray, hunting: np.ndarray | None = None) -> np.ndarray:
-    """How often the value of each sample was read in a row, shape (n,): 1 where its neighbours differ.
+    """Return the number of equal values in a row at each sample, shape (n,): 1 where its neighbours differ.
 
-    Where fewer than `SAME` of them are the same, they are so by chance, of numbers written with so many digits.
-    Samples that hunt between two counts are together one reading.
+    If fewer than the share `SAME` are equal, they are so by chance, of numbers with few digits, and all are 1. Samples
+    that hunt between two counts are together one reading.
 
     Parameters
     ----------
     hunting
-        What `hunts` says of the column, if that is known.
+        The result of `hunts` for the column, if known.
     """
     if len(column) - len(begins_of_runs(column)) < SAME * len(column):
         return np.ones(len(column))
@@ -297,7 +298,7 @@ def repeated(column: np.ndarray, hunting: np.ndarray | None = None) -> np.ndarra
 
 
 def masked(trial: Trial, outputs: Sequence[str], hidden: Sequence[range]) -> Trial:
-    """The trial with its outputs unmeasured in some ranges of samples."""
+    """Return the trial with its outputs unmeasured in some ranges of samples."""
     rows = np.zeros(len(trial), dtype=bool)
     for some in hidden:
         rows[some.start : some.stop] = True

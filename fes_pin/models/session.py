@@ -1,11 +1,11 @@
-"""What was done in a session before a trial: how much a muscle was stimulated, by how long ago that was.
+"""Stimulation of a muscle in a session before a trial, by its age.
 
-What tires in one trial may be tired in the next. Where trials say when they began (`start_s`) the recruitment of all
-earlier ones is known, and with it the states at which a trial begins of whatever remembers for longer than a trial.
-Such a state follows first-order equations whose rates do not change within a bin of the past, so that a bin takes it
-exactly to where it is after the mean recruitment of that bin. Recruitment replaces the activation, which follows it
-within a tenth of a second. In a trial without a time of beginning the muscle begins unfatigued, and so it does in all
-trials where trials overlap: they are of more than one session.
+A muscle that tires in one trial may be tired in the next. Where trials state when they began (`start_s`), the
+recruitment of all earlier ones is known, and with it the initial states of effects with a longer memory than a trial.
+Such a state follows first-order equations with constant rates within a bin of the past, so that the mean recruitment of
+a bin gives the state at its end exactly. Recruitment replaces the activation, which follows it within a tenth of a
+second. In a trial without a time of beginning the muscle starts unfatigued. So it does in all trials if trials overlap,
+as they then belong to more than one session.
 """
 
 from __future__ import annotations
@@ -24,19 +24,19 @@ from fes_pin.models.maths import exp
 # stretches of stimulation: begin and end in s, as `start_s` counts them, and mean recruitment
 Session = tuple[tuple[float, float, float], ...]
 NEWEST_S, GROWTH, BINS = 0.2, 1.25, 45
-"""The newest bin of the past in s, how much longer each older one reaches, and how many there are: they go an hour
-back, twelve times the longest recovery that is looked for. Within a bin an exponential of its own age differs from its
-mean by 4 % at most."""
+"""Length of the newest bin of the past in s, ratio of successive lengths, and number of bins: together an hour, twelve
+times the longest recovery that is searched. Within a bin an exponential of its own age differs from its mean by at most
+4 %."""
 EDGES = np.concatenate([[0.0], NEWEST_S * GROWTH ** np.arange(BINS)])
-"""Ages at which bins begin and end, s."""
+"""Ages of the ends of the bins, s."""
 PAST = tuple(f"past_{k:02d}" for k in range(BINS))
 """Names of the constants of a trial that hold the mean recruitment of each bin, newest first."""
 PIECES, SHORTEST_S = 20, 0.25
-"""A trial is kept in so many pieces, or in fewer that last so long."""
+"""Most pieces in which a trial is kept, and their least length, s."""
 
 
 def checked_session(rows: Sequence[Sequence[float]]) -> Session:
-    """Stretches of stimulation as they must be: each a begin, a later end and a mean recruitment.
+    """Return checked stretches of stimulation: each a begin, a later end and a mean recruitment.
 
     Raises
     ------
@@ -54,12 +54,12 @@ def checked_session(rows: Sequence[Sequence[float]]) -> Session:
 
 
 def session_of(trials: Sequence[Trial], recruited: Callable[[Trial], np.ndarray]) -> Session:
-    """The stimulation of trials that say when they began; none where two of them overlap.
+    """Return the stimulation of trials that state when they began; none where two of them overlap.
 
     Parameters
     ----------
     recruited
-        Recruitment of a trial, shape (n,), by its stimulus.
+        Returns the recruitment of a trial, shape (n,), by its stimulus.
     """
     known = sorted((t for t in trials if "start_s" in t.conditions), key=lambda t: t.conditions["start_s"])
     ends = [t.conditions["start_s"] + t.duration for t in known]
@@ -75,7 +75,7 @@ def session_of(trials: Sequence[Trial], recruited: Callable[[Trial], np.ndarray]
 
 
 def past_of(session: Session, trial: Trial) -> dict[str, float]:
-    """Mean recruitment in each bin of a trial's past, by the names of `PAST`; zero where it does not say its start."""
+    """Return mean recruitment in each bin of a trial's past, by the names of `PAST`; zero without a stated start."""
     if "start_s" not in trial.conditions or not session:
         return dict.fromkeys(PAST, 0.0)
     now = trial.conditions["start_s"]
@@ -87,14 +87,14 @@ def past_of(session: Session, trial: Trial) -> dict[str, float]:
 
 
 def after_the_past(s: Any, rate: Callable[[Any], Any], towards: Callable[[Any], Any]) -> Any:
-    """A state at the start of a trial that has followed x' = rate(act) (towards(act) - x) from 0 through the past.
+    """Return the initial state of a trial after x' = rate(act) (towards(act) - x) from 0 through the past.
 
     Parameters
     ----------
     s
         The signals: `s.c` holds the constants of `PAST`.
     rate, towards
-        Of an activation: 1/s, and the state that it leads to.
+        Functions of an activation: a rate, 1/s, and the stationary state.
     """
     state: Any = 0.0
     for name, width in zip(reversed(PAST), np.diff(EDGES)[::-1], strict=True):

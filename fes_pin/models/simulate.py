@@ -1,4 +1,4 @@
-"""Simulation: a model's answer to the inputs of trials, with sensitivities."""
+"""Simulation of a model on the inputs of trials, with sensitivities."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ from fes_pin.models.rigs.base import Rig
 from fes_pin.models.storage import pass_as_stored
 
 EachTrial = Sequence[Mapping[str, float]]
-"""Of each trial numbers by name."""
+"""Numbers by name for each trial."""
 Values = Mapping[str, float] | EachTrial
-"""Every parameter of a model by name: one for all trials, or one for each."""
+"""Every parameter of a model by name: one mapping for all trials, or one for each."""
 MAX_STEP_S = 2.5e-3
 """Longest integration step, s: 1/20 of a muscle's time constant; at 1/17 s of damping RK4 errs by 1e-6 rad a swing."""
 FIRST_S = 0.2
-"""A rate that was not measured is estimated from the samples of this time, s: the error of a line's slope falls with
-its power 3/2, and a model that is worth its name is right for so short a time."""
+"""Time from whose samples a rate that was not measured is estimated, s: the error of a line's slope falls with its
+power 3/2, and a nominal model is accurate for so short a time."""
 FEWEST = 6
-"""Samples that an estimate of position and rate is made from at least."""
+"""Least number of samples for an estimate of position and rate."""
 NEWTON_STEPS = 3
 NUDGE = 1e-4
-"""Step of the differences in position (rad or m) and rate that the estimate is made with."""
+"""Step of the finite differences in position (rad or m) and rate of that estimate."""
 
 
 @dataclass(frozen=True)
@@ -54,14 +54,14 @@ class Simulated:
 
 @dataclass(frozen=True)
 class SimulatedBatch:
-    """Trials of one kind as they were simulated: side by side, each in its lane.
+    """Trials of one kind that were simulated in one batch, each in its lane.
 
     Attributes
     ----------
     trials
-        Their places among the simulator's trials, lane by lane; lanes beyond them say nothing.
+        Their places among the simulator's trials, lane by lane; further lanes are unused.
     columns
-        The places of the sensitivities among the columns that the simulator was asked for; the others are zero.
+        Places of the sensitivities among the columns of the simulator; the others are zero.
     readings
         Shape (n, outputs, lanes); zero after the end of a shorter trial.
     sensitivities
@@ -75,7 +75,7 @@ class SimulatedBatch:
 
 
 class OnTrials:
-    """A model structure on trials, which run in blocks of those that can share one.
+    """A model structure on trials, which run in batches of trials that can share a program.
 
     Parameters
     ----------
@@ -89,11 +89,11 @@ class OnTrials:
         self.model, self.trials, self.columns, self.max_step_s = model, tuple(trials), columns, max_step_s
 
     def key(self, trial: Trial) -> tuple[Any, ...]:
-        """What trials share that can share a block: kind, inputs and integration steps per sample."""
+        """Return what trials of one batch have in common: kind, inputs and integration steps per sample."""
         return trial.kind, self.model.driven_by(trial), substeps(self.model, trial.dt, self.max_step_s)
 
     def side_by_side(self) -> Iterator[list[int]]:
-        """Places of trials that can share a block: those of the same key, of similar length."""
+        """Yield places of trials of one batch: those of the same key and of similar length."""
         groups: dict[Any, list[int]] = {}
         for i, trial in enumerate(self.trials):
             groups.setdefault(self.key(trial), []).append(i)
@@ -114,7 +114,7 @@ class Simulator(OnTrials):
     trials
         The trials whose inputs and conditions drive it.
     columns
-        Parameters (and unknowns of a trial) to give sensitivities for; none by default.
+        Parameters (and unknowns of a trial) of the sensitivities; none by default.
     max_step_s
         Longest integration step; by default what the model needs.
     """
@@ -134,7 +134,7 @@ class Simulator(OnTrials):
         values
             Every parameter of the model, by name; one for all trials, or one for each.
         unknowns
-            For each trial its own unknowns, if the model has any; by default as its first samples say: see `start`.
+            For each trial its own unknowns, if the model has any; by default from its first samples: see `start`.
 
         Raises
         ------
@@ -153,7 +153,7 @@ class Simulator(OnTrials):
         return [s for s in out if s is not None]
 
     def run_batches(self, values: Values, unknowns: EachTrial) -> Iterator[SimulatedBatch]:
-        """Simulate every trial, as `run` does; what comes side by side is given as it comes."""
+        """Simulate every trial as `run` does; yield the batches."""
         for own in [values] if isinstance(values, Mapping) else values:
             for name, value in self._fixed.items():
                 if own[name] != value:
@@ -162,11 +162,10 @@ class Simulator(OnTrials):
             yield block.run(values, unknowns)
 
     def start(self, values: Mapping[str, float]) -> list[dict[str, float]]:
-        """Each trial's unknowns as its first samples say.
+        """Return start values of each trial's unknowns from its first samples.
 
-        What was measured at the first sample is what the model reads there; a rate that was not is the one with which
-        the model follows the first 0.2 s best, position and rate fitted together. What effects have of each trial's own
-        is at its null.
+        The model reads the first sample of each measured output. A rate that was not measured is fitted, together with
+        the position, to the first 0.2 s. Unknowns of effects are at their nulls.
         """
         rig, out = self.model.rig, [self.model.initial_unknowns(t) for t in self.trials]
         unmeasured = [i for i, t in enumerate(self.trials) if rig.unmeasured(t)]
@@ -193,7 +192,7 @@ class Simulator(OnTrials):
         column: str,
         samples: int | None = None,
     ) -> list[dict[str, float]]:
-        """Unknowns with which some trials' first samples of a column are followed best: Gauss-Newton on differences."""
+        """Return unknowns that fit the first samples of a column of some trials: Gauss-Newton on finite differences."""
         short, guess = [_first_samples(self.trials[i]) for i in places], [dict(unknowns[i]) for i in places]
         simulator = Simulator(self.model, short)
         for _ in range(NEWTON_STEPS):
@@ -213,16 +212,16 @@ def _first_samples(trial: Trial) -> Trial:
 
 
 class Block:
-    """Trials of one kind that run side by side in the lanes of one program, as many at most as `widest` lets.
+    """Trials of one kind that run as a batch in the lanes of one program, at most `widest` of them.
 
     Parameters
     ----------
     all_of
-        What all blocks are of. Sensitivities that the model has not are left out.
+        The model and all trials. Sensitivities that the model does not have are left out.
     lanes
-        Places of those among the trials that are in this one.
+        Places of the trials of this batch.
     model
-        With what acts at random.
+        The model with its process noise.
     measured
         Outputs whose measurement corrects the states, for a predictor.
     """
@@ -247,20 +246,20 @@ class Block:
         self._latest = lru_cache(maxsize=1)(self._inputs)  # other threads ask for other ones
 
     def _inputs(self, shift: tuple[int, ...]) -> np.ndarray:
-        """Inputs of all lanes, later by whole samples; before the trial begins they are as at rest: zero."""
+        """Return inputs of all lanes, delayed by whole samples; before the trial begins they are zero."""
         return lane_inputs(self.rig, self.trials, self.inputs, (self.count, self.width), shift)
 
     def _set(self, constants: np.ndarray, name: str, values: Sequence[float]) -> None:
-        """Write a constant of each lane; spare lanes are as the last trial."""
+        """Write a constant of each lane; unused lanes equal the last trial."""
         constants[self.layout.constants.index(name)] = [*values, *[values[-1]] * (self.width - len(values))]
 
     def _run(self, values: Values, unknowns: EachTrial, **known: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
-        """What the program gives of all lanes; see `Program`.
+        """Run the program of all lanes, and return its results; see `Program`.
 
         Parameters
         ----------
         values, unknowns
-            Of all trials.
+            Those of all trials.
         known
             Further constants of each lane.
         """
@@ -286,7 +285,7 @@ class _Simulation(Block):
 
 
 def spread(sensitivities: np.ndarray, places: tuple[int, ...], width: int) -> np.ndarray:
-    """Sensitivities of a trial at their places among all columns, (n, outputs, width): zero where it has none."""
+    """Return sensitivities of a trial at their places among all columns, (n, outputs, width); zero elsewhere."""
     if len(places) == width:
         return sensitivities
     full = np.zeros((*sensitivities.shape[:2], width))
@@ -295,21 +294,21 @@ def spread(sensitivities: np.ndarray, places: tuple[int, ...], width: int) -> np
 
 
 def max_step(model: Model) -> float:
-    """Longest integration step that resolves the model, s."""
+    """Return the longest integration step that resolves the model, s."""
     return min([MAX_STEP_S, *(e.max_step_s for e in model.effects)])
 
 
 def substeps(model: Model, dt: float, max_step_s: float) -> int:
-    """Integration steps per sample; a delay, which ends one of them where the input jumps, needs one more."""
+    """Return integration steps per sample; a delay needs one more, which ends where the input jumps."""
     return max(1, math.ceil(dt / max_step_s - 1e-6)) + is_delayed(model)
 
 
 def lane_inputs(
     rig: Rig, trials: Sequence[Trial], inputs: Sequence[str], size: tuple[int, int], shift: Sequence[int]
 ) -> np.ndarray:
-    """Inputs of trials side by side, shape (count, inputs, width), each later by whole samples; zero before.
+    """Return inputs of a batch, shape (count, inputs, width), each delayed by whole samples; zero before.
 
-    `size` is (count, width). An imposed motion is never late: what is delayed is the answer to a stimulus.
+    `size` is (count, width). An imposed motion is never delayed: a delay is that of the response to a stimulus.
     """
     u = np.zeros((size[0], len(inputs), size[1]))
     for lane, trial in enumerate(trials):
@@ -320,7 +319,7 @@ def lane_inputs(
 
 
 def lane_values(layout: Layout, values: EachTrial, unknowns: EachTrial) -> np.ndarray:
-    """Values of a program's parameters, side by side, shape (values, width); spare lanes are as the last trial."""
+    """Return values of a program's parameters, shape (values, width); unused lanes equal the last trial."""
     p = np.empty((len(layout.values), layout.width))
     for k, name in enumerate(layout.values):
         own = [known[name] for known in (unknowns if name in layout.unknowns else values)]
@@ -329,17 +328,17 @@ def lane_values(layout: Layout, values: EachTrial, unknowns: EachTrial) -> np.nd
 
 
 def timing(trial: Trial, steps: int) -> dict[str, float]:
-    """Constants that every program reads."""
+    """Return the constants that every program reads."""
     return {"t0": float(trial.time[0]), "dt": trial.dt, "step": trial.dt / steps, "shift": 0.0}
 
 
 def is_delayed(model: Model) -> bool:
-    """True if the model has an effect that delays the input."""
+    """Return whether the model has an effect that delays the input."""
     return any(e.signal == "delay" for e in model.effects)
 
 
 def total_delay(model: Model, values: Mapping[str, float]) -> float:
-    """Delay from stimulus to muscle in s, all effects together."""
+    """Return the delay from stimulus to muscle in s, all effects together."""
     delay = 0.0
     for effect in model.with_parameters(values).effects if is_delayed(model) else ():
         if effect.signal == "delay":
@@ -348,12 +347,12 @@ def total_delay(model: Model, values: Mapping[str, float]) -> float:
 
 
 def simulate(model: Model, trial: Trial) -> Trial:
-    """What the model predicts for a trial, from its inputs, conditions and (joint) first sample alone.
+    """Simulate a trial from its inputs, conditions and, for a joint, its first sample alone.
 
     Returns
     -------
     Trial
-        The same time and inputs, with the predicted outputs. For a joint the velocity is predicted as well.
+        A trial of the same time and inputs, with the predicted outputs; for a joint the velocity as well.
 
     Raises
     ------
@@ -365,7 +364,7 @@ def simulate(model: Model, trial: Trial) -> Trial:
 
 
 def simulated_trial(model: Model, trial: Trial) -> Trial:
-    """What `simulate` gives of a trial that is known to be one of the model's rig."""
+    """Return the result of `simulate` for a trial that is known to belong to the model's rig."""
     (simulated,) = Simulator(model, [trial]).run(model.parameters())
     rig = model.rig
     columns = {name: trial[name] for name in rig.input_columns(trial)}

@@ -1,4 +1,4 @@
-"""The signal path, and what acts on it: stages, signals, effects."""
+"""The signal path and the effects that act on it: stages, signals, effects."""
 
 from __future__ import annotations
 
@@ -38,11 +38,11 @@ Grids = dict[str, tuple[float, ...]]
 
 
 _RENAMED = {"beside": "screened_with", "foretold_step_s": "predictor_step_s"}
-"""Attributes of an effect that an earlier version named otherwise; a file of one's own may still set these."""
+"""Old and new names of attributes of an effect: an own cause may still set the old ones."""
 
 
 class Stage(StrEnum):
-    """Where on the path from stimulus to reading something acts."""
+    """Stage of the path from stimulus to reading at which an effect acts."""
 
     NERVE = "nerve"
     MUSCLE = "muscle"
@@ -53,7 +53,7 @@ class Stage(StrEnum):
 
 @dataclasses.dataclass(frozen=True)
 class Effect:
-    """One physical thing that the nominal model leaves out; it vanishes at its null.
+    """A physical effect that the nominal model leaves out; it vanishes at its null.
 
     A subclass is a frozen dataclass whose fields are parameters. It names the `signal` that it changes, and says how in
     `apply`. If it has states of its own it lists them in `states` and gives their `rate`; what it remembers from sample
@@ -83,21 +83,21 @@ class Effect:
     predictor_step_s
         The same for a one-step predictor, where the step depends on how well the rig's velocity is known.
     varies
-        True if its amplitudes can be other in each trial: those of what does not begin with the trial.
+        True if its amplitudes can differ between trials, as those of effects that do not begin with the trial.
     screened_with
-        Names of effects without which it shows little or nothing: it is screened in models that also contain them.
+        Names of effects without which it is hardly identifiable: it is screened in models that also contain them.
     remembers
-        True if earlier trials of the session are in its states at the start: `rest` reads them by `session`.
+        True if its initial states depend on earlier trials of the session: `rest` reads them by `session`.
     scales
-        True if it multiplies its signal. Where that is a reading it scales a filter's gains: see `LikelihoodProblem`.
+        True if it multiplies its signal. If that is a reading, it scales a filter's gains: see `LikelihoodProblem`.
     each_trial
-        Its amplitudes are unknowns of each trial, estimated from that trial alone; the fields keep what a trial that
-        was not measured is predicted with: their nulls. All other parameters stay common to all trials.
+        True if its amplitudes are unknowns of each trial, estimated from that trial alone. The fields then hold their
+        nulls, with which a trial that was not measured is predicted. All other parameters are common to all trials.
 
     Raises
     ------
     InputError
-        When it is built: a parameter that is no number, or out of its bounds.
+        When it is built with a parameter that is no number, or out of its bounds.
     """
 
     name: ClassVar[str]
@@ -130,61 +130,61 @@ class Effect:
         check_parameters(self)
 
     def apply(self, value: Any, s: Any) -> Any:
-        """The signal with the effect, from the signal without it."""
+        """Return the signal with the effect, from the signal without it."""
         raise NotImplementedError
 
     def rate(self, s: Any) -> ByName:
-        """Time derivative of each state."""
+        """Return the time derivative of each state."""
         return {}
 
     def update(self, s: Any) -> ByName:
-        """Next value of each memory."""
+        """Return the next value of each memory."""
         return {}
 
     def slack(self, s: Any) -> Mapping[str, tuple[Any, Any]]:
-        """Of each memory that only follows something by `update` once a slack is taken up: what, and half the slack."""
+        """Return for each memory with play its target, which it follows by `update`, and half the width of the play."""
         return {}
 
     def rest(self, s: Any) -> ByName:
-        """States and memories at rest that are not zero."""
+        """Return the states and memories that are not zero at rest."""
         return {}
 
     def intensities(self, c: Any) -> ByName:
-        """Intensity of the white noise that drives each state at random, from the constants `random`."""
+        """Return the intensity of the white noise that drives each state, from the constants `random`."""
         return {}
 
     def stationary_variances(self, c: Any) -> ByName:
-        """Variance of what is random in each state when a trial begins, from the constants `random`."""
+        """Return the stationary variance of each random state at the start of a trial, from the constants `random`."""
         return {}
 
     def start_variances(self, reach: Any, speed: Any) -> ByName:
-        """Variances about `rest` of states, and of memories that states go into, when a trial begins: unit squared.
+        """Return prior variances about `rest` of initial states, and of memories that depend on states.
 
         Parameters
         ----------
         reach, speed
-            How far and how fast what is read moves in the trial; 0 for a rig that begins at rest.
+            Range and speed of the reading in the trial; 0 for a rig that begins at rest.
         """
         return {}
 
     @classmethod
     def parameters(cls) -> dict[str, ParameterInfo]:
-        """Name and description of every parameter, in order."""
+        """Return name and description of every parameter, in order."""
         return parameters_of(cls)
 
     @classmethod
     def amplitudes(cls) -> tuple[str, ...]:
-        """The parameters whose null switches the effect off."""
+        """Return the parameters whose null switches the effect off."""
         return tuple(n for n, info in cls.parameters().items() if info.null is not None and not info.optional)
 
     @classmethod
     def shapes(cls) -> tuple[str, ...]:
-        """The parameters that have a meaning only where the effect acts."""
+        """Return the parameters that have a meaning only where the effect acts."""
         return tuple(n for n, info in cls.parameters().items() if info.null is None and not info.optional)
 
     @classmethod
     def refinements(cls) -> tuple[tuple[str, ...], ...]:
-        """The refinements of the effect's form: for each an optional parameter with a null, and its shapes after it."""
+        """Return the refinements of the effect's form: for each an optional parameter with a null, and its shapes."""
         out: list[tuple[str, ...]] = []
         for name, info in cls.parameters().items():
             if info.optional and info.null is not None:
@@ -194,21 +194,21 @@ class Effect:
         return tuple(out)
 
     def refined(self) -> tuple[str, ...]:
-        """The parameters of the refinements that are switched on."""
+        """Return the parameters of the refinements that are switched on."""
         info = self.parameters()
         return tuple(n for names in self.refinements() if getattr(self, names[0]) != info[names[0]].null for n in names)
 
     def unused(self) -> dict[str, float]:
-        """The parameters of the refinements that are switched off, with their values."""
+        """Return the parameters of the refinements that are switched off, with their values."""
         refined = self.refined()
         return {n: float(getattr(self, n)) for n, i in self.parameters().items() if i.optional and n not in refined}
 
     def kept_states(self) -> tuple[str, ...]:
-        """Its states, without those of refinements that are switched off: such a state it does not have at all."""
+        """Return its states without those of refinements that are switched off."""
         return self._kept(self.states)
 
     def kept_memories(self) -> tuple[str, ...]:
-        """Its memories, in the same way."""
+        """Return its memories without those of refinements that are switched off."""
         return self._kept(self.memories)
 
     def _kept(self, names: tuple[str, ...]) -> tuple[str, ...]:
@@ -216,26 +216,26 @@ class Effect:
         return tuple(n for n in names if self.of_form.get(n, n) in (n, *refined))
 
     def unknowns(self) -> tuple[str, ...]:
-        """The parameters that each trial has a value of its own of."""
+        """Return the parameters that have a value of each trial's own."""
         return self.amplitudes() if self.each_trial else ()
 
     def common(self) -> tuple[str, ...]:
-        """The parameters that all trials share."""
+        """Return the parameters that all trials share."""
         return tuple(n for n in self.parameters() if n not in self.unknowns())
 
     def fitted_parameters(self) -> tuple[str, ...]:
-        """What a fit moves in all trials alike: all but discrete choices, and but refinements that are switched off."""
+        """Return the fitted common parameters: all but discrete choices and refinements that are switched off."""
         unused, info = self.unused(), self.parameters()
         return tuple(n for n in self.common() if info[n].fitted and n not in unused)
 
     @classmethod
     def of_each_trial(cls, **shapes: Any) -> Effect:
-        """The effect with amplitudes that are each trial's own."""
+        """Return the effect with amplitudes of each trial's own."""
         return dataclasses.replace(cls.absent(), each_trial=True, **shapes)
 
     @classmethod
     def grids(cls, measured: Measured) -> Grids:
-        """Start values of each parameter for a search, most likely first.
+        """Return start values of each parameter for a search, most likely first.
 
         Parameters
         ----------
@@ -246,37 +246,37 @@ class Effect:
 
     @classmethod
     def far_sizes(cls, measured: Measured) -> Grids:
-        """Sizes of amplitudes that no slope leads to, and a fit begins with as well; `measured` as in `grids`."""
+        """Return sizes of amplitudes that no descent reaches and at which fits start too; `measured` as in `grids`."""
         info = cls.parameters()
         return {n: info[n].grid for n in cls.amplitudes() if info[n].grid}
 
     @classmethod
     def forms(cls, measured: Measured) -> tuple[Mapping[str, float], ...]:
-        """Forms that a screen tries, each by the values of the refinements that it has: the plain one, by default.
+        """Return the forms that a screen tries, each by the values of its refinements; by default the plain one alone.
 
-        A refinement belongs here if without it the effect may look like none at all; `measured` as in `grids`.
+        A refinement belongs here if the effect may not be identifiable without it; `measured` as in `grids`.
         """
         return ({},)
 
     def limits(self, measured: Measured) -> Bounds:
-        """Bounds that the measured range sets to parameters, inside the physical ones; `measured` as in `grids`."""
+        """Return bounds of parameters by the measured range, within the physical ones; `measured` as in `grids`."""
         return {}
 
     def smallest(self, measured: Measured) -> dict[str, float]:
-        """Sizes of amplitudes below which readings as coarse as these do not tell them.
+        """Return sizes of amplitudes below which readings of this resolution do not identify them.
 
-        `measured` is as in `grids`, with `answer` the effort of a controller that answers what is read.
+        `measured` is as in `grids`, with `answer` the effort of a controller in closed loop.
         """
         return {}
 
     @classmethod
     def nulls(cls) -> dict[str, float]:
-        """Values at which the effect vanishes, and its refinements are off."""
+        """Return the values at which the effect vanishes and its refinements are off."""
         return {n: float(info.null) for n, info in cls.parameters().items() if info.null is not None}
 
     @classmethod
     def absent(cls) -> Effect:
-        """The effect at its null."""
+        """Return the effect at its null."""
         nulls: dict[str, Any] = cls.nulls()
         return cls(**nulls)
 
@@ -288,7 +288,7 @@ Kind = TypeVar("Kind")
 
 
 def classes_in(folder: Iterable[str], package: str, kind: type[Kind]) -> Iterator[type[Kind]]:
-    """The classes of a kind that the files of a package define; `folder` is its `__path__`."""
+    """Yield the classes of a kind that the files of a package define; `folder` is its `__path__`."""
     for file in iter_modules(folder, f"{package}."):
         for one in vars(import_module(file.name)).values():
             if isinstance(one, type) and issubclass(one, kind) and one.__module__ == file.name:
@@ -296,7 +296,7 @@ def classes_in(folder: Iterable[str], package: str, kind: type[Kind]) -> Iterato
 
 
 def by_name(effects: Iterable[type[Effect]], name: str) -> type[Effect]:
-    """The effect of that name.
+    """Return the effect of that name.
 
     Raises
     ------
@@ -310,16 +310,16 @@ def by_name(effects: Iterable[type[Effect]], name: str) -> type[Effect]:
 
 
 def in_order(effects: Iterable[Named]) -> tuple[Named, ...]:
-    """Effects in the order of the signal path, by name at each stage."""
+    """Return effects in the order of the signal path, by name at each stage."""
     return tuple(sorted(effects, key=lambda e: (list(Stage).index(e.stage), e.name)))
 
 
 class Signals(SimpleNamespace):
-    """The signals of one instant, by name: what a rig's equations and the effects read.
+    """The signals of one instant, by name, for a rig's equations and the effects.
 
-    `own` holds the states and memories of the effect that is being evaluated; `std(x)` is the standard deviation of an
-    expression in them, in its unit, where a predictor estimates them and asks for rates; else it is 0. `sensed_rate` is
-    how fast what is read moves when a trial begins: 0 unless the rig says otherwise in `set_rest`.
+    `own` holds the states and memories of the effect that is evaluated. `std(x)` is the standard deviation of an
+    expression in them, in its unit, where a predictor estimates them and evaluates rates; else it is 0. `sensed_rate`
+    is the initial rate of the reading: 0 unless the rig sets it in `set_rest`.
     """
 
     std: Callable[[Any], Any] = staticmethod(lambda x: 0.0)
@@ -329,12 +329,12 @@ class Signals(SimpleNamespace):
         super().__init__(effects=tuple(effects), own=SimpleNamespace(), owned={}, **signals)
 
     def of(self, effect: Effect) -> Signals:
-        """The same signals, with the effect's own states and memories as `own`."""
+        """Return the same signals, with the effect's own states and memories as `own`."""
         self.own = SimpleNamespace(**self.owned.get(effect.name, {}))
         return self
 
     def through(self, signal: str, value: Any) -> Any:
-        """Pass a value through every effect that acts on `signal`, in the order of the path."""
+        """Return a value after every effect that acts on `signal`, in the order of the path."""
         for effect in self.effects:
             if effect.signal == signal:
                 value = effect.apply(value, self.of(effect))
@@ -342,39 +342,39 @@ class Signals(SimpleNamespace):
 
 
 def counted_from(s: Any, place: Any) -> Any:
-    """The reading that a sensor's deviations are counted from: where the trial begins at 0, at 1 where the joint rests
-    when nothing drives it, at 2 the model's own zero. On an ankle the first two are one."""
+    """Return the origin of a sensor's deviations: for `place` 0 the reading at the trial's start, for 1 that of the
+    joint at rest without a drive, for 2 the model's own zero. On an ankle the first two are the same."""
     return where(place < 0.5, s.rest_reading, where(place < 1.5, s.idle_reading, 0.0))
 
 
 class FromAPlace(Effect):
-    """Base of what a sensor does to deviations that are counted from a place of the rig, the parameter `place`."""
+    """Base of effects of a sensor on deviations from a place of the rig, the parameter `place`."""
 
     @classmethod
     def grids(cls, measured: Measured) -> Grids:
-        """Deviations are counted from any place that the rig has: a joint's trial may begin anywhere."""
+        """Return grids with every place that the rig has: a joint's trial may begin anywhere."""
         position = measured.get("position")
         anywhere = position is not None and np.array_equal(position, measured.get("reading", ()))
         return {**super().grids(measured), "place": (1.0, 0.0, 2.0) if anywhere else (0.0,)}
 
 
 def reading_range(measured: Measured) -> float:
-    """Largest difference between first readings; 0 where there are none."""
+    """Return the largest difference between first readings; 0 where there are none."""
     reading = measured.get("reading", np.zeros(1))
     return float(np.nanmax(reading) - np.nanmin(reading))
 
 
 def symmetric(size: float) -> tuple[float, float]:
-    """From -size to size, or no bounds for no size."""
+    """Return bounds from -size to size, or none for a size of 0."""
     return (-size, size) if size > 0.0 else (-math.inf, math.inf)
 
 
 def span(measured: Measured, name: str) -> float:
-    """How far a column goes, from its least to its largest value; 0 where it was not measured."""
+    """Return the range of a column; 0 where it was not measured."""
     return float(np.ptp(measured.get(name, np.zeros(1))))
 
 
 def least_step(values: np.ndarray) -> float:
-    """The least difference of neighbours that is none of equal ones; infinite where all are equal."""
+    """Return the least difference above 0 of neighbouring values; infinite where all are equal."""
     steps = np.abs(np.diff(values))
     return float(np.min(steps, where=steps > 0.0, initial=np.inf))

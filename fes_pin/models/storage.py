@@ -1,4 +1,4 @@
-"""What was done to readings before they were stored is done to simulated ones."""
+"""Low pass of simulated readings, where measured ones were low-passed before they were stored."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ import numpy as np
 from fes_pin.data.trial import Trial
 
 FEWEST_PERIODS = 2.0
-"""Periods of a low pass that a record holds at least for it to be filtered: the start of a trial is not."""
+"""Least length of a record that is filtered, in periods of the low pass; the start of a trial is shorter."""
 
 
 def pass_as_stored(trials: Sequence[Trial], results: Sequence[np.ndarray]) -> None:
-    """Low-pass what was simulated of trials, in place, where their readings were; see `Trial.low_pass_hz`.
+    """Low-pass simulated trials, in place, where their readings were low-passed; see `Trial.low_pass_hz`.
 
-    Trials as long as each other are filtered at once.
+    Trials of equal length are filtered at once.
 
     Parameters
     ----------
     trials
-        By lane.
+        Trials by lane.
     results
-        Readings and their sensitivities, shape (n, ..., lanes) each; zero behind the end of a shorter trial. What did
-        not stay finite is left as it is.
+        Readings and their sensitivities, shape (n, ..., lanes) each; zero after the end of a shorter trial. Results
+        that are not finite are not filtered.
     """
     if all(t.low_pass_hz is None for t in trials):
         return

@@ -1,4 +1,4 @@
-"""Models on disk: `model.toml`, whole and by itself."""
+"""Models on disk: `model.toml`, complete without other files."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from fes_pin.models.stage import Effect
 
 FORMAT = 1
 NEEDS = "needs"
-"""Key of a table: the file or module of each cause or rig that is not written here."""
+"""Key of a table: the file or module of each cause or rig that is not of this library."""
 EACH_TRIAL = "each_trial"
 """Key of an effect whose amplitudes are each trial's own."""
 
 
 def model_toml(model: Model, further: Mapping[str, Mapping[str, Any]] | None = None) -> str:
-    """A model as TOML: rig, constants, parameters to the last bit, effects; further tables, if there are any.
+    """Return a model as TOML: rig, constants, parameters to the last bit, effects; and further tables.
 
     Parameters
     ----------
@@ -52,12 +52,12 @@ def model_toml(model: Model, further: Mapping[str, Mapping[str, Any]] | None = N
 
 
 def save_model(model: Model, path: str | Path) -> None:
-    """Write `model.toml`, whole or not at all.
+    """Write `model.toml`, completely or not at all.
 
     Raises
     ------
     InputError
-        It is no `Model`: the body of a diagnosis of walking is saved as URDF, by its `write`. Or the file cannot be
+        If it is no `Model`: the body of a diagnosis of walking is saved as URDF, by its `write`. If the file cannot be
         written, or was read and not written by this process.
     """
     how = ": its write() saves it as URDF, which Body.from_urdf reads" if hasattr(model, "urdf") else ""
@@ -71,12 +71,12 @@ def load_model(path: str | Path, *, library: Source | Sequence[Source] | None = 
     Parameters
     ----------
     library
-        Where causes and rigs come from that are not written here or installed: see `load_library`.
+        Sources of causes and rigs that are not of this library or of installed packages: see `load_library`.
 
     Raises
     ------
     InputError
-        Not such a file, or one that needs a library that was not given: names the row, the key and what was expected.
+        For another file, or one that needs a library that was not given: names the row, the key and what was expected.
     """
     document, catalogue = read_toml(path), catalogue_of(library)
     kinds = {rig.name: rig for rig in catalogue.rigs}
@@ -112,7 +112,7 @@ def _effect_table(one: Effect) -> dict[str, Any]:
 
 
 def _missing(document: Document, name: object, otherwise: str) -> str:
-    """What to say of an unknown cause or rig: the library that the model says it comes from."""
+    """Return an error message for an unknown cause or rig, with the library that the model states for it."""
     where = document.table(NEEDS).get(name) if isinstance(name, str) else None
     if not isinstance(where, str) or not where:
         return otherwise

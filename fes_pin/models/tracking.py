@@ -1,11 +1,11 @@
-"""The effort that a model lacks along a measured motion: what a stiff servo must add to keep it there.
+"""The effort that a model lacks along a measured motion: the effort of a stiff servo that keeps it there.
 
 The servo acts on the difference of measured and modelled reading and on its rate, critically damped:
 
     torque + J (w^2 (y - reading) + 2 w (y' - v)),   w = 2 pi BANDWIDTH_HZ
 
-Below its bandwidth what it adds is the effort that would have made the model right; whatever effects the model has are
-part of it. Unlike a free simulation it stays with a rig that integrates or falls over.
+Below its bandwidth that is the effort which would have made the model right, effects of the model included. Unlike a
+free simulation it stays near the motion of a rig that integrates or falls over.
 
 Source: Ohnishi, Shibata and Murakami, Motion control for advanced mechatronics, IEEE/ASME Transactions on Mechatronics
 1 (1996): the effort of a servo as an observer of disturbances.
@@ -25,7 +25,7 @@ from fes_pin.models.simulate import Simulator
 from fes_pin.models.stage import Effect, Stage
 
 BANDWIDTH_HZ = 8.0
-"""Above what limbs and their muscles do: voluntary motion ends near 5 Hz (Winter, Biomechanics and Motor Control of
+"""Bandwidth above that of limbs and muscles: voluntary motion ends near 5 Hz (Winter, Biomechanics and Motor Control of
 Human Movement, 4th ed., section 3.4.4, finds 99.7 % of a gait's power below 6 Hz)."""
 FINE = 0.05
 """Longest sample of the servo, in radians of its bandwidth."""
@@ -33,7 +33,7 @@ FINE = 0.05
 
 @dataclass(frozen=True)
 class TrackingEffort(Effect):
-    """The servo's effort, added to what drives the joint; see the module.
+    """The servo's effort, added to the effort that drives the joint; see the module.
 
     torque + J (w^2 (y - reading) + 2 w (y' - v))
     """
@@ -48,18 +48,18 @@ class TrackingEffort(Effect):
 
 
 def _servo(behind: Any, slower: Any) -> Any:
-    """Acceleration that the servo asks for."""
+    """Return the acceleration that the servo demands."""
     w = 2.0 * math.pi * BANDWIDTH_HZ
     return w * w * behind + 2.0 * w * slower
 
 
 def can_track(model: Model) -> bool:
-    """True for a joint, whose position and rate are both known of a simulation."""
+    """Return whether a model is of a joint, whose simulation gives both position and rate."""
     return model.rig.name in TrackingEffort.rigs
 
 
 def measured_motion(trial: Trial, output: str) -> tuple[np.ndarray, np.ndarray]:
-    """Position and rate of a measured motion by cubics over a quarter of the servo's period, shape (n,) each.
+    """Return position and rate of a measured motion by cubics over a quarter of the servo's period, shape (n,) each.
 
     Source: Savitzky and Golay, Smoothing and differentiation of data by simplified least squares procedures, Analytical
     Chemistry 36 (1964).
@@ -74,16 +74,16 @@ def measured_motion(trial: Trial, output: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 def tracking_effort(model: Model, trial: Trial, position: np.ndarray, rate: np.ndarray) -> np.ndarray:
-    """What must be added to a joint's effort for it to move as measured, shape (n,), N m (N if prismatic).
+    """Return the effort to add to a joint's effort for it to move as measured, shape (n,), N m (N if prismatic).
 
     Parameters
     ----------
     model
-        With its effects.
+        The model with its effects.
     trial
-        What was measured; its effort acts.
+        The measured trial, whose effort acts.
     position, rate
-        Of the measured motion, shape (n,).
+        Position and rate of the measured motion, shape (n,).
     """
     from scipy.interpolate import CubicHermiteSpline  # noqa: PLC0415 - as above
 
@@ -102,7 +102,7 @@ def tracking_effort(model: Model, trial: Trial, position: np.ndarray, rate: np.n
 
 
 def _finer(trial: Trial, count: int) -> Trial:
-    """A trial with `count` samples in the place of each, what drives it held: a servo at few samples ripples."""
+    """Return a trial with `count` samples in the place of each, inputs held: a servo at few samples ripples."""
     if count == 1:
         return trial
     time = trial.time[0] + trial.dt / count * np.arange(count * (len(trial) - 1) + 1)
@@ -111,5 +111,5 @@ def _finer(trial: Trial, count: int) -> Trial:
 
 
 def _held(values: np.ndarray) -> np.ndarray:
-    """Mean of each sample and the next: what is held between them without a delay."""
+    """Return the mean of each sample and the next: the value that is held between them without a delay."""
     return np.append(0.5 * (values[1:] + values[:-1]), values[-1])
