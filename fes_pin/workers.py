@@ -16,7 +16,7 @@ from threadpoolctl import OpenBLASController, threadpool_limits
 from fes_pin.settings import threads
 
 Progress = Callable[[float, str], None]
-"""What is told of a long search: the share that is done, and what is being done."""
+"""Report of a long search: the share that is done, and what is being done."""
 In = TypeVar("In")
 Out = TypeVar("Out")
 
@@ -78,7 +78,7 @@ _IS_ONE_OF_MANY: ContextVar[bool] = ContextVar("is_one_of_many", default=False)
 def in_parallel(function: Callable[[In], Out], items: Iterable[In]) -> list[Out]:
     """`function` of each item, in their order; the result does not depend on the number of threads.
 
-    Work that is itself done beside other work is done in its own thread alone.
+    Work that is itself one of several parallel tasks runs in its own thread alone.
     """
     work = list(items)
     if threads() == 1 or len(work) < 2 or _IS_ONE_OF_MANY.get():

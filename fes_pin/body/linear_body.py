@@ -1,4 +1,4 @@
-"""A body linearized at a posture: A, B, C, E of its joints, braces, and feet that stand on the ground beside the first.
+"""A body linearized at a posture: A, B, C, E of its joints, braces, and further feet that stand on the ground.
 
 Two feet on the ground close a loop: the joints' deviations g obey J g = 0, J the Jacobian of the second foot
 (`closure`). They then lie in the span of `basis`, and accelerations are `mobility` times torques; on one foot the two

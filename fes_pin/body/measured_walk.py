@@ -80,7 +80,7 @@ class MeasuredWalk:
 
 
 def data_folder() -> Path:
-    """The folder `walking_subject01`, in FES_PIN_DATA or in `shared` beside the repository.
+    """Return the folder `walking_subject01`, in FES_PIN_DATA or in `shared` next to the repository.
 
     Raises
     ------

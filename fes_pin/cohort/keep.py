@@ -11,7 +11,7 @@ from fes_pin.cohort.one import Answer, Work
 from fes_pin.data.outputs import Outputs
 
 STATE = "state.json"
-"""Beside each answer: what it depends on, and what went wrong."""
+"""Files next to each answer: the key of what it depends on, and the error if there was one."""
 
 
 @dataclass(frozen=True)

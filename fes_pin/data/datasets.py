@@ -1,6 +1,6 @@
 """Public measured data that the documentation and the tests refer to: where they come from, fetched and made studies.
 
-`datasets.json` beside this file is written by `scripts/generate/dataset_registry.py`: repositories at a pinned commit,
+`datasets.json` next to this file is written by `scripts/generate/dataset_registry.py`: repositories at a pinned commit,
 licences, checksums.
 """
 

@@ -264,7 +264,7 @@ class SavedResult(Saveable):
     """A result as it was saved: what it said, to the digits that are printed, without the study, fits and models.
 
     It has the verdict, the causes or changes, every value, the text and the table, and equals what was saved.
-    It cannot simulate or draw a report: keep `model.toml` and the report beside it, or the result itself by `pickle`.
+    It cannot simulate or draw a report: keep `model.toml` and the report with it, or the result itself by `pickle`.
 
     Attributes
     ----------

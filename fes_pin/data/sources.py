@@ -20,7 +20,7 @@ def code_hash(package: Path = PACKAGE) -> str:
     Parameters
     ----------
     package
-        Folder of the package. Its URDFs lie in it where it is installed, beside it in the repository.
+        Folder of the package. Its URDFs are in it where it is installed, next to it in the repository.
     """
     digest = hashlib.sha256()
     for folder in (package, package.parent / "urdf"):

@@ -33,7 +33,8 @@ def diagnose(
     study
         The rig and its trials.
     library
-        Causes beside those written here and installed: files, modules, classes or what `load_library` made of them.
+        Causes in addition to those of the library and of installed packages: files, modules, classes or what
+        `load_library` made of them.
         Walking has none but its own.
     seed
         Of what is simulated: critical values and bootstrap intervals.

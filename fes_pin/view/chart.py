@@ -30,7 +30,7 @@ SHORTER = {
     r"(\.\d\d)\d+": r"\1",
     r"font(?:-size)?: ([\d.]+px)[^;]*;(?: font-family: [^;]*;)?": r"font-size: \1;",
 }
-"""What is left out of matplotlib's text: names that other figures have as well, digits, and type."""
+"""Parts of matplotlib's text that are omitted: names that other figures have as well, digits, and type."""
 NO_METADATA = dict.fromkeys(("Creator", "Date", "Format", "Type"))
 
 
@@ -44,7 +44,7 @@ def panels(
     heights
         Of each row of panels, points.
     width, left
-        Of a column, and of what is left of its panels; points.
+        Widths of a column and of the margin to the left of its panels; points.
     columns
         How many there are.
     """

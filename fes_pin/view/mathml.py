@@ -24,7 +24,7 @@ WORDS = set(
 )
 """Words of a sentence, which are no names of quantities."""
 PRIME, NEXT = "ʹ", "ᐩ"
-"""Letters of Python's names that stand for a prime and for the plus of a next value."""
+"""Letters of Python's names that mean a prime and the plus of a next value."""
 AS_PYTHON = {
     r"([^\W\d]\w*)\+(?=\s*(?:=|$))": rf"\1{NEXT}",
     "'": PRIME,

@@ -328,7 +328,7 @@ def import_meshcat():
 
 
 class _Kept:
-    """What stands for a browser: it keeps what is sent."""
+    """A replacement of a browser, which keeps what is sent."""
 
     def __init__(self) -> None:
         self.commands: list = []

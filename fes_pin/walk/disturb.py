@@ -13,7 +13,7 @@ from fes_pin.walk.recording import WalkRecording
 from fes_pin.walk.strides import Strides
 
 PAD_S = 0.3
-"""Beside a stride, so that the filter's ends do not matter."""
+"""Time before and after a stride, so that the filter's ends do not matter."""
 TISSUE_M, TISSUE_RAD = 0.002, 0.01
 """Soft tissue's share of a coordinate's wave once a stride; it falls as 1 / h (Leardini et al., Gait Posture 21, 2005:
 some 10 mm on the thigh, a few degrees in its angles). Only proportions matter."""

@@ -19,13 +19,13 @@ below a third (`fits.POSSIBLE`)."""
 NEARER = 0.6
 """Share of its distance to one ankle at which a centre of pressure is the other foot's; one who stands may share it."""
 FULLY = 0.9
-"""Share of what they carry in a stretch's middle that plates carry all through it; else a foot beside them carries."""
+"""Share of what they carry in a stretch's middle that plates carry all through it; else a foot next to them carries."""
 NEARLY_ALL = 0.95
 """Share of a trial that plates carry from which on all of it is used."""
 ENOUGH_S = 0.3
 """Most of a single support, s: less is no record of walking."""
 MEAN_S = 0.15
-"""Time over which forces are averaged before they are compared, s: a foot beside a plate stands there for longer, and
+"""Time over which forces are averaged before they are compared, s: a foot next to a plate stands there for longer, and
 accelerations of noisy markers are as large as the weight from sample to sample."""
 
 
@@ -75,7 +75,7 @@ def _check_sides(motion: Motion, plates: Plates) -> None:
 def carried_along(motion: Motion, plates: Plates) -> slice:
     """The longest stretch in which the plates carry the whole body; all of the record, if it is most of it.
 
-    Over ground a walk begins and ends beside the plates, and with one plate each other step is not measured.
+    Over ground a walk begins and ends next to the plates, and with one plate every other step is not measured.
 
     Raises
     ------
@@ -94,7 +94,7 @@ def carried_along(motion: Motion, plates: Plates) -> slice:
     if (stop - start) * motion.dt < ENOUGH_S:
         raise InputError(
             f"the plates carry the whole body for {(stop - start) * motion.dt:.2f} s at a time at most, "
-            f"{ENOUGH_S:g} s are needed: does a foot step beside them?",
+            f"{ENOUGH_S:g} s are needed: does a foot step next to them?",
             column="r_Fy" if plates.loaded["right"].mean() < plates.loaded["left"].mean() else "l_Fy",
         )
     return slice(int(start), int(stop))

@@ -61,14 +61,14 @@ class LikelihoodMaxima:
         return grown if grown.sse < plain.sse or not math.isfinite(plain.sse) else plain
 
     def process_noises(self, calm: LikelihoodFit, scales: Sequence[float]) -> list[StateSpaceNoise]:
-        """Return several sizes of process noise with which a fit that has none begins again.
+        """Return start values of noise, with several sizes of process noise, for a fit without any.
 
-        There are none where readings were low-passed: no filter takes a low pass of trials.
+        There are none where readings were low-passed, as no filter includes a low pass of trials.
 
         Parameters
         ----------
         scales
-            Sizes of process noise beside white measurement noise, in units of the smallest.
+            Sizes of process noise together with white measurement noise, in units of the smallest.
         """
         guess = first_guess(calm.model, self.trials)
         if not guess.std or any(t.low_pass_hz for t in self.trials):

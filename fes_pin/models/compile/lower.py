@@ -17,7 +17,7 @@ from fes_pin.models.compile.layout import WIDTH
 from fes_pin.models.compile.straight import Lines, Value
 
 ROUNDED = (*CONTRACT, "arcp")
-"""Beside fused products: what is divided by the same number several times may be multiplied by its inverse."""
+"""Floating-point flags: fused products, and products with an inverse for several divisions by the same number."""
 KEPT = "%kept"
 """Name of the pointer to what earlier parts of a function leave to later ones."""
 _BINARY = {ca.OP_ADD: "fadd", ca.OP_SUB: "fsub", ca.OP_MUL: "fmul", ca.OP_DIV: "fdiv"}

@@ -11,7 +11,7 @@ from fes_pin.models.stage import Bounds, Effect, Measured, Scalar, Signals, Stag
 
 @dataclass(frozen=True)
 class EffortOffset(Effect):
-    """A constant effort beside the commanded one.
+    """A constant effort in addition to the commanded one.
 
         effort + offset
 

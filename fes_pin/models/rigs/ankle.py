@@ -148,9 +148,9 @@ class Ankle(Rig):
         return {n: max(math.sqrt(max(float(np.nanmean(y**2)) for y in many)), 1e-9) for n, many in read.items() if many}
 
     def pull_in(self, trials: Sequence[Trial]) -> float:
-        """How much of the muscle's torque is in what a dynamometer reads, by a regression; below 0 it counts otherwise.
+        """Return the coefficient of the muscle's torque in a dynamometer's reading; below 0 its sign is opposite.
 
-        Beside it acceleration, velocity and what any function of the angle nearly is: a parabola.
+        The regression also contains acceleration, velocity and a parabola in the angle, close to any function of it.
         """
         from scipy.signal import lfilter  # noqa: PLC0415 - half a second, for dynamometers alone
 

@@ -17,7 +17,7 @@ PLACES = {
     "right hand": ("trunk", (0.25, -0.35, 0.10)),
 }
 """Segment and place in it, m from the centre between the hips or from the lumbar joint: belt, harness, hand rails
-beside the hips (round figures for an adult)."""
+next to the hips (round figures for an adult)."""
 
 
 class ExternalForce(WalkEffect):
