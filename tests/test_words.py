@@ -1,6 +1,9 @@
-"""The documentation uses terms that a reader can search for: those of system identification and statistics."""
+"""Documentation and code use terms that a reader can search for: those of system identification and statistics."""
 
+import io
 import re
+import tokenize
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -8,6 +11,8 @@ import pytest
 ROOT = Path(__file__).parents[1]
 WRITTEN_BY_OTHERS = {"CHANGELOG.md", "accuracy.md"}
 """A record of what was said, and a page that a script writes."""
+PACKAGE = ROOT / "fes_pin"
+ROOMS = sorted({path.relative_to(PACKAGE).parts[0] for path in PACKAGE.rglob("*.py")})
 PAGES = [ROOT / "README.md", *(p for p in sorted((ROOT / "docs").glob("*.md")) if p.name not in WRITTEN_BY_OTHERS)]
 
 WORDS = {
@@ -35,8 +40,25 @@ WORDS = {
 }
 """Words that a stranger cannot search for, and what to write in their place; `docs/glossary.md` has the terms."""
 
-KEPT = {"what is refused or odd before any fit": "of a study that is not fitted, not of a cause"}
+KEPT = {
+    "Fit.doubt is": "an old name, which says that it ends",
+    '"beside"': "an old name, which is still read",
+    "the rest angle": "of a joint at rest",
+}
 """Lines, or parts of these, in which such a word is right, each with the reason."""
+
+KEPT_NAMES = {
+    "doubt": "the option --doubt of `body observe`; Fit.doubt, an old name which says that it ends",
+    "lasts_s": "Endurance.lasts_s, how long a muscle can go on; an old name of StateSpaceNoise.correlation_s",
+    "REFUSED": "Status.REFUSED of a controller: the caller's error, no cause",
+    "told": "Apart.told of a comparison, and its key in JSON",
+}
+"""Names of the code that hold such a word, each with the reason."""
+NAMED = {**WORDS, r"\btold\b": "reported; evaluated", r"\blasts s\b": "correlation time"}
+"""Words that no other name of the code may hold."""
+
+
+TEXT = {tokenize.STRING, tokenize.COMMENT, getattr(tokenize, "FSTRING_MIDDLE", None)}  # of Python 3.12 and later
 
 
 def name(path):
@@ -65,9 +87,49 @@ def _matches(text):
             yield match, term
 
 
+@cache
+def tokens(path):
+    return list(tokenize.generate_tokens(io.StringIO(path.read_text()).readline))
+
+
+def files_of(room):
+    return sorted((PACKAGE / room).rglob("*.py")) if (PACKAGE / room).is_dir() else [PACKAGE / room]
+
+
+def said_in(token):
+    """The words of a string or a comment; of an f-string without its code."""
+    is_f = token.type == tokenize.STRING and "f" in token.string[: token.string.index(token.string[-1])].lower()
+    return re.sub(r"\{[^{}\n]*\}", "{}", token.string) if is_f else token.string
+
+
+def uses_in_code(path, kept=()):
+    """As `uses`, of the strings and comments of a file."""
+    said = [t for t in tokens(path) if t.type in TEXT]
+    return [f"{name(path)}:{t.start[0]}, {one}" for t in said for one in uses(said_in(t), kept)]
+
+
+def names_with_such_words(path):
+    """Names of a file that hold such a word, with what to write in its place."""
+    names = {t.string: t.start[0] for t in tokens(path) if t.type == tokenize.NAME}
+    apart = {n: re.sub(r"(?<=[a-z0-9])(?=[A-Z])|_", " ", n) for n in names}
+    found = ((n, term) for n, words in apart.items() for p, term in NAMED.items() if re.search(p, words, re.IGNORECASE))
+    return [(f"{name(path)}:{names[n]}", n, term) for n, term in found]
+
+
 @pytest.mark.parametrize("page", PAGES, ids=name)
 def test_a_page_uses_the_terms_of_the_field(page):
     assert uses(page.read_text(), KEPT) == []
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_docstrings_comments_and_messages_use_the_terms_of_the_field(room):
+    assert [one for path in files_of(room) for one in uses_in_code(path, KEPT)] == []
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_names_of_the_code_are_terms_of_the_field(room):
+    found = [one for path in files_of(room) for one in names_with_such_words(path)]
+    assert [one for one in found if one[1] not in KEPT_NAMES] == []
 
 
 def test_a_word_is_found_over_the_end_of_a_line_and_not_in_code():
@@ -78,6 +140,23 @@ def test_a_word_is_found_over_the_end_of_a_line_and_not_in_code():
     assert uses("beside a wall", ["beside a wall"]) == []
 
 
+def test_a_word_is_found_in_code(tmp_path, monkeypatch):
+    monkeypatch.setattr(f"{__name__}.ROOT", tmp_path)
+    path = tmp_path / "one.py"
+    path.write_text(
+        '"""A cause\n\nbeside a `beside`."""\nforetoldTrial = f"{anew} anew {x}"  # by turns\nis_told = 1\n'
+    )
+    assert uses_in_code(path) == [
+        "one.py:1, line 3: 'beside': write together with; in a model that also contains; next to (places)",
+        "one.py:4, line 1: 'anew': write again; refit; restart",
+        "one.py:4, line 1: 'by turns': write alternating maximisation (ECM)",
+    ]
+    assert [n for _, n, _ in names_with_such_words(path)] == ["foretoldTrial", "is_told", "is_told"]
+
+
 def test_what_is_kept_is_there():
-    text = "".join(page.read_text() for page in PAGES)
+    files = [path for room in ROOMS for path in files_of(room)]
+    text = "".join(path.read_text() for path in (*PAGES, *files))
     assert [one for one in KEPT if one not in text] == []
+    names = {n for path in files for _, n, _ in names_with_such_words(path)}
+    assert sorted(set(KEPT_NAMES) - names) == []

@@ -112,8 +112,8 @@ class RepeatedProblem(LikelihoodProblem):
         part = self.whitened(one)
         v = self.columns(part, list(self.deviations)) * self._sizes
         own = np.linalg.solve(np.eye(len(at)) + v.T @ v, v.T @ part.residual) * self._sizes
-        beside = np.linalg.lstsq(part.local, part.jacobian[:, at] @ own, rcond=1e-10)[0]
-        moved = one.sensitivities[..., at] @ own - one.sensitivities[..., len(self.free) :] @ beside
+        own_step = np.linalg.lstsq(part.local, part.jacobian[:, at] @ own, rcond=1e-10)[0]
+        moved = one.sensitivities[..., at] @ own - one.sensitivities[..., len(self.free) :] @ own_step
         return replace(one, values=np.where(one.seen, one.values + moved, 0.0))
 
 

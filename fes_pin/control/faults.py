@@ -49,7 +49,7 @@ when it is fatigued as far as muscles are (Riener and Fuhr 1998: 0.35)."""
 MOST_TORQUE = 0.3
 """Share of the muscle's greatest torque that an unknown torque may have: a load of 0.2 kg that the model lacks makes
 0.12, 30 % in stiffness 0.07 to 0.17."""
-LASTING = 9
+PERSISTENT = 9
 """Pulses in a row that an estimate must be absurd for: 0.2 s."""
 
 
@@ -174,9 +174,9 @@ class FaultMonitor:
         if stimulated:
             self.silent = self.silent + 1 if observer.x[4] < LEAST_SHARE else 0
         self.pushed = self.pushed + 1 if abs(observer.x[3]) > self.torque_nm else 0
-        if self.silent >= LASTING:
+        if self.silent >= PERSISTENT:
             self._found(Status.SILENT)
-        if self.pushed >= LASTING:
+        if self.pushed >= PERSISTENT:
             self._found(Status.INCONSISTENT)
 
     def _found(self, fault: Status) -> None:

@@ -34,7 +34,7 @@ _OPENSIM_GROUND = re.compile(
 )
 STORAGE = (".mot", ".sto")
 """Suffixes of OpenSim's files, whose columns have its own names."""
-BESIDE_M = 0.02
+APART_M = 0.02
 """Least sideways distance of two plates' centres of pressure that identifies the right foot's."""
 BENT_RAD, BACK_RAD = 0.7, -0.26
 """Knees that both pass the first and never the second count flexion positive: none extends 0.7 rad beyond straight."""
@@ -215,7 +215,7 @@ def _right_plate(table: Table, names: Mapping[str, str]) -> str:
             raise table.error("missing", next(n for n in ("Fy", "copz") if f"{plate}_{n}" not in names))
         load = np.clip(table.columns[names[f"{plate}_Fy"]], 0.0, None)
         across[plate] = float(load @ table.columns[names[f"{plate}_copz"]] / max(load.sum(), 1e-9))
-    if abs(across["1"] - across["2"]) < BESIDE_M:
+    if abs(across["1"] - across["2"]) < APART_M:
         raise table.error(
             "expected columns that name the foot, r_ and l_: the plates' order does not show it", names["1_Fy"]
         )

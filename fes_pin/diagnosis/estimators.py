@@ -78,7 +78,7 @@ def _with_process_noise(search: LikelihoodSearch) -> tuple[LikelihoodSearch, Fou
 
 def found_with_white_process_noise(search: LikelihoodSearch, found: Found) -> LikelihoodFit | None:
     """Return the best set fitted with white process noise; None where no coloured process noise acts."""
-    if search.was_stopped or not search.models.answered or not _may_last(found.best):
+    if search.was_stopped or not search.models.answered or not _has_coloured_noise(found.best):
         return None
     try:
         with time_limit(search.seconds_left):
@@ -128,7 +128,7 @@ def _parts_and_rivals(found: Found) -> list[LikelihoodFit]:
     return in_parallel(with_white_process_noise, list(parts.values()))
 
 
-def _may_last(fitted: LikelihoodFit) -> bool:
+def _has_coloured_noise(fitted: LikelihoodFit) -> bool:
     """Return whether coloured process noise acts on a rig whose initial states are unknown.
 
     Where the motion is imposed, the effort itself is read, with noise that may be as coloured. Where a rig begins at

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fes_pin.data.errors import InputError
-from fes_pin.data.recorded.formats import REFUSED, read_recording
+from fes_pin.data.recorded.formats import UNREADABLE, read_recording
 from fes_pin.data.recorded.sniff import sniff
 from fes_pin.data.recorded.text import TextForm, read_text_recording
 from fes_pin.data.schema import known_rigs
@@ -216,7 +216,7 @@ def test_a_file_of_another_form_is_refused_with_the_hint(tmp_path):
     path.write_text(text(";", ","))
     with pytest.raises(InputError, match="semicolons between values, decimal commas: `fes-pin new-study` writes"):
         read_trial(path, rig="joint")
-    for suffix in REFUSED:
+    for suffix in UNREADABLE:
         other = path.rename(path.with_suffix(suffix))
         with pytest.raises(InputError, match="this is a"):
             read_trial(other, rig="joint")

@@ -28,7 +28,7 @@ from fes_pin.data.motion import read_motion
 from fes_pin.data.recorded.text import TextForm, read_text_recording, without_twins
 from fes_pin.data.table import MIN_ROWS, Table
 
-REFUSED = {
+UNREADABLE = {
     **dict.fromkeys(
         (".xlsx", ".xls", ".xlsm", ".ods", ".numbers"),
         "a spreadsheet: what a cell shows need not be what was measured; save the sheet as CSV",
@@ -41,7 +41,7 @@ REFUSED = {
 
 def is_text(path: Path) -> bool:
     """Whether a file is read as text, by its suffix."""
-    return path.suffix.lower() not in {*_READERS, *REFUSED}
+    return path.suffix.lower() not in {*_READERS, *UNREADABLE}
 
 
 def check_suffix(path: Path) -> None:
@@ -52,7 +52,7 @@ def check_suffix(path: Path) -> None:
     InputError
         With what to do instead.
     """
-    if why := REFUSED.get(path.suffix.lower()):
+    if why := UNREADABLE.get(path.suffix.lower()):
         raise InputError(f"this is {why}", file=path)
 
 
