@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fes_pin.comparison.held_out import Parting, fits_of, left_out_errors, partings, spreads
+from fes_pin.comparison.held_out import Parting, fits_of, left_out_errors, partings, spread_noise
 from fes_pin.comparison.literature import NOMINAL, RIGS, possible, published_model
 from fes_pin.comparison.result import Apart, Compared, Comparison, apart_from
 from fes_pin.data.asked import asked
@@ -90,12 +90,12 @@ def compare(
     chosen = _chosen(models, extended, nominal, every, library)
     noted = [*measured.warnings, *check_study(joined, nominal)]
     parts = partings(fitted, held)
-    scale, floor = spreads(nominal, every), rough_noise(nominal, every)
+    white, floor = spread_noise(nominal, every), rough_noise(nominal, every)
     compared = []
     with one_thread_each():
         for k, one in enumerate(chosen):
             tell(k / len(chosen), one.name)
-            compared.append(_compared(one, parts, fitted, scale, floor, horizon, given_s))
+            compared.append(_compared(one, parts, fitted, white, floor, horizon, given_s))
     tell(1.0, "done")
     ranked = sorted(compared, key=lambda m: m.percent["free"])
     return Comparison(
@@ -150,21 +150,19 @@ def _compared(
     one: _Chosen,
     parts: Sequence[Parting],
     fitted: Sequence[Trial],
-    scale: Mapping[str, float],
+    white: Mapping[str, Noise],
     floor: NoiseModel,
     horizon_s: float,
     given_s: float | None,
 ) -> Compared:
-    """A model with its errors; `scale` weighs the columns in its fits, `floor` in E."""
-    fits = fits_of(one.model, parts, scale)
-    errors = left_out_errors(fits, parts, scale, horizon_s, given_s)
-    white = {n: Noise(s, (), s) for n, s in scale.items()}
+    """A model with its errors; `white` weighs the columns in its fits, `floor` in E."""
+    fits = fits_of(one.model, parts, white)
+    kinds = left_out_errors(fits, parts, horizon_s, given_s)
     whole = fits[0] if len(parts) == 1 else fit_multistart(Problem(one.model, fitted, white), one.model.parameters())
     trials = [t for p in parts for t in p.held]
     columns = np.array([one.model.rig.output(t.kind) for t in trials])
-    kinds = {n: e for n in ("free", "horizon", "begun", "free_rest") if (e := getattr(errors, n)) is not None}
     weight = np.array([len(t) / floor[c].std ** 2 for t, c in zip(trials, columns, strict=True)])
-    around = weight * errors.around
+    around = weight * kinds.pop("around")
     squares = {n: len(trials) * 100.0 * weight * e / around.sum() for n, e in kinds.items()}
     return Compared(
         name=one.name,
