@@ -13,8 +13,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from fes_pin.data.trial import Trial, derived_trial
-from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood import LikelihoodProblem, unknown_names
+from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.process_noise import spread_of_start
 from fes_pin.infer.noise import NoiseModel
 from fes_pin.infer.problem import Linearized, normal_equations
@@ -103,16 +103,13 @@ def _moved(
     return {**now, **{n: now[n] + float(d) for n, d in step.items()}}
 
 
-def amplitude(fitted: Fit, effect: Effect) -> tuple[float, float]:
+def amplitude(fitted: LikelihoodFit, effect: Effect) -> tuple[float, float]:
     """Return the root mean square size of an effect with amplitudes of each trial's own, and its standard deviation.
 
     The mean is over the trials of the first kind in which the effect acts, as a motion and a force have no common unit.
     The variance of the single estimates is subtracted from their squares.
     """
-    if isinstance(fitted.noise, StateSpaceNoise):
-        names = unknown_names(fitted.model, fitted.noise, fitted.trials)
-    else:
-        names = (*fitted.model.rig.unknowns(fitted.trials[0].kind), *fitted.model.own_unknowns())
+    names = unknown_names(fitted.model, fitted.noise, fitted.trials)
     own = np.array([names.index(f"{effect.name}.{n}") for n in effect.unknowns()])
     slopes = [slope for _, slope in normal_equations(fitted.parts).eliminated]
     squares, spread, kind = [], [], None

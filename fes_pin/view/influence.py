@@ -9,7 +9,6 @@ import numpy as np
 
 from fes_pin.body.controllability import ModalControllability
 from fes_pin.data.errors import InputError
-from fes_pin.data.files import write_bytes
 
 ON = ("joints", "modes")
 
@@ -61,20 +60,14 @@ def check_image(path: str | Path) -> str:
     return kind
 
 
-def plot_influence(result: ModalControllability, path: str | Path, on: str = "joints") -> Path:
-    """Draw the table as a heat map (logarithmic, red positive, blue negative) into an image file.
+def influence_image(result: ModalControllability, kind: str, on: str = "joints") -> bytes:
+    """The table as a heat map (logarithmic, red positive, blue negative): an image of this kind.
 
     Raises
     ------
     InputError
-        `on` is neither `joints` nor `modes`; `path` ends in no kind of image, was read, or cannot be written.
+        `on` is neither `joints` nor `modes`.
     """
-    write_bytes(path, influence_image(result, check_image(path), on))
-    return Path(path)
-
-
-def influence_image(result: ModalControllability, kind: str = "png", on: str = "joints") -> bytes:
-    """The heat map of `plot_influence` as an image of this kind; raises as it does."""
     from matplotlib.colors import SymLogNorm  # noqa: PLC0415
     from matplotlib.figure import Figure  # noqa: PLC0415
 

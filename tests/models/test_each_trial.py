@@ -6,13 +6,15 @@ from models.cases import CASES, RIGS, name_of, trial
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.trial import Trial
-from fes_pin.identify.fit import fit_problem
+from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.identify.likelihood_fit import fit_of
 from fes_pin.identify.per_trial import amplitude, predictions
-from fes_pin.identify.problem import Problem
 from fes_pin.infer.noise import Noise
+from fes_pin.infer.optimum import minimise
 from fes_pin.models.effects import EFFECTS
 from fes_pin.models.model import Model
 from fes_pin.models.predict import predict
+from fes_pin.models.predictor import StateSpaceNoise
 from fes_pin.models.simulate import Simulator, max_step
 from fes_pin.models.store import load_model, model_toml
 
@@ -68,10 +70,11 @@ def test_each_trial_recovers_its_own(one, rig, kind):
     answers = Simulator(model, trials).run(model.parameters(), with_own(model, trials, own))
     names = RIGS[rig].outputs(kind)[:1]
     measured = [t.with_columns(**{n: a.readings[:, 0] for n in names}) for t, a in zip(trials, answers, strict=True)]
-    noise = {names[0]: Noise(0.2 if names[0] == "force_n" else 2e-3)}
+    noise = StateSpaceNoise({names[0]: 0.2 if names[0] == "force_n" else 2e-3})
     values = {n: (0.95 * v if "." not in n else v) for n, v in model.parameters().items()}
-    fitted = fit_problem(Problem(model, measured, noise), values)
-    assert fitted.converged and fitted.sse < 0.05
+    problem = LikelihoodProblem(model, measured, noise)
+    fitted = fit_of(problem, minimise(problem, values))
+    assert fitted.converged and sum(float(p.residual @ p.residual) for p in fitted.parts) < 0.05
     for got, true in zip(fitted.unknowns, own, strict=True):
         for n, v in true.items():
             assert got[n] == pytest.approx(v, abs=0.05 * max(map(abs, true.values())))

@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TypeVar
 
 from fes_pin.data.study import Study
 from fes_pin.diagnosis.experiment import NextExperiment, next_experiment
 from fes_pin.diagnosis.search.score import Scored, best_by_effect
-from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.per_trial import amplitude
 from fes_pin.infer.levels import IDENTIFIABLE_SHARE
 from fes_pin.infer.result import Cause, ParameterEstimate, Ranked
 from fes_pin.infer.scatter import least_apart
 
-F = TypeVar("F", bound=Fit)
 
-
-def estimates(fitted: Fit, name: str) -> dict[str, ParameterEstimate]:
+def estimates(fitted: LikelihoodFit, name: str) -> dict[str, ParameterEstimate]:
     """Return the estimates of a cause's parameters, by name; for amplitudes of each trial's own, their size."""
     info, out = fitted.model.parameter_info(), {}
     (one,) = (e for e in fitted.model.effects if e.name == name)
@@ -34,7 +30,7 @@ def estimates(fitted: Fit, name: str) -> dict[str, ParameterEstimate]:
     return out
 
 
-def alternatives(best: Fit, rivals: Sequence[Fit], name: str) -> tuple[str, ...]:
+def alternatives(best: LikelihoodFit, rivals: Sequence[LikelihoodFit], name: str) -> tuple[str, ...]:
     """Return the equivalents of a cause: the criterion chooses which is named, the likelihood which are equivalent.
 
     A rival that fits as well with more parameters, as a spring in the place of a constant torque, is not excluded.
@@ -43,12 +39,12 @@ def alternatives(best: Fit, rivals: Sequence[Fit], name: str) -> tuple[str, ...]
     return tuple(sorted({e.name for f in not_excluded(best, rivals) for e in f.model.effects} - others - {name}))
 
 
-def not_excluded(best: Fit, rivals: Sequence[F]) -> list[F]:
+def not_excluded(best: LikelihoodFit, rivals: Sequence[LikelihoodFit]) -> list[LikelihoodFit]:
     """Return the rivals whose criterion or cost is not significantly larger than that of the best set."""
     return [f for f in rivals if min(f.criterion - best.criterion, f.sse - best.sse) < least_apart(best, f)]
 
 
-def not_identifiable(best: Fit, scored: Sequence[Scored], not_excited: Sequence[str]) -> tuple[str, ...]:
+def not_identifiable(best: LikelihoodFit, scored: Sequence[Scored], not_excited: Sequence[str]) -> tuple[str, ...]:
     """Return the causes that are not identifiable: nominal parameters take their place, or they act in no trial."""
     found = {e.name for e in best.model.effects}
     by_effect = best_by_effect(scored)
@@ -56,7 +52,7 @@ def not_identifiable(best: Fit, scored: Sequence[Scored], not_excited: Sequence[
     return tuple(sorted(taken | set(not_excited)))
 
 
-def ranking(best: Fit, rivals: Mapping[str, Sequence[Fit]]) -> dict[str, tuple[Ranked, ...]]:
+def ranking(best: LikelihoodFit, rivals: Mapping[str, Sequence[LikelihoodFit]]) -> dict[str, tuple[Ranked, ...]]:
     """Return for each cause the sets with another cause in its place, and the shortfall of each."""
     return {
         name: tuple(Ranked(tuple(e.name for e in f.model.effects), f.sse - best.sse) for f in fits)
