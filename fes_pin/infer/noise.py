@@ -5,11 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 import scipy.linalg
-from numpy.lib.stride_tricks import as_strided
 
 from fes_pin.infer.levels import PARAMETER_PENALTY, WHITE_SHARE
 
@@ -45,9 +43,6 @@ class Noise:
     def __post_init__(self) -> None:
         object.__setattr__(self, "ar", tuple(self.ar))
 
-    def __reduce__(self) -> tuple[type[Noise], tuple[object, ...]]:
-        return Noise, (self.innovation_std, self.ar, self.std, self.step_s)
-
     def whiten(self, values: np.ndarray, dt: float) -> np.ndarray:
         """Return innovations in units of their standard deviation.
 
@@ -64,22 +59,15 @@ class Noise:
             Shape (n / thinning - p, ...): the first p samples only start the filter.
         """
         values = thin(values, thinning(dt, self.step_s))
-        columns = values.reshape(len(values), math.prod(values.shape[1:]))
+        out = np.array(values, dtype=float)
         with np.errstate(invalid="ignore"):  # a simulation that did not stay finite
-            out = _correlated(columns, self._stretch)
-        return out.reshape(len(out), *values.shape[1:])
+            for k, a in enumerate(self.ar, 1):
+                out[k:] -= a * values[:-k]
+        return out[len(self.ar) :] / self.innovation_std
 
     def innovations(self, samples: int, dt: float) -> int:
         """Return the number of innovations of `samples` samples: see `whiten`."""
         return max(samples // thinning(dt, self.step_s) - len(self.ar), 0)
-
-    @cached_property
-    def _stretch(self) -> np.ndarray:
-        """Matrix that whitens `BLOCK` samples from these and the p before, shape (BLOCK, p + BLOCK)."""
-        taps = [*(-a / self.innovation_std for a in reversed(self.ar)), 1.0 / self.innovation_std]
-        made = np.array([[0.0] * k + taps + [0.0] * (BLOCK - 1 - k) for k in range(BLOCK)])
-        made.setflags(write=False)
-        return made
 
 
 def estimate_noise(
@@ -148,8 +136,6 @@ def _autoregression(gram: np.ndarray, p: int) -> tuple[np.ndarray, float]:
     return ar, max(float(power - 2.0 * gram[0, 1 : p + 1] @ ar + ar @ around @ ar), 1e-300)
 
 
-BLOCK = 16
-"""Rows that are whitened by one product: more rows multiply more zeros, fewer rows need more products."""
 FASTEST_S = 4e-3
 """Shortest time step at which noise is modelled, s: 250 Hz resolves the mains, and 48 coefficients span 0.2 s."""
 
@@ -188,20 +174,6 @@ def _lags(residual: np.ndarray, order: int) -> np.ndarray:
     """Return the residual and its past, shape (n - order, order + 1)."""
     n = len(residual)
     return np.stack([residual[order - k : n - k] for k in range(order + 1)], axis=1)
-
-
-def _correlated(values: np.ndarray, stretch: np.ndarray) -> np.ndarray:
-    """Return the columns of `values`, shape (n, columns), filtered by one product for each stretch of rows."""
-    block, reach = stretch.shape
-    p, columns, (row, column) = reach - block, values.shape[1], values.strides
-    count = max(len(values) - p, 0)
-    full = count // block * block
-    out = np.empty((count, columns))
-    windows = as_strided(values, (full // block, reach, columns), (block * row, row, column), writeable=False)
-    np.matmul(stretch, windows, out=out[:full].reshape(full // block, block, columns))
-    if rest := count - full:
-        np.matmul(stretch[:rest, : rest + p], values[full:], out=out[full:])
-    return out
 
 
 def likeliest_autoregression(pieces: Sequence[np.ndarray], orders: Sequence[int]) -> tuple[float, ...]:
