@@ -27,7 +27,7 @@ from fes_pin.data.motion import coordinates_of, ground_reaction_of, on_common_ti
 from fes_pin.data.numbers import instance
 from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.recorded.columns import Columns
-from fes_pin.data.recorded.hint import NEW_STUDY, read_csv_or_hint
+from fes_pin.data.recorded.sniff import NEW_STUDY, read_csv_or_hint
 from fes_pin.data.schema import NumberKey, RigSchema, check_conditions, checked_numbers, schema_of
 from fes_pin.data.show import frame
 from fes_pin.data.table import MIN_ROWS, Table, check_time, check_times, format_csv

@@ -1,4 +1,4 @@
-"""What form a text file seems to have: proposed to a person, never used unseen."""
+"""What form a text file seems to have: proposed to a person, or named by an error, and never used unseen."""
 
 from __future__ import annotations
 
@@ -8,11 +8,14 @@ from pathlib import Path
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import read_bytes, read_text
-from fes_pin.data.recorded.text import DELIMITERS, MISSING, TextForm, cells_of
+from fes_pin.data.recorded.formats import check_suffix, is_text
+from fes_pin.data.recorded.text import DELIMITERS, MISSING, TextForm, cells_of, read_csv
+from fes_pin.data.table import Table
 from fes_pin.data.units import UNITS, known_unit
 
 LOOKED_AT = 400
 """Lines that are looked at; no preamble of an instrument is nearly as long."""
+NEW_STUDY = "`fes-pin new-study` writes a [columns] table that reads it as it is"
 COMMENTS = ("#", "%", "//")
 _NUMBER = {
     ".": re.compile(r"^[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$"),
@@ -110,3 +113,34 @@ def _are_units(cells: list[str]) -> bool:
     stated = [cell for cell in bare if cell not in ("", "-", "1")]
     bracketed = all(cell[:1] in "[({" for cell in cells if cell)
     return bool(stated) and (bracketed or all(known_unit(cell, tuple(UNITS)) for cell in stated))
+
+
+def read_csv_or_hint(path: str | Path) -> Table:
+    """As `read_csv`; where that fails and the file seems to be written otherwise, the error says how.
+
+    Raises
+    ------
+    InputError
+        As `read_csv`.
+    """
+    path = Path(path)
+    check_suffix(path)
+    if not is_text(path):
+        raise InputError(f"expected CSV, found {path.suffix}; {NEW_STUDY}", file=path)
+    try:
+        return read_csv(path)
+    except InputError as error:
+        hint = _hint(path)
+        if not hint:
+            raise
+        message = f"{error.message}; {hint}"
+        raise InputError(message, file=error.file, row=error.row, column=error.column) from None
+
+
+def _hint(path: Path) -> str:
+    try:
+        form, _ = sniff(path)
+    except InputError:
+        return ""
+    words = form.in_words()
+    return f"it seems to have {words}: {NEW_STUDY}" if words else ""

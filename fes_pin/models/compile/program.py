@@ -7,11 +7,14 @@ import logging
 import threading
 from dataclasses import asdict
 from functools import cache
+from importlib.metadata import version
+from pathlib import Path
 from typing import Protocol
 
 import numpy as np
 
 from fes_pin import settings
+from fes_pin.data.sources import code_hash
 from fes_pin.models.compile.disk_cache import read_cached, write_cached
 from fes_pin.models.compile.equations import Equations, derive
 from fes_pin.models.compile.layout import Layout
@@ -101,7 +104,6 @@ def _native(model: Model, layout: Layout) -> Program | None:
     """Machine code from the cache or compiled; None if it cannot be made here."""
     try:
         from fes_pin.models.compile import machine, native  # noqa: PLC0415 - llvmlite may be missing
-        from fes_pin.models.compile.signature import source_signature  # noqa: PLC0415
 
         classes = [f"{c.__module__}.{c.__qualname__}" for c in _classes(model)]
         if not all(name.startswith("fes_pin.") for name in classes):  # the signature knows only our own source
@@ -115,6 +117,12 @@ def _native(model: Model, layout: Layout) -> Program | None:
     except (ImportError, OSError, RuntimeError, NotImplementedError) as problem:
         _say_slow(" ".join(str(problem).split()))
         return None
+
+
+@cache
+def source_signature() -> str:
+    """Changes whenever an equation, the compiler or CasADi changes."""
+    return f"{version('casadi')} {code_hash(Path(__file__).parents[1])}"
 
 
 @cache

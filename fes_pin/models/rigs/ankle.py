@@ -124,15 +124,10 @@ class Ankle(Rig):
         return (*self.needed, "gravity_cos", "gravity_sin", *own[kind])
 
     def trial_constants(self, trial: Trial) -> dict[str, float]:
-        known = {name: float(self.constants[name]) for name in self.needed}
-        a, b = _foot_gravity(known["foot_mass_kg"], known["com_distance_m"])
-        known.update(gravity_cos=a, gravity_sin=b)
-        if trial.kind == IMPOSED:
-            own = {"load_kg": trial.conditions.get("load_kg", 0.0), "torque_sign": self.constants.get("torque_sign", 1)}
-        else:
-            condition = "load_kg" if trial.kind == "motion" else "angle_rad"
-            own = {condition: trial.conditions[condition]}
-        return {**known, **{name: float(value) for name, value in own.items()}}
+        a, b = _foot_gravity(float(self.constants["foot_mass_kg"]), float(self.constants["com_distance_m"]))
+        unstated = {"load_kg": 0.0, "torque_sign": 1.0} if trial.kind == IMPOSED else {}
+        known = {**unstated, **self.constants, **trial.conditions, "gravity_cos": a, "gravity_sin": b}
+        return {name: float(known[name]) for name in self.constant_names(trial.kind)}
 
     def recruited(self, trial: Trial) -> np.ndarray:
         known = (float(self.constants[n]) for n in ("threshold_us", "saturation_us"))
