@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy import special
@@ -24,9 +24,9 @@ from fes_pin.identify.fit import Fit, fit_multistart, fit_problem, noise_of, rou
 from fes_pin.identify.per_trial import halves
 from fes_pin.identify.problem import Problem
 from fes_pin.infer.levels import CLAIM_LEVEL, EXPLAINED_AS_WELL, FEWEST_STATED, MISREAD_SCORE
-from fes_pin.infer.noise import NoiseModel, as_white
-from fes_pin.infer.problem import Linearized, normal_equations
-from fes_pin.infer.projection import without_locals
+from fes_pin.infer.noise import as_white
+from fes_pin.infer.problem import Linearized
+from fes_pin.infer.projection import Projection, without_locals
 from fes_pin.models.model import Model
 from fes_pin.models.simulate import simulated_trial
 from fes_pin.workers import in_parallel
@@ -161,35 +161,30 @@ def _screen(
     whole: Fit, trials: Sequence[Trial], wanted: Sequence[tuple[int, str]], sizes: dict[str, float]
 ) -> list[tuple[int, str]]:
     """Return the conditions of largest score in a model whose parameters are free too, under white noise."""
-    noise = as_white(noise_of(whole))
-    problem = Problem(whole.model, trials, noise)
-    parts = problem.linearize(whole.values, whole.unknowns)
-    system = normal_equations(parts)
-    inverse = np.linalg.pinv(system.hessian, hermitian=True)
+    white = replace(whole, noise=as_white(noise_of(whole)))
+    projection = Projection(Problem(whole.model, trials, white.noise).linearize(whole.values, whole.unknowns))
 
     def score(pick: tuple[int, str]) -> float:
         i, name = pick
-        column = _column(whole.model, trials[i], name, whole, noise, sizes[name])
-        own = parts[i]
-        column, r, j = (without_locals(own, x) for x in (column[:, None], own.residual[:, None], own.jacobian))
-        cross = j.T @ column[:, 0]
-        power = float(column[:, 0] @ column[:, 0]) - float(cross @ inverse @ cross)
-        along = float(column[:, 0] @ r[:, 0]) - float(cross @ inverse @ system.gradient)
-        return along**2 / power if power > 1e-9 * max(float(column[:, 0] @ column[:, 0]), 1e-300) else 0.0
+        columns = np.zeros((len(projection.residual), 1))
+        columns[projection.trials[i], 0] = _column(white, trials[i], name, sizes[name])
+        left = projection(columns)[:, 0]
+        power, before = float(left @ left), float(np.sum(columns**2))
+        return float(left @ projection.residual) ** 2 / power if power > 1e-9 * max(before, 1e-300) else 0.0
 
     scores = in_parallel(score, list(wanted))
     return [wanted[k] for k in np.argsort(scores)[::-1][:CANDIDATES] if scores[k] > MISREAD_SCORE]
 
 
-def _column(model: Model, trial: Trial, name: str, fitted: Fit, noise: NoiseModel, step: float) -> np.ndarray:
+def _column(fitted: Fit, trial: Trial, name: str, step: float) -> np.ndarray:
     """Return the whitened derivative of a trial's simulation by a condition, shape (m,)."""
-    there = model.rig.stated(trial)[name]
-    low, high = (_residual(model, model.rig.restated(trial, name, there + s), fitted, noise) for s in (-step, step))
+    rig, there = fitted.model.rig, fitted.model.rig.stated(trial)[name]
+    low, high = (_linearized(fitted, rig.restated(trial, name, there + s)) for s in (-step, step))
     return (low.residual - high.residual) / (2.0 * step)
 
 
-def _residual(model: Model, trial: Trial, fitted: Fit, noise: NoiseModel) -> Linearized:
-    problem = Problem(model, [trial], noise, fitted.free)
+def _linearized(fitted: Fit, trial: Trial) -> Linearized:
+    problem = Problem(fitted.model, [trial], fitted.noise, fitted.free)
     return problem.linearize(fitted.values, problem.start_unknowns())[0]
 
 
@@ -205,12 +200,11 @@ def _left_out(
     others = [k for k in range(len(trials)) if k != i]
     rest = [trials[k] for k in others]
     near = fit_problem(Problem(whole.model, rest, as_white(noise_of(whole))), whole.values)
-    noise = noise_of(near)
-    fitted = fit_problem(Problem(whole.model, rest, noise), near.values)
+    fitted = fit_problem(Problem(whole.model, rest, noise_of(near)), near.values)
     if not math.isfinite(fitted.sse):
         return None
-    own = _step(fitted, trials[i], name, noise, sizes[name])
-    steps = [_step(fitted, trials[k], n, noise, sizes[n], 1) for k, n in wanted if k != i]
+    own = _step(fitted, trials[i], name, sizes[name])
+    steps = [_step(fitted, trials[k], n, sizes[n], 1) for k, n in wanted if k != i]
     finite = [s for s in steps if math.isfinite(s.z)]
     if len(finite) < FEWEST_STATED - 1 or not math.isfinite(own.z):
         return None
@@ -221,7 +215,7 @@ def _left_out(
     if not p < CLAIM_LEVEL or own.left > EXPLAINED_AS_WELL * max(usual, 1.0):
         return None
     stated = whole.model.rig.stated(trials[i])[name]
-    halves = [_step(fitted, trials[i], name, noise, sizes[name], half=k).value for k in (0, 1)]
+    halves = [_step(fitted, trials[i], name, sizes[name], half=k).value for k in (0, 1)]
     return Misread(
         trials[i].name,
         name,
@@ -235,9 +229,7 @@ def _left_out(
     )
 
 
-def _step(
-    fitted: Fit, trial: Trial, name: str, noise: NoiseModel, size: float, steps: int = STEPS, half: int | None = None
-) -> _Step:
+def _step(fitted: Fit, trial: Trial, name: str, size: float, steps: int = STEPS, half: int | None = None) -> _Step:
     """Estimate a condition from its own trial by Gauss-Newton steps, as a difference from the stated value.
 
     Parameters
@@ -249,8 +241,8 @@ def _step(
     begun = rig.stated(trial)[name]
     covariance = np.where(np.isfinite(fitted.covariance), fitted.covariance, 0.0)
     for _ in range(steps):
-        part = _residual(fitted.model, now, fitted, noise)
-        column = without_locals(part, _column(fitted.model, now, name, fitted, noise, size)[:, None])[:, 0]
+        part = _linearized(fitted, now)
+        column = without_locals(part, _column(fitted, now, name, size)[:, None])[:, 0]
         r, j = without_locals(part, part.residual[:, None])[:, 0], without_locals(part, part.jacobian)
         if half is not None:
             column = np.where(halves(len(column))[half], column, 0.0)
@@ -263,7 +255,7 @@ def _step(
         now = rig.restated(now, name, rig.stated(now)[name] + move)
         if abs(move) < ENDS * std:
             break
-    r = without_locals(part, _residual(fitted.model, now, fitted, noise).residual[:, None])[:, 0]
+    r = without_locals(part, _linearized(fitted, now).residual[:, None])[:, 0]
     return _Step(rig.stated(now)[name] - begun, std, float(r @ r) / max(len(r), 1))
 
 
