@@ -1,1 +1,1 @@
-"""What differs between groups of trials of one rig."""
+"""Contrasts: changes between groups of trials of one rig."""

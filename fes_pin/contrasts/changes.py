@@ -1,4 +1,4 @@
-"""What is said of each change, and of what did not change."""
+"""Reports of each change, and of parameters and causes that did not change."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from fes_pin.models.stage import Effect
 def change_of(
     models: ContrastModels, found: Found, item: Item, catalogue: Catalogue, evidence: Evidence | None
 ) -> Change:
-    """One change of the result: its size in each group, in words, and the candidates equivalent to it."""
+    """Return one change of the result: its size in each group, in words, and its equivalents."""
     best, model, groups = found.best, found.best.model, tuple(found.best.model.models)
     assert item.group is not None
     wider = math.sqrt(max(1.0, models.spread(best, found.without[str(item)]).phi))
@@ -49,7 +49,7 @@ def change_of(
 def _by_group(
     best: Grouped, item: Item, groups: tuple[str, ...], nominal: bool, wider: float
 ) -> dict[str, dict[str, ParameterEstimate]]:
-    """Each parameter of what changed in each group, with deviations so much wider; its null where a group has none."""
+    """Return each parameter of a change in each group, with widened deviations; its null where a group has none."""
     model = best.model
     assert item.group is not None
     own = model.models[item.group]
@@ -68,7 +68,7 @@ def _by_group(
 
 
 def _equivalents(found: Found, item: Item) -> tuple[str, ...]:
-    """What could stand in a change's place; of driven rigs also with more parameters, if it is as likely."""
+    """Return the equivalents of a change; of driven rigs also with more parameters, if they are as likely."""
     best, near = found.best, set[str]()
     for rival in found.rivals[str(item)]:
         criterion = min(rival.criterion, rival.sse + best.criterion - best.sse) if best.is_driven else rival.criterion
@@ -80,12 +80,13 @@ def _equivalents(found: Found, item: Item) -> tuple[str, ...]:
 def not_changed(
     models: ContrastModels, best: Grouped
 ) -> tuple[dict[str, float], dict[str, ParameterEstimate], tuple[str, ...]]:
-    """How large a change would have been seen: of what the model has as a share, of other causes in their units.
+    """Return the sizes above which changes are excluded at 95 % power.
 
     Returns
     -------
     tuple
-        Both by name, and the names of what could have changed unseen.
+        For parameters of the model, shares of their values by name; for other causes, sizes in their units by name; and
+        the names of parameters and causes whose change is not testable.
     """
     single = 1.0 - (1.0 - CLAIM_LEVEL) ** (1.0 / models.family.tests)
     reach, changed = normal_quantile(1.0 - 0.5 * single) + normal_quantile(SEEN_POWER), {i.name for i in best.items}
@@ -101,7 +102,7 @@ def not_changed(
 
 
 def _largest(sizes: list[tuple[ItemScore, float]]) -> dict[str, float]:
-    """The largest size of each name."""
+    """Return the largest size of each name."""
     out: dict[str, float] = {}
     for one, size in sizes:
         out[one.item.name] = max(out.get(one.item.name, size), size)
@@ -109,17 +110,17 @@ def _largest(sizes: list[tuple[ItemScore, float]]) -> dict[str, float]:
 
 
 def _value(best: Grouped, one: ItemScore) -> float:
-    """What a parameter is in groups that share it."""
+    """Return the value of a parameter in groups that share it."""
     return best.model.parameters()[one.item.name]
 
 
 def _unit(best: Grouped, effect: Effect) -> str:
-    """Of the first amplitude of a cause."""
+    """Return the unit of the first amplitude of a cause."""
     return effect.parameters()[effect.amplitudes()[0]].in_units(best.model.rig.units()).unit
 
 
 def misread_change(models: ContrastModels, misread: Misread) -> Change:
-    """A trial that was restated, as a change of its group."""
+    """Return a restated trial as a change of its group."""
     known = models.nominal_model.rig.schema.conditions.get(misread.condition)
     estimate = ParameterEstimate(misread.value, misread.std, known.unit if known is not None else "m")
     group = next(g for g, many in models.trials.items() if misread.trial in (t.name for t in many))

@@ -1,4 +1,4 @@
-"""What differs between groups of trials: which parameter or cause, by how much, and what certainly did not change."""
+"""Contrast of groups of trials: the parameters and causes that changed, by how much, and those that did not."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
 from fes_pin.models.nominal import nominal_model
 from fes_pin.workers import Progress, noting_stops, one_thread_each, time_limit
 
-UNCONFIRMED = "{} stands out of the trials that were fitted, but those that were held out do not confirm it"
+UNCONFIRMED = "{} is significant in the fitted trials, but the held-out trials do not confirm it"
 
 
 def contrast(
@@ -48,27 +48,27 @@ def contrast(
     limit: float | None = None,
     progress: Progress | None = None,
 ) -> Contrast:
-    """Find out what differs between groups of trials of one rig.
+    """Find the changes between groups of trials of one rig.
 
     Parameters
     ----------
     study
-        With a group in every trial; or what was measured before.
+        A study with a group in every trial; or the study of the first group.
     after
-        A study of the same rig: the second group.
+        The study of the second group, of the same rig.
     by
         "group", or a condition that every trial states.
     groups
-        Those that are compared, in this order; by default all, in the order of the study.
+        Groups that are compared, in this order; by default all, in the order of the study.
     library
-        Causes besides those written here and installed; see `diagnose`.
+        Causes in addition to those of the library and of installed packages; see `diagnose`.
     seed
         Of simulated critical values.
     limit
         Seconds that the search may take; then it stops at the best set so far, and the verdict is "stopped". The fit of
-        the model that all groups share comes on top.
+        the model that all groups share takes time in addition.
     progress
-        Called with a share done and a few words.
+        Called with the share that is done and a few words.
 
     Returns
     -------
@@ -98,18 +98,18 @@ def contrast(
 
 
 class _Work:
-    """What turns a study of groups into a contrast.
+    """The steps from a study of groups to its contrast.
 
     Parameters
     ----------
     study
-        As measured, with a group in every trial.
+        The measured study, with a group in every trial.
     catalogue, seed, tell
-        As of `contrast`.
+        As in `contrast`.
     end
-        When searches must have ended, of `time.perf_counter`.
+        Time at which searches stop, of `time.perf_counter`.
     stops
-        Holds something once a search had to; see `noting_stops`.
+        Not empty once a search was stopped; see `noting_stops`.
     """
 
     def __init__(
@@ -122,7 +122,7 @@ class _Work:
         self.driven = self.fed_back or any(t.kind == IMPOSED for t in train)
 
     def contrast(self) -> Contrast:
-        """Search what differs, and judge what is found."""
+        """Search the changes, judge them, and return the contrast."""
         noise = self._noise_of_efforts()
         log, unit = Log(effort_noise=noise), self.nominal.rig.units()["effort"]
         trials, said = self._searched([log.applied(t) for t in self.study.trials])
@@ -137,25 +137,25 @@ class _Work:
         return self._judged(search, found, made, said)
 
     def _noise_of_efforts(self) -> float:
-        """Noise that efforts were recorded with in all groups, in their unit; 0 where the likelihood supports none."""
+        """Return the noise of recorded efforts in all groups, in their unit; 0 where the likelihood supports none."""
         if not self.fed_back or not all(EFFORT in self.nominal.rig.input_columns(t) for t in self.study.trials):
             return 0.0
         faults = LogFaults(self.study.trials, lambda trials: self._searched(trials)[0], self.end)
         return faults.effort_noise_of_nominal(self.nominal)
 
     def _searched(self, trials: Sequence[Trial]) -> tuple[list[Trial], list[str]]:
-        """What a search takes of the trials of each group, and what is to be said."""
+        """Return the trials of each group, or the parts of them, that a search takes, and warnings."""
         groups, out, said = in_groups(split(replace(self.study, trials=tuple(trials)))[0]), [], []
         for group, many in groups.items():
             part, _, words = searched_part(many, self.study.schema, self.fed_back, len(groups))
             out += part
             said += [f"group {group}: {one}" for one in words]
         if min(map(len, in_groups(out).values())) < 2:
-            said.append("a group has one trial only: how much repeats differ is judged from its parts")
+            said.append("a group has one trial only: differences between repeats are estimated from its parts")
         return out, said
 
     def _found(self, trials: Sequence[Trial]) -> tuple[ContrastSearch, Found, Misread | None]:
-        """A search, what it found, and the trial that was restated for it."""
+        """Return a search, its result, and the trial that was restated for it."""
         with time_limit(self.end - time.perf_counter()):
             search, found, made = GroupConditions(self.nominal, self._run).search(trials)
         return search, found, made.misread if made is not None else None
@@ -167,7 +167,7 @@ class _Work:
         return search, search.run()
 
     def _judged(self, search: ContrastSearch, found: Found, misread: Misread | None, said: list[str]) -> Contrast:
-        """Everything that is said of a search that has run."""
+        """Return the contrast of a search that has run."""
         state = ContrastVerdict(search).of(found)
         models, found, best, left = search.models, state.found, state.found.best, state.weighed.lack_of_fit
         evidence = state.weighed.evidence
@@ -175,9 +175,9 @@ class _Work:
         changes += [misread_change(models, misread)] if misread is not None else []
         unchanged, excluded, untestable = not_changed(models, best)
         said += [*state.weighed.said, *_smoothed(best), *(UNCONFIRMED.format(n) for n in state.rejected)]
-        if left.unexplained:  # sizes that would have been seen hold for a model that is right
+        if left.unexplained:  # excluded sizes hold for a right model only
             unchanged, excluded = {}, {}
-            said.append("with a lack of fit in one group it cannot be said what did not change")
+            said.append("with a lack of fit in one group no change can be excluded")
         return Contrast(
             study=self.study,
             groups=tuple(models.trials),
@@ -197,7 +197,7 @@ class _Work:
 
 
 def _provenance(study: Study, after: Study | None, seed: int) -> Provenance:
-    """Where a contrast made now comes from: the files of a second study stand under its name, as those of the first."""
+    """Return the provenance of a contrast, with the files of each study listed by its name."""
     made = provenance_now(study, seed)
     if after is None:
         return made
@@ -206,7 +206,7 @@ def _provenance(study: Study, after: Study | None, seed: int) -> Provenance:
 
 
 def _smoothed(best: Grouped) -> tuple[str, ...]:
-    """Remarks on smoothed readings of a driven rig: their noise has the same correlation time in all groups."""
+    """Return warnings about smoothed readings of a driven rig, whose noise has one correlation time in all groups."""
     noise = next(iter(best.weights.values())).noise
     return words_of_reading(noise, best.model.rig, best.fit.trials)
 

@@ -1,4 +1,4 @@
-"""Faults of a recording that are no change: a trial that states a wrong condition, efforts written down late."""
+"""Faults of a recording that are no change: a trial that states a wrong condition, efforts that were recorded late."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ from fes_pin.workers import in_parallel
 
 
 class GroupConditions(Conditions[ContrastSearch, Found]):
-    """Conditions of the trials of a contrast: one that stands out does so of its own group."""
+    """Conditions of the trials of a contrast: an outlier is one among the trials of its own group."""
 
     def misread(self, trials: Sequence[Trial], searched: Found | None) -> Misread | None:
-        """The trial that stands out of its group, all groups being asked."""
+        """Return the trial that is an outlier in its group, of all groups."""
         groups = in_groups(trials)
         models = dict.fromkeys(groups, self.nominal) if searched is None else searched.best.model.models
         found = [one for g, many in groups.items() if (one := find_misread(models[g], many)) is not None]
@@ -36,24 +36,24 @@ class GroupConditions(Conditions[ContrastSearch, Found]):
         return replace(first, p_value=len(groups) * first.p_value)
 
     def has_causes(self, searched: Found) -> bool:
-        """Whether anything was found."""
+        """Return whether any cause or change was found."""
         return bool(searched.best.items)
 
     def leaves_noise(self, made: Restated[ContrastSearch, Found]) -> bool:
-        """True: where nothing changed, and nothing is wrong, no explanation is simpler."""
+        """Return True: where nothing changed and nothing is wrong, no explanation is simpler."""
         return True
 
     def saved(self, searched: Found, trials: Sequence[Trial], made: Restated[ContrastSearch, Found]) -> float:
-        """The fall of the penalised likelihood, with the noise of the restated trials."""
+        """Return the fall of the criterion, with the noise of the restated trials."""
         best, after = searched.best, made.searched.best
         fits = GroupedFits(self.nominal, in_groups(trials), best.is_driven)
         return fits.converged(best.model, best.items, after.weights, best.fit.unknowns).criterion - after.criterion
 
 
 def late_in_groups(models: ContrastModels, found: Found) -> float | None:
-    """How late the efforts of a driven rig were written down, s, in the mean over groups; None where one is in time.
+    """Return the mean delay over groups with which efforts were recorded, s; None where those of a group are in time.
 
-    A cause of all groups may be mistaken for it: then the nominal model is asked as well.
+    A cause of all groups may be mistaken for a delay: the delay is then estimated with the nominal model as well.
     """
     rig, trials = models.nominal_model.rig, [t for many in models.trials.values() for t in many]
     if not models.driven or not all(EFFORT in rig.input_columns(t) for t in trials):
@@ -63,7 +63,7 @@ def late_in_groups(models: ContrastModels, found: Found) -> float | None:
 
 
 def _late_in(models: ContrastModels, one: Grouped) -> float | None:
-    """How late efforts are by a set, each group with nominal values of its own; None where one is in time."""
+    """Return the delay by a set, each group with nominal values of its own; None where one group is in time."""
 
     def late_in(group: str) -> float:
         part = models.maxima.part(one, group)
@@ -78,6 +78,6 @@ def _late_in(models: ContrastModels, one: Grouped) -> float | None:
 
 
 def is_likelier(timed: Grouped, recorded: Grouped) -> bool:
-    """True if efforts in time explain the same readings with a lower penalised likelihood."""
+    """Return whether corrected efforts explain the same readings with a lower criterion."""
     one, other = ({w.noise.correlation_s for w in f.weights.values()} for f in (timed, recorded))
     return one == other and timed.criterion < recorded.criterion

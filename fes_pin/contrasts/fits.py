@@ -21,25 +21,25 @@ from fes_pin.models.model import Model
 from fes_pin.workers import in_parallel
 
 LOOK = 4
-"""Steps of a first fit under the noise of a smaller set."""
+"""Steps of a first fit at the noise of a smaller set."""
 ROUNDS = 6
-"""Turns of parameters and noise, at most."""
+"""Most alternations of parameters and noise."""
 
 Weights = Mapping[str, Repeats]
-"""By group: noise, and how much repeats scatter."""
+"""For each group, its noise and the scatter of repeats."""
 
 
 class GroupedFits:
-    """Fits of grouped models to some trials, each with everything that is random.
+    """Fits of grouped models to some trials, each with its noise.
 
     Parameters
     ----------
     nominal
-        The believed model of all groups.
+        The nominal model of all groups.
     trials
-        By group.
+        Trials by group.
     driven
-        Whether process noise acts from the first.
+        Whether fits have process noise from the beginning.
     """
 
     def __init__(self, nominal: Model, trials: Mapping[str, Sequence[Trial]], driven: bool) -> None:
@@ -59,7 +59,7 @@ class GroupedFits:
         return min((self.converged(model, (), w, None) for w in starts), key=lambda f: f.criterion)
 
     def _without_scatter(self, model: GroupedModel, noises: Weights, unknowns: Unknowns) -> dict[str, Repeats]:
-        """The noise of each group without all that nominal values of each trial's own explain."""
+        """Return the noise of each group without the part that nominal values of each trial's own explain."""
         known, info = self.nominal.parameters(), self.nominal.parameter_info()
         much = {n: abs(known[n]) or info[n].scale for n in self.nominal.fitted_parameters()}
         problem = GroupedProblem(model, self.trials, {g: Repeats(w.noise, much) for g, w in noises.items()})
@@ -67,11 +67,11 @@ class GroupedFits:
         return problem.weights
 
     def _simulated(self, group: str) -> LikelihoodFit:
-        """The nominal fit of a group alone without process noise."""
+        """Return the nominal fit of a group alone without process noise."""
         return LikelihoodFits(self.nominal, self.trials[group], (), answered=False, noise=MEASUREMENT).nominal()
 
     def _alone(self) -> list[LikelihoodFit]:
-        """The nominal fit of each group alone; measurement noise has the same correlation time in all groups."""
+        """Return the nominal fit of each group alone, with one correlation time of measurement noise in all groups."""
 
         def fitted(group: str, correlation_s: float) -> LikelihoodFit:
             trials = self.trials[group]
@@ -90,9 +90,9 @@ class GroupedFits:
         return Grouped.of(items, problem, alternate(problem, model.parameters(), unknowns, ROUNDS, LOOK))
 
     def go_on(self, one: Grouped) -> Grouped:
-        """Let a set converge; of process noise also from little, and from what is in each group alone.
+        """Fit a set until it converges, also from little process noise and from that of each group alone.
 
-        A smaller set's random effort has taken what it got wrong, and might keep it: a likelihood can have two optima.
+        The process noise of a smaller set explains its error, and may keep doing so: a likelihood can have two maxima.
         """
         starts = [one.weights, *self._begun]
         return min(
@@ -100,11 +100,11 @@ class GroupedFits:
         )
 
     def look(self, model: GroupedModel, items: Collection[Item], base: Grouped) -> Grouped:
-        """A first fit of a model under the weights of another set."""
+        """Return a first fit of a model with the weights of another set."""
         return self._looked(model, items, base.weights, base.fit.unknowns)
 
     def weighed_as(self, one: Grouped, other: Grouped) -> Grouped:
-        """The set again, under the weights of another: only then are the residuals of both in one unit."""
+        """Return the set with the weights of another, so that the residuals of both have one unit."""
         return self._looked(one.model, one.items, other.weights, one.fit.unknowns)
 
     def _looked(
@@ -114,7 +114,7 @@ class GroupedFits:
         return Grouped.of(items, problem, minimise(problem, model.parameters(), unknowns, LOOK))
 
     def refitted(self, one: Grouped, held: Collection[int]) -> Grouped:
-        """The set again, fitted without some trials, by their numbers, under its own weights."""
+        """Return the set fitted without some trials, by their numbers, with its own weights."""
         kept = by_group(((k, t) for k, t in enumerate(one.fit.trials)), self.trials)
         trials = {g: [t for k, t in many if k not in held] for g, many in kept.items()}
         problem = GroupedProblem(one.model, trials, one.weights)
@@ -122,14 +122,14 @@ class GroupedFits:
         return Grouped.of(one.items, problem, minimise(problem, one.fit.values, unknowns))
 
     def part(self, one: Grouped, group: str, alone: int | None = None) -> LikelihoodFit:
-        """A group's part of a fit as a fit of that group's own, to its own trials, or to one of them `alone`."""
+        """Return a group's part of a fit as a fit of that group, to its own trials or to one of them `alone`."""
         rows = slice(None) if alone is None else slice(alone, alone + 1)
         trials, unknowns = self.trials[group][rows], by_group(one.fit.unknowns, self.trials)[group][rows]
         problem = LikelihoodProblem(one.model.models[group], trials, one.weights[group].noise)
         return fit_of(problem, minimise(problem, one.model.models[group].parameters(), unknowns, LOOK))
 
     def with_process_noise(self, one: Grouped) -> Grouped | None:
-        """A set again with process noise; None where that is none the likelier, by the penalised likelihood."""
+        """Return a set fitted with process noise; None where that does not lower the criterion."""
         parts = {g: self.part(one, g) for g in self.trials}
         begun = {g: LikelihoodMaxima(f.trials).process_noises(f, FIRST_NOISE_SCALES) for g, f in parts.items()}
         if not all(begun.values()):

@@ -30,7 +30,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Item:
-    """Something that a grouped model has and the nominal one has not.
+    """A cause or change of a grouped model, which the nominal one does not have.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class Item:
 
     @classmethod
     def of(cls, text: str) -> Item:
-        """The item of a name, or of a name, "@" and a group."""
+        """Return the item of a name, or of a name, "@" and a group."""
         name, _, group = text.partition("@")
         return cls(name, group or None)
 
@@ -76,11 +76,11 @@ class GroupedModel:
         return next(iter(self.models.values())).rig
 
     def path(self, name: str, group: str) -> str:
-        """What a parameter of a group's model is called here."""
+        """Return the path of a parameter of a group's model."""
         return f"{name}@{group}" if (name, group) in self.own else name
 
     def parameters(self) -> dict[str, float]:
-        """The value of every parameter, by its path here."""
+        """Return the value of every parameter, by its path."""
         return {self.path(n, g): v for g, m in self.models.items() for n, v in m.parameters().items()}
 
     def parameter_info(self) -> dict[str, ParameterInfo]:
@@ -89,19 +89,19 @@ class GroupedModel:
 
     @cached_property
     def free(self) -> tuple[str, ...]:
-        """What a fit moves."""
+        """Paths of the fitted parameters."""
         return tuple(dict.fromkeys(self.path(n, g) for g, m in self.models.items() for n in m.fitted_parameters()))
 
     def own_unknowns(self) -> tuple[str, ...]:
-        """Unknowns of trials that effects bring: none, amplitudes are each group's here."""
+        """Return the unknowns of trials that belong to effects: none, as amplitudes belong to groups here."""
         return ()
 
     def of(self, group: str, values: Mapping[str, float]) -> dict[str, float]:
-        """The values of one group's model."""
+        """Return the values of one group's model."""
         return {n: values[self.path(n, group)] for n in self.models[group].parameters()}
 
     def with_parameters(self, values: Mapping[str, float]) -> GroupedModel:
-        """The same with other values."""
+        """Return the same model with other values."""
         full = {**self.parameters(), **values}
         return GroupedModel({g: m.with_parameters(self.of(g, full)) for g, m in self.models.items()}, self.own)
 
@@ -186,12 +186,12 @@ class GroupedProblem(NoisyProblem):
 
     @property
     def noise_parameters(self) -> dict[str, float]:
-        """Those of the noise that may change, by name and group. Of driven rigs, as all that has to do with it."""
+        """Parameters of the process and measurement noise that may change, by name and group."""
         return {f"{n}@{g}": v for g, p in self.parts.items() for n, v in p.noise_parameters.items()}
 
     @property
     def noise_limits(self) -> dict[str, tuple[float, float]]:
-        """How small and how large those may become."""
+        """Bounds of these parameters."""
         return {f"{n}@{g}": v for g, p in self.parts.items() for n, v in p.noise_limits.items()}
 
     def set_noise(self, parameters: Mapping[str, float]) -> None:
@@ -200,7 +200,7 @@ class GroupedProblem(NoisyProblem):
             p.set_noise(_of_group(parameters, g))
 
     def evaluate(self, points: Sequence[Point]) -> list[Evaluation]:
-        """One-step predictions of all trials at each of several points, group after group."""
+        """Return one-step predictions of all trials at each of several points, group after group."""
         cut = [by_group(unknowns, self._by_group) for _, unknowns, _ in points]
         each = [
             p.evaluate(
@@ -211,9 +211,9 @@ class GroupedProblem(NoisyProblem):
         return [Evaluation.joined(one) for one in zip(*each, strict=True)]
 
     def noise_step(self, values: Mapping[str, float], unknowns: Unknowns) -> float:
-        """Improve the noise of each group, in place; returns by how much that lowers the cost.
+        """Improve the noise of each group, in place; return by how much the cost falls.
 
-        And how much repeats scatter, where nothing acts at random in a trial: that would take it up.
+        Without process noise the scatter of repeats is estimated too; process noise would explain it.
         """
         own = by_group(unknowns, self._by_group)
         gained = float(sum(p.noise_step(self.model.of(g, values), own[g]) for g, p in self.parts.items()))
@@ -221,11 +221,11 @@ class GroupedProblem(NoisyProblem):
 
     @property
     def is_simulated(self) -> bool:
-        """True where nothing acts at random in any group."""
+        """Whether no group has process noise."""
         return all(p.is_simulated for p in self.parts.values())
 
     def _scatter_step(self, values: Mapping[str, float], unknowns: Unknowns) -> float:
-        """Find again, in place, how much repeats scatter; returns by how much that lowers the cost."""
+        """Estimate the scatter of repeats again, in place; return by how much the cost falls."""
         cut, names = by_group(unknowns, self._by_group), Model(self.model.rig).fitted_parameters()
         plain = {g: p.plain(self.model.of(g, values), cut[g]) for g, p in self.parts.items()}
         columns = [p.columns(one, names) for g, p in self.parts.items() for one in plain[g]]
@@ -236,31 +236,31 @@ class GroupedProblem(NoisyProblem):
         return before - self._cost(plain)
 
     def _cost(self, plain: Mapping[str, Sequence[Linearized]]) -> float:
-        """The cost of trials that were linearized as if nothing scattered."""
+        """Return the cost of trials that were linearized without scatter."""
         return float(sum(whitened_sse(p.scattered(plain[g])) for g, p in self.parts.items()))
 
     def shrinks(self, values: Mapping[str, float], unknowns: Unknowns) -> list[Shrink]:
-        """What the scatter of repeats makes of each trial; nothing where there is none."""
+        """Return the whitening of each trial by the scatter of repeats; none where nothing scatters."""
         cut, known = by_group(unknowns, self._by_group), {g: p for g, p in self.parts.items() if p.deviations}
         return [s for g, p in known.items() for s in p.shrinks(p.plain(self.model.of(g, values), cut[g]))]
 
     @cached_property
     def products(self) -> list[tuple[int, int]]:
-        """Places in `free` of shapes and of the amplitudes that they are factors of."""
+        """Places in `free` of shapes and of the amplitudes that they multiply."""
         return products_of(self.free, self.model.parameter_info())
 
     @property
     def is_final(self) -> bool:
-        """True where no other slopes lead on from the end of a descent."""
+        """Whether a descent ends without other slopes."""
         return all(p.is_final for p in self.parts.values())
 
     @property
     def batch(self) -> int:
-        """How many points `costs` evaluates in one run."""
+        """Number of points that `costs` evaluates in one run."""
         return max(p.batch for p in self.parts.values())
 
     def costs(self, points: Sequence[tuple[Mapping[str, float], Unknowns]]) -> list[float]:
-        """A lower bound of the cost at several parameter values."""
+        """Return a lower bound of the cost at several parameter values."""
         cut = [by_group(unknowns, self._by_group) for _, unknowns in points]
         each = [
             part.costs([(self.model.of(g, values), own[g]) for (values, _), own in zip(points, cut, strict=True)])
@@ -269,13 +269,13 @@ class GroupedProblem(NoisyProblem):
         return [sum(costs) for costs in zip(*each, strict=True)]
 
     def linearize(self, values: Mapping[str, float], unknowns: Unknowns) -> list[Linearized]:
-        """Whitened residuals and sensitivities of all trials, group after group."""
+        """Return whitened residuals and sensitivities of all trials, group after group."""
         cut = by_group(unknowns, self._by_group)
         each = {g: p.linearize(self.model.of(g, values), cut[g]) for g, p in self.parts.items()}
         return [one for g, many in each.items() for one in self._spread(g, many)]
 
     def _spread(self, group: str, parts: Sequence[Linearized]) -> list[Linearized]:
-        """Trials of a group with the parameters and unknowns of all groups."""
+        """Return trials of a group with the parameters and unknowns of all groups."""
         out, own = [], self.parts[group]
         at = [self.free.index(self.model.path(n, group)) for n in own.free]
         unknown = [self.unknown_names.index(n) for n in own.unknown_names]
@@ -288,13 +288,13 @@ class GroupedProblem(NoisyProblem):
 
 
 def by_group(rows: Iterable[T], trials: Mapping[str, Sequence[Trial]]) -> dict[str, list[T]]:
-    """What belongs to each trial, all groups end to end, cut into groups."""
+    """Return values of all trials, groups end to end, by group."""
     left = iter(rows)
     return {g: list(itertools.islice(left, len(many))) for g, many in trials.items()}
 
 
 def _of_group(parameters: Mapping[str, float], group: str) -> dict[str, float]:
-    """Parameters of a group's noise, by name."""
+    """Return the parameters of a group's noise, by name."""
     split = ((name.partition("@"), v) for name, v in parameters.items())
     return {name: v for (name, _, g), v in split if g == group}
 
@@ -306,15 +306,15 @@ class Grouped:
     Attributes
     ----------
     items
-        What it has besides the nominal model.
+        Its causes and changes in addition to the nominal model.
     model
-        Fitted.
+        The fitted model.
     fit
-        Of `model`; its `sse` is twice the negative log-likelihood, but for a constant.
+        The optimum; its `sse` is twice the negative log-likelihood up to a constant.
     weights
-        By group.
+        Noise and scatter of repeats by group.
     shrinks
-        What the scatter of repeats makes of each trial, all groups end to end; empty where nothing scatters.
+        Whitening of each trial by the scatter of repeats, all groups end to end; empty where nothing scatters.
     """
 
     items: frozenset[Item]
@@ -325,7 +325,7 @@ class Grouped:
 
     @classmethod
     def of(cls, items: Collection[Item], problem: GroupedProblem, found: Optimum) -> Grouped:
-        """The fit of a grouped problem that has ended."""
+        """Return the fit of a grouped problem at its optimum."""
         model, shrinks = problem.model.with_parameters(found.values), problem.shrinks(found.values, found.unknowns)
         ended = {**vars(found), "model": model, "parameters": model.parameters()}
         fit = Fit(**ended, trials=problem.trials, noise=problem.noise)
@@ -333,19 +333,19 @@ class Grouped:
 
     @property
     def sse(self) -> float:
-        """Twice the negative log-likelihood, but for a constant."""
+        """Twice the negative log-likelihood, up to a constant."""
         return self.fit.sse
 
     @property
     def degrees(self) -> int:
-        """Free parameters."""
+        """Number of free parameters."""
         return len(self.fit.free)
 
     @property
     def criterion(self) -> float:
-        """`sse` with a penalty for each parameter, of process noise too, and for each change.
+        """`sse` with a penalty for each parameter, also of process noise, and for each change.
 
-        A common cause that explains as much as a change is taken: a model that is wrong in all groups is no change.
+        A common cause is preferred to a change that explains as much: an error of the model in all groups is no change.
         """
         random = 2 * sum(len(w.noise.acting) for w in self.weights.values()) + len(self.deviations)
         return self.sse + PARAMETER_PENALTY * (self.degrees + random) + SEPARABLE * len(self.changes)
@@ -357,13 +357,13 @@ class Grouped:
 
     @property
     def common(self) -> tuple[str, ...]:
-        """Causes of all groups, but for those that differ in one."""
+        """Causes of all groups, except those that differ in one."""
         differ = {i.name for i in self.changes}
         return tuple(sorted(i.name for i in self.items if i.group is None and i.name not in differ))
 
     @property
     def is_driven(self) -> bool:
-        """True if something acts at random, which predictions one sample ahead follow."""
+        """Whether there is process noise, so that predictions are one step ahead."""
         return any(w.noise.processes for w in self.weights.values())
 
     @property
@@ -378,12 +378,12 @@ class Grouped:
         return {n: s / abs(values[n]) for n, s in self.deviations.items() if values[n]}
 
     def leaning(self, moved: np.ndarray) -> float:
-        """What of the squares that move the trials rests on how much repeats scatter.
+        """Return the part of the squares of a change that depends on the scatter of repeats.
 
         Parameters
         ----------
         moved
-            Shape (m,), all trials end to end.
+            Change of the residuals, shape (m,), all trials end to end.
         """
         ends = np.cumsum([len(p.residual) for p in self.fit.parts])[:-1]
         pieces = np.split(moved, ends) if self.shrinks else []

@@ -14,7 +14,7 @@ BY_GROUP = "group"
 
 
 def grouped_study(study: Study, other: Study | None, by: str, chosen: Sequence[str] | None) -> Study:
-    """One study whose trials all have a group, and no trials of groups that were not chosen.
+    """Return one study whose trials all have a group, without trials of groups that were not chosen.
 
     Raises
     ------
@@ -34,7 +34,7 @@ def grouped_study(study: Study, other: Study | None, by: str, chosen: Sequence[s
 
 
 def _order(study: Study, chosen: Sequence[str] | None) -> list[str]:
-    """The groups that are compared, in their order: those that were chosen, or all."""
+    """Return the groups that are compared, in their order: those that were chosen, or all."""
     groups = list(in_groups(study.trials))
     if chosen is not None:
         instance(chosen, Sequence, "groups")
@@ -50,7 +50,7 @@ def _order(study: Study, chosen: Sequence[str] | None) -> list[str]:
 
 
 def in_groups(trials: Sequence[Trial]) -> dict[str, list[Trial]]:
-    """Trials by their group, groups in the order of their first trials."""
+    """Return trials by their group, groups in the order of their first trials."""
     out: dict[str, list[Trial]] = {}
     for trial in trials:
         out.setdefault(str(trial.group), []).append(trial)
@@ -73,7 +73,7 @@ def _labelled(study: Study, by: str) -> Study:
 
 
 def _joined(before: Study, after: Study) -> Study:
-    """Two studies of one rig as one, each a group by its name."""
+    """Return two studies of one rig as one, each a group by its name."""
     if before.rig != after.rig:
         raise InputError(f"expected a study of the rig {before.rig}, found {after.rig}", file=after.folder)
     for name in sorted(set(before.constants) | set(after.constants)):
@@ -96,5 +96,5 @@ def _joined(before: Study, after: Study) -> Study:
 
 
 def labels_of(before: Study, after: Study) -> tuple[str, str]:
-    """What two studies are called as groups."""
+    """Return the names of two studies as groups."""
     return (before.name, after.name) if before.name != after.name else ("before", "after")

@@ -1,4 +1,4 @@
-"""What the model of all groups leaves unexplained in some of them."""
+"""Lack of fit of the model of all groups in some of them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fes_pin.workers import in_parallel
 
 
 def left_in_groups(models: ContrastModels, best: Grouped, seed: int) -> tuple[Remainder, list[str]]:
-    """Lack of fit in some groups alone; where all groups have one it is an error of the model, and is reported."""
+    """Return the lack of fit in some groups alone, and warnings; one of all groups is an error of the model."""
     parts = in_parallel(lambda g: models.maxima.part(best, g), list(models.trials))
     each = dict(zip(models.trials, in_parallel(lambda f: lack_of_fit(f, seed), parts), strict=True))
     each = {g: _in_single_trials(models, best, g, r, seed) if r.unexplained else r for g, r in each.items()}
@@ -31,9 +31,9 @@ def left_in_groups(models: ContrastModels, best: Grouped, seed: int) -> tuple[Re
 
 
 def _in_single_trials(models: ContrastModels, best: Grouped, group: str, left: Remainder, seed: int) -> Remainder:
-    """Lack of fit of a group, if half of its trials have one with nominal values of their own.
+    """Return the lack of fit of a group, if half of its trials have one with nominal values of their own.
 
-    Trials whose strength or friction differs, of whatever group, have a lack of fit by values that they share.
+    Trials that differ in strength or friction, within a group too, have a lack of fit with shared values.
     """
     alone = in_parallel(lambda k: models.maxima.part(best, group, k), range(len(models.trials[group])))
     p = min(1.0, 2.0 * float(np.median([lack_of_fit(one, seed).p_value for one in alone])))

@@ -1,4 +1,4 @@
-"""Sets of common causes and changes as the search of `infer` sees them: how they are fitted and judged."""
+"""Sets of common causes and changes for the search of `infer`: their fits, and the rules that judge them."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from fes_pin.models.stage import Effect
 from fes_pin.workers import in_parallel
 
 FITTED, FITTED_DRIVEN = 10, 6
-"""Items that are fitted with a set, those of largest score; on driven rigs a fit is some five times as long."""
+"""Items of largest score that are fitted with a set; on driven rigs a fit takes some five times as long."""
 
 POLICY = Policy(fitted=None, pairs=0)
 """`candidates` are those of largest score."""
 
 Found = SearchResult[Grouped]
-"""What a search of what differs found."""
+"""Result of a search for changes."""
 
 
 class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
@@ -39,13 +39,13 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
     Parameters
     ----------
     nominal
-        The believed model of all groups.
+        The nominal model of all groups.
     trials
-        By group.
+        Trials by group.
     effects
-        The causes that are looked for.
+        The causes that are searched.
     driven
-        True for rigs that are judged by the likelihood of predictions.
+        Whether fits have process noise.
     seed
         Of critical values.
     """
@@ -76,9 +76,9 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
         return self.fits[()]
 
     def candidates(self, base: Grouped) -> dict[str, Candidate[list[ItemScore]]]:
-        """The items of largest score, and every parameter and cause of the set as one group could have it.
+        """Return the items of largest score, and every parameter and cause of the set with a value of one group's own.
 
-        What is random in the set hides how much the latter gain.
+        The noise of the set understates the gain of the latter.
         """
         by_item: dict[Item, list[ItemScore]] = {}
         for one in sorted(self.screen.scores(base).scored, key=lambda s: -s.net_gain):
@@ -89,12 +89,12 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
         return {str(many[0].item): Candidate(many[0].net_gain, many[:STARTS]) for many in chosen}
 
     def begin(self, base: Grouped, starts: Mapping[Names, list[ItemScore]]) -> dict[Names, Grouped]:
-        """First fits of sets with one item more, from its shapes of largest score."""
+        """Return first fits of sets with one more item, from its shapes of largest score."""
         looks = in_parallel(lambda many: self._look(base, many), list(starts.values()))
         return dict(zip(starts, looks, strict=True))
 
     def _look(self, base: Grouped, scores: Sequence[ItemScore]) -> Grouped:
-        """A first fit of a set; one that converges where the scatter of a parameter hides that it changed."""
+        """Return a first fit of a set; a converged one where the scatter of a parameter hides its change."""
         out = []
         for one in scores:
             items = base.items | {one.item}
@@ -104,31 +104,31 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
         return self.maxima.go_on(best) if scores[0].item.name in base.repeats else best
 
     def converged(self, fits: Sequence[Grouped]) -> list[Grouped]:
-        """Fits once they have converged."""
+        """Return the converged fits."""
         return in_parallel(self.maxima.go_on, fits)
 
     def near(self, size: int, without: Sequence[Names] = ()) -> list[Names]:
-        """The best sets of a size that come near the best; after some that were not accepted, those that may be."""
+        """Return the sets of a size near the best; after some that were not accepted, those that may be."""
         near = super().near(size, without)[: self.converged_sets]
         return [n for n in near if self._may_be_accepted(n)] if without else near
 
     def converge(self, size: int, without: Sequence[Names] = ()) -> None:
-        """Let the best sets of a size converge, but for some; nothing where no other may be accepted."""
+        """Fit the best sets of a size until they converge, except some, unless no other can be accepted."""
         if not without or self.near(size, without):
             super().converge(size, without)
 
     def _may_be_accepted(self, names: Names) -> bool:
-        """Whether a set gains enough over the best smaller one to stand out of the noise."""
+        """Return whether the gain of a set over the best smaller one is significant against the noise."""
         larger, smaller = self.fits[names], self.fits[self.ranked(len(names) - 1)[0]]
         return self.noise_p_value(smaller.sse - larger.sse, more_degrees(larger, smaller)) < CLAIM_LEVEL
 
     def form_of(self, fitted: Grouped) -> frozenset[tuple[str, str, tuple[str, ...]]]:
-        """Of each cause of each group its name, and which refinements it has."""
+        """Return for each cause of each group its name and its refinements."""
         models = fitted.model.models.items()
         return frozenset((g, e.name, e.refined()) for g, m in models for e in m.effects)
 
     def without(self, names: Names, name: str) -> Grouped:
-        """The fit of a set less one item, from the set's own values where that is better."""
+        """Return the fit of a set without one item, from the values of the set where that is better."""
         rest, whole = tuple(n for n in names if n != name), self.fits[names]
         if self._compared.get((names, name)) is not whole:
             items = whole.items - {Item.of(name)}
@@ -144,10 +144,10 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
         return excess_scatter(larger.fit, smaller.fit)
 
     def p_value(self, larger: Grouped, smaller: Grouped, gain: float | None = None) -> float:
-        """Family-wise p-value of what a set has more than another.
+        """Return the family-wise p-value of the gain of a larger set.
 
-        Of a cause of all groups that against the noise; of a change the larger of that, and of that against the spread
-        between trials: a repeat that differs by more than its noise is no change.
+        For a cause of all groups it is that against the noise. For a change it is the larger of that and of the p-value
+        against the spread between trials, as a repeat that differs by more than its noise is no change.
         """
         noise = super().p_value(larger, smaller, gain)
         if not set(larger.changes) - set(smaller.changes) or not noise < CLAIM_LEVEL:
@@ -157,15 +157,15 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
         return max(noise, self.family.adjusted(between))
 
     def spread(self, larger: Grouped, smaller: Grouped) -> Spread:
-        """Between trials, of what a set has more than another; see `infer.spread`."""
+        """Return the spread between trials of the gain of a larger set; see `infer.spread`."""
         return self._spread(larger, self.maxima.weighed_as(smaller, larger))
 
     def _spread(self, larger: Grouped, smaller: Grouped) -> Spread:
-        """The same of sets under the same weights; the mean of all trials and that of one group are fitted.
+        """Return the same for sets with the same weights; the mean of all trials and that of one group are fitted.
 
-        Of the scatter of repeats few trials tell little as well: where a share q of the gain rests on it, of f degrees
-        of freedom 1 / (1 / f + q^2 / f0) stay, with f0 those of the trials. Source: Satterthwaite, Biometrics Bulletin
-        2 (1946).
+        Few trials estimate the scatter of repeats poorly. Where a share q of the gain depends on it, f degrees of
+        freedom are reduced to 1 / (1 / f + q^2 / f0), with f0 those of the trials. Source: Satterthwaite, Biometrics
+        Bulletin 2 (1946).
         """
         left = np.concatenate([p.residual for p in larger.fit.parts])
         moved = np.concatenate([p.residual for p in smaller.fit.parts]) - left
@@ -178,16 +178,16 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
         return Spread(both.phi, 1.0 / (1.0 / both.free + share**2 / free))
 
     def extension_p_value(self, fitted: Grouped) -> float:
-        """Family-wise p-value of the largest score of a further item."""
+        """Return the family-wise p-value of the largest score of a further item."""
         scores = (float(chi2_tail(s.gain, s.degrees)) for s in self.screen.scores(fitted).scored)
         return self.family.adjusted(min(scores, default=1.0))
 
     def leaves_noise(self, fitted: Grouped) -> bool:
-        """False where repeats scatter, or something random acts: that may be a change that is missed."""
+        """Return False where repeats scatter or process noise acts, as these may be a missed change."""
         return not (fitted.repeats or fitted.is_driven)
 
     def better_form(self, fitted: Grouped) -> Grouped | None:
-        """The set with the form of a cause refined as the data of a driven rig demand; None where they demand none."""
+        """Return the set of a driven rig with a significant refinement of a cause; None where none is."""
         if not self.driven:
             return None
         starts, tried = [], 0
@@ -215,7 +215,7 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
 
 
 def _causes(fitted: Grouped) -> list[tuple[str, Effect]]:
-    """The causes of a set, each once for all groups that share it, with a group that has it."""
+    """Return the causes of a set, each once for all groups that share it, with a group that has it."""
     models = fitted.model.models
     out: dict[tuple[str, str | None], tuple[str, Effect]] = {}
     for group, model in models.items():
@@ -226,12 +226,12 @@ def _causes(fitted: Grouped) -> list[tuple[str, Effect]]:
 
 
 def _moved(model: GroupedModel, group: str, own: Model) -> GroupedModel:
-    """A grouped model with the values that differ in one group's model."""
+    """Return a grouped model with the values that differ in one group's model."""
     known = model.models[group].parameters()
     return model.with_parameters({model.path(n, group): v for n, v in own.parameters().items() if v != known[n]})
 
 
 ContrastSearch = Search[Grouped, ContrastModels]
-"""A search for what differs between groups."""
+"""A search for changes between groups."""
 
 __all__ = ["POLICY", "ContrastModels", "ContrastSearch", "Found"]

@@ -1,14 +1,14 @@
-"""Repeats that differ: the nominal parameters of each trial scatter about those of its group.
+"""Scatter of repeats: the nominal parameters of each trial scatter about those of its group (random effects).
 
-A muscle is a percent stronger in one trial than in the next, however alike they are meant to be. To a simulation that
-is an error far above the noise of its reading, in every sample of the trial, and every cause of the library takes up
-some of it. With a trial's residual r (whitened), the sensitivities V of its readings to the nominal parameters, and
-their deviations D = diag(s),
+A muscle is a percent stronger in one trial than in the next, even in repeats. In a simulation that is an error far
+above the measurement noise, in every sample of the trial, and every cause of the library explains some of it. With a
+trial's whitened residual r, the sensitivities V of its readings to the nominal parameters, and their standard
+deviations D = diag(s),
 
     r ~ N(0, I + V D^2 V'),
 
-of which s is estimated by maximum likelihood, the parameters of the model profiled out. What a change of the rig
-explains beyond that is not taken from it. Source: Laird and Ware, Biometrics 38 (1982).
+where s is estimated by maximum likelihood with the parameters of the model profiled out. The gain of a change beyond
+that scatter is kept. Source: Laird and Ware, Biometrics 38 (1982).
 """
 
 from __future__ import annotations
@@ -28,20 +28,20 @@ from fes_pin.models.predictions import PredictedTrial
 from fes_pin.models.predictor import StateSpaceNoise
 
 SMALLEST, LARGEST = -1.0, 12.0
-"""Logarithms between which s is sought, in units of the standard error of a parameter from these trials: at the least
-its variance is an eighth of that, at the largest a trial informs its own value alone."""
+"""Range of the logarithm of s, in units of the standard error of a parameter from these trials: at the lower end its
+variance is an eighth of that, at the upper end a trial determines only its own value."""
 COARSE, STEP, FINE = 27, 0.5, 21
-"""Points of a deviation's logarithm that are tried, half a unit apart, and as many within one of them from the best."""
+"""Grid of a deviation's logarithm, half a unit apart, and its refinement about the best point."""
 
 
 @dataclass(frozen=True, eq=False)
 class Repeats:
-    """Noise of a group's trials, and how much their nominal parameters scatter, if they do.
+    """Noise of a group's trials, and the scatter of their nominal parameters.
 
     Attributes
     ----------
     noise
-        Of the process and of the measurements.
+        Process and measurement noise.
     deviations
         Standard deviation of a nominal parameter between trials, in its unit, by name.
     """
@@ -56,9 +56,9 @@ class RepeatedProblem(LikelihoodProblem):
     Parameters
     ----------
     model, trials, free
-        As of `LikelihoodProblem`.
+        As in `LikelihoodProblem`.
     weight
-        Noise, and how much parameters scatter.
+        Noise, and the scatter of parameters.
     """
 
     def __init__(
@@ -69,28 +69,28 @@ class RepeatedProblem(LikelihoodProblem):
 
     @property
     def weight(self) -> Repeats:
-        """Noise, and how much parameters scatter."""
+        """Noise, and the scatter of parameters."""
         return Repeats(self.noise, self.deviations)
 
     def linearize(self, values: Mapping[str, float], unknowns: Unknowns) -> list[Linearized]:
-        """As a `LikelihoodProblem` does, times (I + V D^2 V')^(-1/2)."""
+        """Return residuals and sensitivities as `LikelihoodProblem` does, times (I + V D^2 V')^(-1/2)."""
         return self.scattered(super().linearize(values, unknowns))
 
     def scattered(self, plain: Sequence[Linearized]) -> list[Linearized]:
-        """Trials as they are where parameters scatter, from trials as if nothing did."""
+        """Return trials whitened by the scatter of parameters, from trials without."""
         shrinks = self.shrinks(plain) if self.deviations else []
         return [s.shrunk(p) for p, s in zip(plain, shrinks, strict=True)] if shrinks else list(plain)
 
     def plain(self, values: Mapping[str, float], unknowns: Unknowns) -> list[Linearized]:
-        """The trials as if nothing scattered."""
+        """Return the trials without scatter."""
         return super().linearize(values, unknowns)
 
     def shrinks(self, plain: Sequence[Linearized]) -> list[Shrink]:
-        """(I + V D^2 V')^(-1/2) of each trial."""
+        """Return (I + V D^2 V')^(-1/2) of each trial."""
         return [Shrink.of(self.columns(p, list(self.deviations)) * self._sizes) for p in plain]
 
     def columns(self, plain: Linearized, names: Sequence[str]) -> np.ndarray:
-        """Sensitivities of a trial to some parameters without what its own unknowns take up, shape (m, names)."""
+        """Return sensitivities of a trial to some parameters, its own unknowns projected off, shape (m, names)."""
         return without_locals(plain, plain.jacobian[:, [self.free.index(n) for n in names]])
 
     @property
@@ -98,11 +98,11 @@ class RepeatedProblem(LikelihoodProblem):
         return np.array(list(self.deviations.values()))
 
     def costs(self, points: Sequence[tuple[Mapping[str, float], Unknowns]]) -> list[float]:
-        """A lower bound of the cost: without sensitivities none is known where parameters scatter."""
+        """Return a lower bound of the cost: where parameters scatter, the cost itself needs sensitivities."""
         return [-np.inf] * len(points) if self.deviations else super().costs(points)
 
     def residual_run(self, values: Mapping[str, float], unknowns: Unknowns) -> list[PredictedTrial]:
-        """Trials less what they most likely differ from their group by."""
+        """Return trials minus their likeliest deviation from their group."""
         if not self.deviations:
             return super().residual_run(values, unknowns)
         at = [self.free.index(n) for n in self.deviations]
@@ -128,7 +128,7 @@ class Shrink:
     def of(cls, along: np.ndarray) -> Shrink:
         with np.errstate(all="ignore"):
             gram = along.T @ along
-        if not np.isfinite(gram).all():  # what runs away costs infinitely much anyway
+        if not np.isfinite(gram).all():  # a trial that diverges has an infinite cost anyway
             return cls(np.zeros((len(along), 0)), np.zeros(0))
         powers, vectors = np.linalg.eigh(gram)
         felt = powers > 1e-12 * max(powers.max(initial=0.0), 1e-300)
@@ -143,31 +143,31 @@ class Shrink:
         return Linearized(scaled(part.residual), scaled(part.jacobian), scaled(part.local), part.log_determinant + more)
 
     def leaning(self, moved: np.ndarray) -> float:
-        """Part of the squares of what moves a trial, weighed, that is the larger the less repeats scatter.
+        """Return the slope of the whitened squares of a trial's change in the logarithm of s^2, with opposite sign.
 
-        With the logarithm of s^2 it falls as this part of it, and so is as uncertain.
+        The squares are as uncertain by the estimate of s as this part of them.
         """
         return float(np.sum((self.basis.T @ moved) ** 2 * self.powers / (1.0 + self.powers)))
 
 
 def scatter(parts: Sequence[Linearized], columns: Sequence[np.ndarray], names: Sequence[str]) -> dict[str, float]:
-    """Deviations of nominal parameters between trials, of those whose scatter the trials demand.
+    """Return standard deviations of nominal parameters between trials, for those whose scatter is significant.
 
     Parameters
     ----------
     parts
-        Trials linearized at a fit, whitened with their noise alone.
+        Trials linearized at a fit, whitened by their noise alone.
     columns
-        V of each trial, shape (m, names), without what its own unknowns take up.
+        V of each trial, shape (m, names), its own unknowns projected off.
     names
-        Of the parameters that may scatter.
+        Names of the parameters that may scatter.
 
     Returns
     -------
     dict
-        Empty also where a trial's readings or sensitivities are no numbers: such trials say nothing of their scatter.
+        Empty also where a trial's readings or sensitivities are not finite.
     """
-    with np.errstate(all="ignore"):  # what overflows costs infinitely much
+    with np.errstate(all="ignore"):  # an overflow has an infinite cost
         return _Scatter(parts, columns, names).found()
 
 
@@ -187,7 +187,7 @@ class _Scatter:
         self.size = np.sqrt(np.mean(np.diagonal(self.vv, axis1=1, axis2=2), axis=0))
 
     def found(self) -> dict[str, float]:
-        """Deviations, one more as long as it is demanded."""
+        """Return the deviations, found by adding one while it is significant."""
         best = np.zeros(len(self.names))
         cost = float(self.costs(best[None])[0])
         while True:
@@ -198,7 +198,7 @@ class _Scatter:
             best, cost = wanted, least
 
     def _with(self, deviations: np.ndarray, k: int) -> tuple[float, np.ndarray]:
-        """The cost with one deviation more, and all deviations, each refined with the others held."""
+        """Return the cost with one more deviation, and all deviations, each refined with the others held."""
         now, cost = deviations.copy(), np.inf
         others: list[int] = np.flatnonzero(now).tolist()
         for one in [k, *others, k] if others else [k]:
@@ -206,7 +206,7 @@ class _Scatter:
         return cost, now
 
     def _best(self, deviations: np.ndarray, k: int) -> tuple[float, float]:
-        """The least cost along one of the deviations, and where it is."""
+        """Return the least cost along one of the deviations, and its place."""
         least, best = np.inf, 0.0
         for grid in (np.linspace(SMALLEST, LARGEST, COARSE), np.linspace(-STEP, STEP, FINE)):
             tried = np.tile(deviations, (len(grid), 1))
@@ -217,7 +217,7 @@ class _Scatter:
         return least, best
 
     def costs(self, deviations: np.ndarray) -> np.ndarray:
-        """Twice the negative log-likelihood but for a constant, the free parameters profiled out.
+        """Return twice the negative log-likelihood up to a constant, the free parameters profiled out.
 
         Parameters
         ----------
@@ -227,7 +227,7 @@ class _Scatter:
         Returns
         -------
         ndarray, shape (points,)
-            Infinite where a product is beyond floating-point numbers.
+            Infinite where a product overflows.
         """
         felt = np.flatnonzero(deviations.any(axis=0))
         d = deviations[:, None, felt]

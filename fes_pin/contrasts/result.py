@@ -1,4 +1,4 @@
-"""The answer of a contrast, and it in words."""
+"""The result of a contrast, and it in words."""
 
 from __future__ import annotations
 
@@ -18,26 +18,26 @@ SEEN = "(would have been seen in 95 of 100 beyond)"
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Contrast(Result):
-    """What differs between the groups of a study: "nothing_changed", "changed", "unexplained" or "stopped".
+    """Verdict on the groups of a study: "nothing_changed", "changed", "unexplained" or "stopped", with the changes.
 
     Attributes
     ----------
     causes, changes
-        Surest first.
+        Changes, most significant first.
     common
         Causes that act in all groups alike: errors of the model, and no changes.
     unchanged
-        For each parameter of the model that is not among the changes the size, as a share of its value, beyond which a
-        change would have been seen in 95 of 100.
+        For each parameter of the model without a change, the size, as a share of its value, above which a change is
+        excluded at 95 % power.
     excluded
-        For each cause that no group has, its first parameter: the size beyond which its coming would have been seen.
+        For each cause that no group has, its first parameter: the size above which the cause is excluded.
     untestable
-        What could have changed unseen.
+        Parameters and causes whose change is not testable.
     remainder
         Lack of fit in a group that no other group has.
     repeats
-        Standard deviation of a nominal parameter between trials that are meant to be alike, as a share of its value: of
-        those that scatter by more than their noise.
+        Standard deviation of a nominal parameter between repeats, as a share of its value, for those that scatter
+        significantly.
     """
 
     causes: tuple[Change, ...]
@@ -55,11 +55,11 @@ class Contrast(Result):
 
     @property
     def changes(self) -> tuple[Change, ...]:
-        """What changed, surest first."""
+        """The changes, most significant first."""
         return self.causes
 
     def title(self) -> str:
-        """The answer in a few words."""
+        """The verdict in a few words."""
         between = listed(list(self.groups))
         if self.verdict == "unexplained":
             return f"something differs between {between}, and nothing in the library explains it"
@@ -73,7 +73,7 @@ class Contrast(Result):
         return "change", "what happened", "values", "p", "cannot be told from"
 
     def own_record(self) -> dict[str, Any]:
-        """What `contrast.json` has of its groups."""
+        """Return the part of `contrast.json` about its groups."""
         return {
             "groups": list(self.groups),
             "common": list(self.common),
@@ -85,11 +85,11 @@ class Contrast(Result):
         }
 
     def effect(self, name: str) -> type[Effect] | None:
-        """The class that describes a cause; None of a nominal parameter and of a trial that was misread."""
+        """Return the class of a cause; None of a nominal parameter and of a misread condition."""
         return next((e for e in self.catalogue.effects if e.name == name), None)
 
     def notes(self) -> list[tuple[str, str]]:
-        """What is said besides the changes, by topic."""
+        """Return notes in addition to the changes, by topic."""
         left = self.remainder
         state = f"in one group alone ({probability(left.p_value)})" if left.unexplained else "none in one group alone"
         sizes = [f"{n} {p.value:.2g} {p.unit}".strip() for n, p in self.excluded.items()]
@@ -105,7 +105,7 @@ class Contrast(Result):
         return [(topic, words) for topic, words in rows if words] + super().notes()
 
     def advice(self) -> str:
-        """What to do next."""
+        """The next step, in words."""
         if self.is_stopped or self.next_experiment is not None:
             return super().advice()
         if self.verdict == "unexplained":

@@ -1,4 +1,4 @@
-"""Score tests of every item that a grouped model may be extended by."""
+"""Score tests of every item by which a grouped model may be extended."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from fes_pin.models.stage import Effect
 from fes_pin.workers import in_parallel
 
 FEWEST_TRIALS = 6
-"""Trials that alone show how much repeats differ; of fewer each is cut into pieces, as a diagnosis does."""
+"""Number of trials that estimate the differences between repeats by themselves; fewer trials are cut into pieces."""
 FITTED = 2
 """Parameters that are fitted along an item: the mean of all trials, and that of one group."""
 LEAST_KEPT = 1e-6
@@ -34,24 +34,24 @@ LEAST_KEPT = 1e-6
 
 @dataclass(frozen=True)
 class ItemScore:
-    """What an item would add to a set, linearly.
+    """The score test of an item in a set.
 
     Attributes
     ----------
     effect
         The cause with its start values; None for a parameter, or a cause, that the group's model has.
     gain
-        Drop in twice the negative log-likelihood.
+        Score statistic: predicted gain in twice the log-likelihood.
     degrees
-        Parameters that it adds.
+        Number of its parameters.
     kept
-        Share of its sensitivity that the set does not take up.
+        Share of its sensitivity that the parameters of the set cannot reproduce.
     deviation
         Standard deviation of its first amplitude.
     start
-        Values of parameters that the model has, by path.
+        Start values of parameters of the model, by path.
     spread
-        Of what single trials say of its first amplitude.
+        Spread of its first amplitude between trials.
     """
 
     item: Item
@@ -65,13 +65,13 @@ class ItemScore:
 
     @property
     def net_gain(self) -> float:
-        """Gain less the penalty of the parameters."""
+        """Gain minus the penalty of its parameters."""
         return self.gain - PARAMETER_PENALTY * self.degrees
 
 
 @dataclass(frozen=True)
 class ItemScores:
-    """The scores of items, and the Gram matrix of what the set leaves of their columns.
+    """The scores of items, and the Gram matrix of their columns with the parameters of the set projected off.
 
     Attributes
     ----------
@@ -86,12 +86,12 @@ class ItemScores:
     blocks: list[slice]
 
     def family(self, seed: int) -> Family:
-        """The family of the tests of all changes."""
+        """Return the family of the tests of all changes."""
         return Family(self.gram, self.blocks, seed)
 
     @cached_property
     def usual_spread(self) -> Spread:
-        """Of the items: see `infer.spread`."""
+        """The usual spread of the items: see `infer.spread`."""
         return usual_spread([s.spread for s in self.scored], len({s.item.name for s in self.scored}))
 
 
@@ -102,7 +102,7 @@ class _Column:
     Attributes
     ----------
     amplitudes
-        By name: value without the item, and bounds.
+        For each amplitude by name, its value without the item, and its bounds.
     columns
         Whitened sensitivities to them, zero in the rows of groups that the item does not concern.
     """
@@ -114,16 +114,16 @@ class _Column:
 
 
 class Screen:
-    """Scores of the items that grouped models of some trials may be extended by.
+    """Score tests of the items by which grouped models of some trials may be extended.
 
     Parameters
     ----------
     nominal
         The rig, without effects.
     trials
-        By group.
+        Trials by group.
     library
-        Of all trials together.
+        The causes, on all trials together.
     """
 
     def __init__(self, nominal: Model, trials: Mapping[str, Sequence[Trial]], library: Library) -> None:
@@ -133,7 +133,7 @@ class Screen:
         self._problems: dict[tuple[Any, ...], LikelihoodProblem] = {}
 
     def scores(self, base: Grouped) -> ItemScores:
-        """Every item that a set does not have, scored."""
+        """Return the scores of every item that a set does not have."""
         if id(base) not in self._kept:
             self._kept[id(base)] = (base, self._scores(base))
         return self._kept[id(base)][1]
@@ -151,7 +151,7 @@ class Screen:
         return ItemScores(scored, gram, [b for c, b in zip(made, blocks, strict=True) if c.item.group is not None])
 
     def _columns(self, base: Grouped) -> Iterator[_Column]:
-        """Every item that a set does not have."""
+        """Yield every item that a set does not have."""
         rows = _rows(base.fit.parts, self._trials)
         for item in self._differing(base):
             yield _own(base, item, rows[str(item.group)])
@@ -161,9 +161,9 @@ class Screen:
             yield from many
 
     def _differing(self, base: Grouped) -> Iterator[Item]:
-        """Parameters and causes of all groups that could have a value of their own in one.
+        """Yield parameters and causes of all groups as items with a value of their own in one group.
 
-        Of two groups it is one and the same which of them has it: the second.
+        Of two groups it is the second that has it, as both choices give the same model.
         """
         groups = list(self._trials)
         free = groups[1:] if len(groups) == 2 else groups
@@ -175,9 +175,9 @@ class Screen:
     def _of_cause(
         self, kind: type[Effect], base: Grouped, unknowns: Mapping[str, Unknowns], rows: Mapping[str, slice]
     ) -> Iterator[_Column]:
-        """A cause in all groups that lack it, and in each of them; in the form that it has in others, if any have it.
+        """Yield a cause in all groups that lack it, and in each of them; in the form that other groups have, if any.
 
-        The last group that lacks it has no item of its own: with it the cause acts in all.
+        If one group alone lacks it, that group has no item of its own: with it the cause acts in all.
         """
         has = [g for g in rows if Item(kind.name, g) in base.items]
         lacks = [g for g in rows if g not in has]
@@ -195,13 +195,13 @@ class Screen:
                 yield _Column(item, one, amplitudes, columns)
 
     def _linearized(self, base: Grouped, group: str, forms: Sequence[Effect], unknowns: Unknowns) -> list[np.ndarray]:
-        """Sensitivities of the trials of a group to the amplitudes of each form of a cause."""
+        """Return sensitivities of the trials of a group to the amplitudes of each form of a cause."""
         bare, noise, out = Model(base.model.models[group].rig), base.weights[group].noise, []
         trials, shrinks = self._trials[group], by_group(base.shrinks, self._trials)[group]
         simulated = is_simulated(noise, trials)  # predictions share the program of a fit, which moves all parameters
         for one in forms:
             names = tuple(f"{one.name}.{n}" for n in one.amplitudes())
-            key = (group, simulated, one.name, *one.unused().items())  # what is unused is compiled in, with its values
+            key = (group, simulated, one.name, *one.unused().items())  # unused ones are compiled in, with values
             if key not in self._problems:
                 self._problems[key] = LikelihoodProblem(bare + one, trials, noise, names if simulated else None)
             problem = self._problems[key]
@@ -214,21 +214,21 @@ class Screen:
 
 
 def _rows(parts: Sequence[Linearized], trials: Mapping[str, Sequence[Trial]]) -> dict[str, slice]:
-    """The rows of each group, all trials end to end."""
+    """Return the rows of each group, all trials end to end."""
     sizes = [sum(len(p.residual) for p in own) for own in by_group(parts, trials).values()]
     ends = itertools.pairwise(itertools.accumulate(sizes, initial=0))
     return {g: slice(a, b) for g, (a, b) in zip(trials, ends, strict=True)}
 
 
 def _at_null(model: Model, kind: type[Effect]) -> Effect:
-    """A cause of a model without its size."""
+    """Return a cause of a model at its null."""
     effect = next(e for e in model.effects if e.name == kind.name)
     nulls: dict[str, Any] = {n: near_null(kind, n) for n in effect.amplitudes()}
     return replace(effect, **nulls)
 
 
 def _own(base: Grouped, item: Item, rows: slice) -> _Column:
-    """A parameter, or a cause's amplitudes, in one group alone."""
+    """Return a parameter, or a cause's amplitudes, in one group alone."""
     model, group = base.model, str(item.group)
     names = [item.name]
     for effect in model.models[group].effects:
@@ -244,14 +244,14 @@ def _own(base: Grouped, item: Item, rows: slice) -> _Column:
 
 
 def _score(one: _Column, gram: np.ndarray, along: np.ndarray, spread: Spread) -> ItemScore:
-    """The score of an item from its columns without what the set takes up.
+    """Return the score of an item from its columns with the parameters of the set projected off.
 
     Parameters
     ----------
     gram, along
         Inner products of the projected columns, with each other and with the residual.
     spread
-        Of what single trials say of its first amplitude.
+        Spread of its first amplitude between trials.
     """
     size, norms = np.sqrt(np.maximum(np.diag(gram), 0.0)), np.linalg.norm(one.columns, axis=0)
     kept = float(np.max(size / np.where(norms > 0.0, norms, np.inf), initial=0.0))

@@ -1,4 +1,4 @@
-"""How it is judged what a search of what differs found: by trials that took no part, and by tests of lack of fit."""
+"""The verdict on changes: by held-out trials and by tests of lack of fit."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from fes_pin.workers import in_parallel
 
 @dataclass(frozen=True)
 class ContrastWeighed(Weighed):
-    """What trials say of a set; gains are shares of what the set adds to the likelihood of held-out trials.
+    """Evidence of trials on a set; gains are shares of the set's gain in the likelihood of held-out trials.
 
     Attributes
     ----------
     said
-        Of the lack of fit of groups.
+        Warnings about the lack of fit of groups.
     """
 
     lack_of_fit: Remainder
@@ -33,12 +33,12 @@ Judgement = State[Grouped, ContrastModels, ContrastWeighed]
 
 
 class ContrastVerdict(Verdict[Grouped, ContrastModels, ContrastWeighed]):
-    """How it is judged what a search found: a change that held-out trials do not confirm is not claimed.
+    """The verdict on what a search found: a change that held-out trials do not confirm is not named.
 
     Parameters
     ----------
     search
-        That has run.
+        A search that has run.
     """
 
     def __init__(self, search: ContrastSearch) -> None:
@@ -47,7 +47,7 @@ class ContrastVerdict(Verdict[Grouped, ContrastModels, ContrastWeighed]):
         self._costs: dict[int, tuple[Grouped, float]] = {}
 
     def weigh(self, found: Found) -> ContrastWeighed:
-        """What held-out trials, and the tests of lack of fit, say of a set."""
+        """Return the evidence of held-out trials and of the tests of lack of fit on a set."""
         models = self.search.models
         evidence = {} if self.search.was_stopped else self._evidence(found)
         whole = evidence.pop("", Evidence(found.nominal.sse - found.best.sse, 0.0, FITTED)).added
@@ -57,12 +57,12 @@ class ContrastVerdict(Verdict[Grouped, ContrastModels, ContrastWeighed]):
         return ContrastWeighed(gains, evidence, left, said)
 
     def unsupported(self, state: Judgement) -> list[str]:
-        """Changes that held-out trials do not confirm."""
+        """Return the changes that held-out trials do not confirm."""
         evidence = state.weighed.evidence
         return [str(i) for i in state.found.best.changes if evidence and not evidence[str(i)].low > 0.0]
 
     def _evidence(self, found: Found) -> dict[str, Evidence]:
-        """What each item, and all together (""), add to twice the log-likelihood of held-out trials; empty without."""
+        """Return the evidence for each item, and for all together (""), in held-out trials; empty without these."""
         folds = folds_of(self.search.models.trials)
         if not found.without or not folds:
             return {}
@@ -71,7 +71,7 @@ class ContrastVerdict(Verdict[Grouped, ContrastModels, ContrastWeighed]):
         return {n: Evidence.of(cost - costs[0]) for n, cost in zip(sets, costs[1:], strict=True)}
 
     def _cost_of_held(self, one: Grouped, folds: Sequence[Sequence[int]]) -> float:
-        """Twice the negative log-likelihood of every fold by fits to the others, what is random as in all trials."""
+        """Return twice the negative log-likelihood of folds by fits to the others, with the noise of all trials."""
         if id(one) not in self._costs:
             parts = [self.search.models.maxima.refitted(one, held) for held in folds]
             self._costs[id(one)] = one, sum(_cost(one) - _cost(part) for part in parts)
@@ -79,7 +79,7 @@ class ContrastVerdict(Verdict[Grouped, ContrastModels, ContrastWeighed]):
 
 
 def folds_of(trials: Mapping[str, Sequence[Trial]]) -> list[list[int]]:
-    """Trials to hold out together, by their numbers, all groups end to end; none where a group has one trial.
+    """Return the trials of each fold, by their numbers, all groups end to end; none where a group has one trial.
 
     Each fold holds out trials of every group, and keeps some of every group.
     """
@@ -93,6 +93,6 @@ def _cost(one: Grouped) -> float:
 
 
 def _share(one: Evidence, whole: float) -> Gain:
-    """What an item adds to the likelihood, percent of what all items do."""
+    """Return the gain of an item in log-likelihood, in percent of that of all items."""
     percent = 100.0 / max(whole, 1e-9)
     return Gain(percent * one.added, percent * one.low, percent * (2.0 * one.added - one.low), on=one.on)

@@ -1,4 +1,4 @@
-"""Changes in plain words."""
+"""Changes in words."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from fes_pin.models.stage import Effect
 
 @dataclass(frozen=True)
 class Words:
-    """How a change of a nominal parameter is reported.
+    """Words for a change of a nominal parameter.
 
     Attributes
     ----------
     more, less
-        What happened if the value rose, and if it fell.
+        Words for a value that rose, and for one that fell.
     by_share
-        True if the ratio of the values is reported, not their difference.
+        Whether the ratio of the values is reported, not their difference.
     """
 
     more: str
@@ -36,11 +36,11 @@ NOMINAL: Mapping[str, Words] = {
     "gain": Words("the muscle became stronger", "the muscle became weaker", True),
     "time_constant_s": Words("activation became slower", "activation became faster"),
 }
-"""By the names of the study format; any other parameter rose or fell."""
+"""Words by the names of the study format; any other parameter rose or fell."""
 
 
 def of_nominal(rig: Rig, name: str, before: float, after: float, unit: str) -> str:
-    """What happened to a nominal parameter, with the size in the unit that it has on the rig."""
+    """Return the change of a nominal parameter in words, with its size in the unit that it has on the rig."""
     words = NOMINAL.get(name, Words(f"{name} rose", f"{name} fell", True))
     happened = words.more if after > before else words.less
     if words.by_share and before:
@@ -53,7 +53,7 @@ def of_nominal(rig: Rig, name: str, before: float, after: float, unit: str) -> s
 
 
 def of_cause(kind: type[Effect], before: float, after: float, unit: str, there_before: bool) -> str:
-    """What happened to a cause, by its first parameter."""
+    """Return the change of a cause in words, by its first parameter."""
     cause = sentence(kind).removesuffix(".")
     if not there_before:
         return f"new: {cause}, {after:.3g} {unit}".strip()
