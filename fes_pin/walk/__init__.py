@@ -1,1 +1,1 @@
-"""Measured walking against the model: what ground reaction a motion requires, and what the model gets wrong."""
+"""Diagnosis of measured walking: the ground reaction that a motion requires, against the measured one."""

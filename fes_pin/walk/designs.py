@@ -1,4 +1,4 @@
-"""The recordings as they are fitted: waves of the mean stride, of the residual and of every form, and their noise."""
+"""Design matrices of recorded walks: waves of the mean stride of the residual and of every form, and their noise."""
 
 from __future__ import annotations
 
@@ -22,17 +22,20 @@ from fes_pin.walk.walk_trial import WalkTrial, walk_trial_of
 
 TISSUE_DRAWS, WHITE_DRAWS = 40, 64
 TAKEN = 0.3
-"""Share of a wave of the required reaction that errors in the motion may make, as a standard deviation: soft tissue
+"""Standard deviation of errors in the motion, as a share of a wave of the required reaction: soft tissue
 moves by 10 mm and more where a trunk moves by 20 to 40 (A. Leardini et al., Gait Posture 21:212, 2005)."""
 SHIFT_ENDS_S = 5e-4
-"""Step of a shift with which following it ends, s."""
+"""Step at which the estimation of a shift ends, s."""
 SHIFT_ROUNDS = 4
-"""Of following a shift of the clock."""
+"""Most steps of the estimation of a shift of the clock."""
 
 
 @dataclass(frozen=True)
 class Design:
-    """Residual and columns of every form by name, (1, 6, k, ...) in the mean stride, for plates read `later_s` late."""
+    """Design matrix: residual and columns of every form by name, (1, 6, k, ...) in the mean stride.
+
+    The plates are read `later_s` later than their clock says.
+    """
 
     trials: list[WalkTrial] = field(repr=False)
     y: np.ndarray = field(repr=False)
@@ -41,7 +44,7 @@ class Design:
 
 
 class Designs:
-    """One diagnosis's recordings on the plates' clock as it was read and as it fits best, and the noise of both.
+    """Design matrices of one diagnosis, on the plates' clock as read and on the clock that fits best, and their noise.
 
     Attributes
     ----------
@@ -52,13 +55,13 @@ class Designs:
     shift
         The name of the form that shifts the plates' clock.
     strides
-        What signals are taken apart into.
+        The strides into which signals are cut.
     as_read, shifted
-        The banks on either clock.
+        Design matrices on either clock.
     noise
-        What is common to all fits, in channels as `turn` left them.
+        Noise of all fits, in rotated channels.
     ordinary
-        (1, 6, k, m) rotated: what ordinary errors of landmarks and plates leave.
+        (1, 6, k, m) rotated: residuals by ordinary errors of landmarks and plates.
     """
 
     def __init__(self, recordings: Sequence[WalkRecording], cutoff_hz: float, seed: int = 0) -> None:
@@ -92,21 +95,21 @@ class Designs:
 
     @cached_property
     def landmarks(self) -> np.ndarray:
-        """Residuals that the ordinary error of each coordinate's zero leaves: (coordinates, 6, k)."""
+        """Residuals by the ordinary error of each coordinate's zero: (coordinates, 6, k)."""
         return misplaced(self._first, self.strides)
 
     @cached_property
     def tissue(self) -> np.ndarray:
-        """Residuals that soft tissue leaves: (draws, 6, k)."""
+        """Residuals by soft tissue: (draws, 6, k)."""
         return disturbed_waves(self._first, self.strides, tissue, TISSUE_DRAWS, self.seed)
 
     @cached_property
     def shaken(self) -> np.ndarray:
-        """Residuals that white noise of one unit leaves in a stride: (draws, 6, k)."""
+        """Residuals of a stride by white noise of one unit: (draws, 6, k)."""
         return disturbed_waves(self._first, self.strides, white, WHITE_DRAWS, self.seed)
 
     def turned(self, residual: np.ndarray) -> Designs:
-        """The same with channels rotated for the residual of a set, (1, 6, k)."""
+        """Return the same with channels rotated for the residual of a set, (1, 6, k)."""
         other = copy.copy(self)
         other._turn(residual)
         return other
@@ -115,7 +118,7 @@ class Designs:
         turn = rotation(left, self.strides.harmonics)
         weight = GRAVITY * sum(p[0] for p in self.as_read.trials[0].parameters.values())
         means = np.r_[np.full(3, MEAN_FORCE * weight), np.full(2, MEAN_ARM_M * weight), MEAN_TWIST_NM] ** 2
-        if not self.strides.whole:  # soft tissue does not come back to what it was
+        if not self.strides.whole:  # soft tissue does not return to its initial place
             means = means + np.mean(self.tissue[..., 0] ** 2, axis=0)
         bare = WalkNoise(self.strides.harmonics, turn, means, self._none())
         self.ordinary = bare.rotated(compressed(self._in_every_session()))
@@ -123,13 +126,13 @@ class Designs:
         self.noise = replace(bare, nuisance=np.concatenate([taken, self.ordinary], axis=3))
 
     def _in_every_session(self) -> np.ndarray:
-        """What ordinary errors of landmarks and plates leave, in units of their standard deviations: (1, 6, k, m)."""
+        """Return residuals by ordinary errors of landmarks and plates of one standard deviation: (1, 6, k, m)."""
         forms = [(self.as_read.x[n], f.ordinary) for n, f in self.forms.items() if f.ordinary > 0.0]
         landmarks = np.moveaxis(self.landmarks, 0, 2)[None]
         return np.concatenate([landmarks, *(size * columns for columns, size in forms)], axis=3)
 
     def _shifted(self) -> Design:
-        """The plates read as late as fits best, followed beyond the linear."""
+        """Return the design matrix at the delay of the plates that fits best, by repeated linearization."""
         form, later = self.forms[self.shift], 0.0
         trials, y, rate = self.as_read.trials, self.as_read.y, self.as_read.x[self.shift]
         for _ in range(SHIFT_ROUNDS):
@@ -143,30 +146,30 @@ class Designs:
         return self._design(trials, later)
 
     def design(self, names: Names) -> Design:
-        """The bank in which a set is fitted: with the clock moved if it holds a shift."""
+        """Return the design matrix in which a set is fitted: with the clock shifted if the set has a shift."""
         return self.shifted if self.shift in names else self.as_read
 
     def columns(self, names: Names) -> np.ndarray:
-        """Rotated columns of a set in the mean stride, one form after the other: (n, 6, k, p)."""
+        """Return rotated columns of a set in the mean stride, one form after the other: (n, 6, k, p)."""
         return self.noise.rotated(self._columns(names))
 
     def residual(self, names: Names, values: np.ndarray) -> np.ndarray:
-        """Residual of a set in the mean stride, (1, 6, k)."""
+        """Return the residual of a set in the mean stride, (1, 6, k)."""
         return self.design(names).y - self._columns(names) @ values
 
     def by_stride(self, names: Names) -> tuple[np.ndarray, np.ndarray]:
-        """Residual (n, 6, k) and columns (n, 6, k, p) of a set, stride by stride."""
+        """Return residual (n, 6, k) and columns (n, 6, k, p) of a set, stride by stride."""
         trials = self.design(names).trials
         y = self.strides.coefficients([s.residual[:, :, None] for s in trials])[..., 0]
         return y, self.strides.coefficients([self.signals(names, s) for s in trials])
 
     def signals(self, names: Names, trial: WalkTrial) -> np.ndarray:
-        """Columns of a set along a trial: (n, 6, p)."""
+        """Return columns of a set along a trial: (n, 6, p)."""
         empty = np.zeros((len(trial.centre), 6, 0))
         return np.concatenate([empty, *(self.forms[n].columns(trial) for n in names)], axis=2)
 
     def plausible(self, names: Names) -> np.ndarray:
-        """Plausible size of every parameter of a set, (p,)."""
+        """Return the plausible size of every parameter of a set, (p,)."""
         return np.array([size for n in names for size in self.forms[n].plausible])
 
     def _columns(self, names: Names) -> np.ndarray:
@@ -181,9 +184,10 @@ def _by_name() -> dict[str, Form]:
 
 
 def _taken(trials: list[WalkTrial], strides: Strides) -> np.ndarray:
-    """What errors in the motion take from every wave of the required reaction, in units of `TAKEN`: (n, 6, k, 7).
+    """Return nuisance columns for errors in the motion, in units of `TAKEN`: (n, 6, k, 7).
 
-    A share of each channel, and one that grows with the square of the frequency, as of accelerations.
+    They are a share of each wave of the required reaction by channel, and one of all channels that grows with the
+    square of the frequency, as errors of accelerations do.
     """
     h = strides.harmonics
     needed = strides.mean([s.needed[:, :, None] for s in trials])[..., 0]

@@ -1,4 +1,4 @@
-"""The verdict on a study of walking: which causes are named, how sure, with what gain, and what stays open."""
+"""Diagnosis of a study of walking: named causes with their significance and gain, and lack of fit."""
 
 from __future__ import annotations
 
@@ -37,21 +37,21 @@ def diagnose_walk(
     Parameters
     ----------
     study
-        Of rig `body`; trials with the role "held_out" take no part.
+        A study of rig `body`; trials with the role "held_out" are not used.
     seed
-        Of what is simulated: soft tissue, critical values, bootstrap intervals.
+        Of simulations: soft tissue, critical values, bootstrap intervals.
     cutoff_hz
-        Of the zero-phase low pass that motion (where its rates are not in the file) and plates go through.
+        Cut-off of the zero-phase low pass of the plates, and of the motion where its rates are not in the file, Hz.
     limit
-        Seconds that the search may take; then it stops at the best set so far, and says so. Inverse dynamics, and what
-        is done with that set, come on top.
+        Seconds that the search may take; then it stops at the best set so far, and the verdict says so. Inverse
+        dynamics and the judgement of that set take time in addition.
     progress
-        Called with a share done and a few words.
+        Called with the share that is done and a few words.
 
     Raises
     ------
     InputError
-        The study is of another rig, or a file of it cannot be used.
+        If the study is of another rig, or a file of it cannot be used.
     """
     began = time.perf_counter()
     tell, made = asked(study, seed, limit, progress), provenance_now(study, seed)
@@ -75,7 +75,7 @@ def diagnose_walk(
 
 
 def _searched(models: WalkModels, tell: Progress) -> tuple[WalkSearch, SearchResult[WalkFit]]:
-    """A search by evidence alone, then one in which the noise is known from the residual of its best set."""
+    """Search by evidence alone, and again with the noise estimated from the residual of the best set."""
     first = WalkSearch(models, lambda share, words: tell(0.3 + 0.2 * share, words), POLICY).run()
     tell(0.5, "critical values")
     models = models.with_noise_of(first.best)
@@ -87,7 +87,7 @@ def _searched(models: WalkModels, tell: Progress) -> tuple[WalkSearch, SearchRes
 
 
 def _judged(study: Study, search: WalkSearch, found: SearchResult[WalkFit], seed: int) -> WalkDiagnosis:
-    """The diagnosis of what a search found."""
+    """Return the diagnosis of a search's result."""
     models, verdict = search.models, WalkVerdict(search, seed)
     state = verdict.of(found)
     found, left, errors = state.found, verdict.lack_of_fit(state), verdict.errors
@@ -95,7 +95,7 @@ def _judged(study: Study, search: WalkSearch, found: SearchResult[WalkFit], seed
     noise = marker_noise(models.designs)
     causes += [noise] if noise is not None and noise.name not in {c.name for c in causes} else []
     causes.sort(key=lambda c: (c.gain_held_out.is_none, -c.gain_held_out.percent))
-    in_a_set = {n for c in causes for n in (c.name, *c.equivalents)}  # these may be what is there
+    in_a_set = {n for c in causes for n in (c.name, *c.equivalents)}  # these may be the true causes
     return WalkDiagnosis(
         study=study,
         verdict=word_of(bool(causes), left),

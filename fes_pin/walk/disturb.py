@@ -1,4 +1,4 @@
-"""What errors in the coordinates do to the residual: soft tissue, white noise, landmarks that are not quite found."""
+"""Changes of the residual by errors in the coordinates: soft tissue, white noise, misplaced landmarks."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ TISSUE_M, TISSUE_RAD = 0.002, 0.01
 """Soft tissue's share of a coordinate's wave once a stride; it falls as 1 / h (Leardini et al., Gait Posture 21, 2005:
 some 10 mm on the thigh, a few degrees in its angles). Only proportions matter."""
 TISSUE_WAVES = 8
-"""As far as a walk's low pass lets through."""
+"""Number of waves of soft tissue: a walk's low pass removes higher ones."""
 CLUSTER_M = 0.15
 """Half the length of a cluster of markers, m: noise of markers, in m, over this is noise of angles, in rad."""
 
@@ -26,14 +26,14 @@ LANDMARK_M, LANDMARK_RAD = 0.005, 0.026
 """Ordinary errors of where a coordinate's zero is, as standard deviations: landmarks are found to 6 to 21 mm, and a
 segment's frame is the mean of several (U. Della Croce et al., Gait Posture 21:226, 2005)."""
 SMALL_N = 1.0
-"""N, or N m: what ordinary errors make together in all waves, and is smaller, is left out."""
+"""Ordinary errors with a smaller residual in all waves together are left out, N or N m."""
 
 Disturbance = Callable[[np.ndarray, np.ndarray, bool, np.random.Generator], np.ndarray]
 CoordinateErrors = dict[str, np.ndarray]
 
 
 def tissue(time: np.ndarray, phase: np.ndarray, angle: bool, random: np.random.Generator) -> np.ndarray:
-    """An error that comes again in each stride, (n,)."""
+    """Return an error that repeats in each stride, (n,)."""
     out = np.zeros(len(time))
     for h in range(1, TISSUE_WAVES + 1):
         a, b = random.normal(size=2) / h
@@ -42,12 +42,12 @@ def tissue(time: np.ndarray, phase: np.ndarray, angle: bool, random: np.random.G
 
 
 def white(time: np.ndarray, phase: np.ndarray, angle: bool, random: np.random.Generator) -> np.ndarray:
-    """White noise as of markers with 1 mm, (n,)."""
+    """Return white noise as of markers with 1 mm, (n,)."""
     return 1e-3 * random.normal(size=len(time)) / (CLUSTER_M if angle else 1.0)
 
 
 def disturbed_waves(recording: WalkRecording, strides: Strides, kind: Disturbance, draws: int, seed: int) -> np.ndarray:
-    """Changes of the residual's waves in the first stride by random errors of all coordinates: (draws, 6, k)."""
+    """Return changes of the residual's waves in the first stride by random errors of all coordinates: (draws, 6, k)."""
     random = np.random.default_rng(seed)
 
     def errors(names: list[str], clock: np.ndarray, turn: np.ndarray) -> Iterator[CoordinateErrors]:
@@ -58,7 +58,7 @@ def disturbed_waves(recording: WalkRecording, strides: Strides, kind: Disturbanc
 
 
 def misplaced(recording: WalkRecording, strides: Strides) -> np.ndarray:
-    """Changes of the residual's waves by the ordinary error of each coordinate's zero: (coordinates, 6, k)."""
+    """Return changes of the residual's waves by the ordinary error of each coordinate's zero: (coordinates, 6, k)."""
 
     def errors(names: list[str], clock: np.ndarray, _turn: np.ndarray) -> Iterator[CoordinateErrors]:
         for n in names:
@@ -76,7 +76,7 @@ def _responses(
     strides: Strides,
     errors: Callable[[list[str], np.ndarray, np.ndarray], Iterator[CoordinateErrors]],
 ) -> np.ndarray:
-    """Changes of the residual's waves in the first stride by errors of the coordinates, by name: (errors, 6, k)."""
+    """Return changes of the residual's waves in the first stride by errors of the coordinates: (errors, 6, k)."""
     _, rows, phase = strides.windows[0]
     time = recording.motion.time[rows]
     near = (recording.coordinates_time >= time[0] - PAD_S) & (recording.coordinates_time <= time[-1] + PAD_S)
@@ -105,7 +105,7 @@ def _responses(
 
 
 def compressed(columns: np.ndarray) -> np.ndarray:
-    """Fewer columns of nearly the same covariance."""
+    """Return fewer columns of nearly the same covariance."""
     flat = columns.reshape(-1, columns.shape[-1])
     vectors, sizes, _ = np.linalg.svd(flat, full_matrices=False)
     kept = sizes > SMALL_N

@@ -10,9 +10,9 @@ from fes_pin.walk.motion import Motion
 
 
 def required(motion: Motion) -> np.ndarray:
-    """The ground reaction that the motion requires: (n, 6) force, N, and moment about the world's origin, N m.
+    """Return the ground reaction that the motion requires: (n, 6) force, N, and moment about the world's origin, N m.
 
-    The first six rows of Pinocchio's `rnea`, which push the free joint, carried to the world's origin.
+    It is given by the first six rows of Pinocchio's `rnea`, the efforts of the free joint, at the world's origin.
     """
     out = np.empty((len(motion.time), 6))
     data = motion.model.createData()
@@ -23,13 +23,13 @@ def required(motion: Motion) -> np.ndarray:
 
 
 def centre_of_mass(motion: Motion) -> np.ndarray:
-    """Where the body's centre of mass is: (n, 3) m."""
+    """Return the body's centre of mass: (n, 3) m."""
     data = motion.model.createData()
     return np.array([pin.centerOfMass(motion.model, data, q) for q in motion.q])
 
 
 def about(wrench: np.ndarray, point: np.ndarray) -> np.ndarray:
-    """The same wrench, its moment about another point: `wrench` (n, 6, ...), `point` (n, 3)."""
+    """Return the same wrench with its moment about another point: `wrench` (n, 6, ...), `point` (n, 3)."""
     arm = point.reshape(*point.shape, *(1,) * (wrench.ndim - 2))
     moved = wrench.copy()
     moved[:, 3:] -= np.cross(np.broadcast_to(arm, wrench[:, :3].shape), wrench[:, :3], axis=1)
@@ -37,7 +37,7 @@ def about(wrench: np.ndarray, point: np.ndarray) -> np.ndarray:
 
 
 def segment_poses(motion: Motion) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Every segment's link frame: orientation (n, 3, 3) and origin (n, 3) m in the world."""
+    """Return every segment's link frame: orientation (n, 3, 3) and origin (n, 3) m in the world."""
     model, data = motion.model, motion.model.createData()
     frames = {s: model.getFrameId(s) for s in SEGMENT_NAMES}
     turn = {s: np.empty((len(motion.time), 3, 3)) for s in frames}
@@ -50,7 +50,7 @@ def segment_poses(motion: Motion) -> dict[str, tuple[np.ndarray, np.ndarray]]:
 
 
 def segment_regressors(motion: Motion) -> dict[str, np.ndarray]:
-    """What each segment's mass parameters add to the required ground reaction.
+    """Return the required ground reaction per unit of each segment's mass parameters.
 
     Pinocchio's `jointBodyRegressor`, carried to the world's origin: the root's rows of `computeJointTorqueRegressor`
     without its columns of zeros.
@@ -72,7 +72,7 @@ def segment_regressors(motion: Motion) -> dict[str, np.ndarray]:
 
 
 def segment_parameters(motion: Motion) -> dict[str, np.ndarray]:
-    """Each segment's ten mass parameters as believed, in the order of `segment_regressors`: (10,)."""
+    """Return each segment's ten mass parameters as believed, in the order of `segment_regressors`: (10,)."""
     model = motion.model
     joints = {s: model.frames[model.getFrameId(s)].parentJoint for s in SEGMENT_NAMES}
     return {s: model.inertias[j].toDynamicParameters() for s, j in joints.items()}

@@ -1,4 +1,4 @@
-"""What a walking model may leave out: causes, and the forms that each can take."""
+"""Causes of errors in a model of walking, and the forms that each can take."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fes_pin.body.joints import SIDES
 from fes_pin.walk.walk_trial import WalkTrial
 
 STAGE = "body"
-"""Where the contract files these causes."""
+"""Stage of these causes."""
 AXES = ("forward", "left", "up")
 
 EffectColumns = Callable[[WalkTrial], np.ndarray]
@@ -27,21 +27,22 @@ class Form:
     cause
         Its canonical name.
     site
-        Where or how, in a few words.
+        Where or how it acts, in a few words.
     parameters, units
-        Of each column.
+        Names and units of its columns.
     plausible
-        A size of each parameter that is large but happens; what stays unseen at this size is not testable.
+        A large but possible size of each parameter; a form that is not significant at this size is not testable.
     columns
         Residual (measured - required) per unit of each parameter: (n, 6, p).
     shifts
-        Whether the parameter is a shift of the plates' clock, which the fit follows beyond the linear.
+        Whether the parameter is a shift of the plates' clock, which is estimated by repeated linearization.
     positive
         Whether a negative value has no meaning.
     ordinary
-        Standard deviation of the parameter where nothing is wrong: what is in every session is no cause.
+        Standard deviation of the parameter where nothing is wrong: an ordinary error of every session is no cause.
     reading
-        Where the parameters are to be read off directly: their values (p,) and standard deviations, or None.
+        Function of a trial that returns directly measured values (p,) and standard deviations of the parameters, or
+        None.
     segments
         By segment, the change of its ten mass parameters per unit of each parameter, (10, p), given what is believed.
     """
@@ -74,9 +75,9 @@ class Form:
 
 
 class WalkEffect:
-    """One physical effect that a model of walking lacks, or one error of its measurements.
+    """A physical effect that a model of walking lacks, or an error of its measurements.
 
-    A subclass says what it is in its docstring and lists its forms. Each form is linear in its parameters.
+    A subclass describes it in its docstring and lists its forms. Each form is linear in its parameters.
 
     Attributes
     ----------
@@ -89,7 +90,7 @@ class WalkEffect:
 
     @classmethod
     def forms(cls) -> Iterator[Form]:
-        """Every form, the simplest first."""
+        """Yield every form, the simplest first."""
         raise NotImplementedError
 
 
@@ -101,7 +102,7 @@ SITES: dict[str, tuple[str, ...]] = {
     **{f"{side} {part}": (f"{side}_{part}",) for part in ("thigh", "shank") for side in SIDES},
     **{f"{side} foot": tuple(f"{side}_{part}" for part in ("hindfoot", "forefoot")) for side in SIDES},
 }
-"""Where a segment's figures may be off: one segment, or the same of both legs."""
+"""Sites at which a segment's parameters may be wrong: one segment, or the same segment of both legs."""
 
 
 def segment_form(
@@ -112,7 +113,7 @@ def segment_form(
     plausible: tuple[float, ...],
     change: Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]],
 ) -> Form:
-    """A form that changes segments' mass parameters: its columns are Pinocchio's regressors times that change."""
+    """Return a form that changes segments' mass parameters, with columns of Pinocchio's regressors times the change."""
 
     def columns(trial: WalkTrial) -> np.ndarray:
         return np.sum([trial.regressors[s] @ d for s, d in change(trial.parameters).items()], axis=0)
@@ -121,7 +122,7 @@ def segment_form(
 
 
 def central(parameters: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
-    """Mass, centre (3,) and inertia about the centre (3, 3) of ten mass parameters."""
+    """Return mass, centre (3,) and inertia about the centre (3, 3) of ten mass parameters."""
     mass = float(parameters[0])
     centre = parameters[1:4] / mass
     return mass, centre, _matrix(parameters[4:]) - mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
@@ -133,5 +134,5 @@ def _matrix(six: np.ndarray) -> np.ndarray:
 
 
 def six_of(matrix: np.ndarray) -> np.ndarray:
-    """A symmetric matrix in Pinocchio's order: xx, xy, yy, xz, yz, zz."""
+    """Return a symmetric matrix in Pinocchio's order: xx, xy, yy, xz, yz, zz."""
     return np.array([matrix[0, 0], matrix[0, 1], matrix[1, 1], matrix[0, 2], matrix[1, 2], matrix[2, 2]])

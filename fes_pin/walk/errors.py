@@ -12,7 +12,7 @@ from fes_pin.walk.likelihood import fit_walk
 from fes_pin.walk.models import WalkFit, WalkModels
 
 ARM = 0.1
-"""Moments count as forces at this arm, in standing heights (or 0.18 m): about a foot's half length and more."""
+"""Arm by which moments are divided to count as forces, in standing heights (or 0.18 m): over half a foot's length."""
 
 
 class StrideErrors:
@@ -38,28 +38,28 @@ class StrideErrors:
         self._differs = np.sum((self._scale * (y - y.mean(axis=0))) ** 2, axis=0) / max(len(y) - 1, 1)
 
     def errors(self, one: WalkFit, held_out: bool) -> Errors:
-        """Squared errors of a set by stride, N^2, moments by `ARM`; the noise is what differs from stride to stride."""
+        """Return squared errors of a set by stride, N^2, moments by `ARM`; noise is the variance between strides."""
         squares = np.sum((self._scale * self._residual(one, held_out)) ** 2, axis=(1, 2))
         alike = np.ones_like(squares)
         noise, scatter = float(np.sum(self._differs)), 2.0 * float(np.sum(self._differs**2))
         return Errors(squares, self._spread, noise * alike, scatter * alike)
 
     def error_percent(self, one: WalkFit) -> tuple[float, float | None]:
-        """E on all strides, and on strides held out; None for one stride."""
+        """Return E on all strides, and on held-out strides; None for one stride."""
         held_out = self.errors(one, True).error_percent() if self.models.designs.strides.count > 1 else None
         return self.errors(one, False).error_percent(), held_out
 
     def gain(self, without: WalkFit, best: WalkFit, held_out: bool) -> Gain:
-        """What a set removes of the nominal error above the noise, against a smaller set."""
+        """Return the share of the nominal error above the noise that a set removes, against a smaller set."""
         sets = (self.models.nominal(), without, best)
         nominal, before, after = (self.errors(one, held_out) for one in sets)
         return held_out_gain(nominal, before, after, self.seed)
 
     def evidence(self, without: WalkFit, best: WalkFit) -> Evidence:
-        """What a set adds to the likelihood of a held-out stride, against a smaller set, in the set's noise.
+        """Return the evidence for a set in held-out strides, against a smaller set, with the set's noise.
 
-        What landmarks and plates may make in a session counts for neither. The mean over strides: soft tissue moves
-        alike in each, so that more strides are no more evidence.
+        Ordinary errors of landmarks and plates in a session are nuisance parameters. The evidence is the mean over
+        strides: soft tissue moves alike in each, so that more strides are no more evidence.
         """
         before, after = (_whitened(self._residual(one, True), self.models.designs, best) for one in (without, best))
         every = [added_likelihood(*pair) for pair in zip(before, after, strict=True)]
@@ -72,7 +72,7 @@ class StrideErrors:
 
 
 def _residual_by_stride(designs: Designs, one: WalkFit, held_out: bool) -> np.ndarray:
-    """Residual of a set in every stride, its sizes fitted to all strides or to the others: (n, 6, k)."""
+    """Return the residual of a set in every stride, its sizes fitted to all strides or to the others: (n, 6, k)."""
     y, x = designs.by_stride(one.names)
     if not (one.names and held_out):
         return y - x @ one.fitted.values
@@ -85,7 +85,7 @@ def _residual_by_stride(designs: Designs, one: WalkFit, held_out: bool) -> np.nd
 
 
 def _whitened(residual: np.ndarray, designs: Designs, best: WalkFit) -> np.ndarray:
-    """Residuals (n, 6, k) in units of the noise of a set and of what its nuisance parameters may take: (n, 6 k).
+    """Return residuals (n, 6, k), whitened by the noise of a set and by its nuisance parameters: (n, 6 k).
 
     With F the nuisance's columns in units of the noise, u s v' its singular values: (1 + F F')^(-1/2) is
     1 - u (1 - (1 + s^2)^(-1/2)) u'.

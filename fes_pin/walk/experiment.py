@@ -1,4 +1,4 @@
-"""The next walk, or stand, that distinguishes two causes: the one of a few simple ones that separates them most."""
+"""The next experiment of walking or standing: the simple trial that distinguishes two causes best."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ class NextWalk(ReadOnly):
     Attributes
     ----------
     why
-        In words.
+        The reason, in words.
     separates
         The two causes.
     conditions
-        Of the trial, as a `[[trial]]` table; None where none of the trials known here separates them.
+        Conditions of the trial, as a `[[trial]]` table; None where no simple trial separates them.
     coordinates
         Columns of the motion to make: `time_s`, `q_<coordinate>`.
     """
@@ -47,7 +47,7 @@ class NextWalk(ReadOnly):
     coordinates: dict[str, np.ndarray] | None
 
     def record(self) -> dict[str, Any]:
-        """As JSON files have it; the motion is in `NEXT_FILE`."""
+        """Return the experiment as JSON files have it; the motion is in `NEXT_FILE`."""
         trial = None
         if self.conditions is not None:
             trial = {"coordinates": NEXT_FILE, "file": NEXT_FILE, "kind": "motion", **self.conditions}
@@ -55,7 +55,7 @@ class NextWalk(ReadOnly):
 
 
 def next_walk(models: WalkModels, found: SearchResult[WalkFit], cause: str) -> NextWalk | None:
-    """The trial that separates a cause from its nearest rival of another name; None if it has none."""
+    """Return the trial that separates a cause from its nearest rival of another name; None if it has no rival."""
     designs, best = models.designs, found.best
     own = {n for n in best.names if designs.forms[n].cause == cause}
     near = [(r.criterion, set(r.names) - set(best.names), n) for n in own for r in models.near_rivals(found, n)]
@@ -98,7 +98,7 @@ def _program(
 
 
 def _trial(old: WalkTrial, motion: Motion, load: dict[str, np.ndarray], extra: np.ndarray | None = None) -> WalkTrial:
-    """A trial that measures just what its motion requires, shared out between the feet; `extra` (n, 6) is added."""
+    """Return a trial whose plates measure what its motion requires, divided between the feet, plus `extra` (n, 6)."""
     needed = required(motion)
     if extra is not None:
         needed = needed + extra
@@ -142,7 +142,7 @@ _WORDS = {
 
 
 def _separation(designs: Designs, signal: np.ndarray, rival: np.ndarray, prior: np.ndarray, best: WalkFit) -> float:
-    """Squared distance of a signal (n, 6) from what a rival (n, 6, p) can make of it, in the noise that was found."""
+    """Return the squared distance of a signal (n, 6) from the span of a rival (n, 6, p), in units of the noise."""
     columns = np.concatenate([signal[:, :, None], rival], axis=2)
     _, rows, _ = designs.strides.windows[0]
     white = designs.noise.rotated(designs.strides.first(columns[rows])) / np.sqrt(best.fitted.variance)

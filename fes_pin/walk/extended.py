@@ -1,4 +1,4 @@
-"""The body with what a diagnosis found: it goes back into `linearize`, `allocate` and the viewer."""
+"""The body extended by the causes of a diagnosis, for `linearize`, `allocate` and the viewer."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ ROUNDED = 1e-3
 
 
 def extended_body(models: WalkModels, best: WalkFit) -> Body:
-    """The body with the segments' masses, centres and inertias of a set of causes; the same where it has none.
+    """Return the body with the segments' masses, centres and inertias of a set of causes.
 
     Raises
     ------
     InputError
-        The figures are no body's: a mass that is not positive, say.
+        If the parameters are impossible, as a mass that is not positive.
     """
     designs = models.designs
     body = designs.recordings[0].motion.body
@@ -40,12 +40,12 @@ def extended_body(models: WalkModels, best: WalkFit) -> Body:
 
 
 def with_segments(body: Body, parameters: dict[str, np.ndarray]) -> Body:
-    """A body with other mass parameters (10,) of some segments, in their links' frames.
+    """Return a body with other mass parameters (10,) of some segments, in their links' frames.
 
     Raises
     ------
     InputError
-        A segment's mass is not positive, or its inertia no body's.
+        If a segment's mass is not positive, or its inertia is impossible.
     """
     tree = fromstring(body.urdf)
     for link in tree.iter("link"):

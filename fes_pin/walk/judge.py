@@ -16,9 +16,9 @@ CHANNELS = ("forward force", "leftward force", "vertical force", "moment about f
 
 
 def other_leg(designs: Designs, one: WalkFit) -> float | None:
-    """Gain in percent on one leg's single supports of sizes fitted to the other's; None where a leg has none.
+    """Return the gain in percent on one leg's single supports of sizes fitted to the other's; None without these.
 
-    Channels count in units of the set's residual in them.
+    Channels are in units of the set's residual in them.
     """
     along = [(trial, designs.signals(one.names, trial)) for trial in designs.design(one.names).trials]
     left = np.concatenate([trial.residual - x @ one.fitted.values for trial, x in along])
@@ -41,9 +41,9 @@ def other_leg(designs: Designs, one: WalkFit) -> float | None:
 
 
 def lack_of_fit(designs: Designs, one: WalkFit) -> tuple[float, str]:
-    """Whether the residual of a set comes again in every stride: p-value, and the channel and wave where it is largest.
+    """Test whether the residual of a set repeats in every stride: p-value, and channel and wave where it is largest.
 
-    For one stride there is nothing to compare with; what a millimetre of marker noise and the plates make is taken.
+    A single stride is compared with the residual of 1 mm of marker noise and of the plates.
     """
     y, x = designs.by_stride(one.names)
     read, _ = designs.by_stride(())
@@ -65,7 +65,7 @@ def lack_of_fit(designs: Designs, one: WalkFit) -> tuple[float, str]:
 
 
 def not_testable(designs: Designs, one: WalkFit) -> list[str]:
-    """Causes whose every form, at its plausible size, stands out by less than `SEEN_DEVIATIONS`."""
+    """Return causes whose every form, at its plausible size, is significant by less than `SEEN_DEVIATIONS`."""
     noise, variance = designs.noise, one.fitted.variance
     root = 1.0 / np.sqrt(variance).ravel()
     taken = np.concatenate([noise.nuisance, designs.columns(one.names)], axis=3).reshape(variance.size, -1)
@@ -77,6 +77,6 @@ def not_testable(designs: Designs, one: WalkFit) -> list[str]:
         kept = x - taken @ np.linalg.solve(taken.T @ taken + ridge, taken.T @ x)
         best[form.cause] = max(best.get(form.cause, 0.0), float(np.sqrt(max(np.sum(kept * x, axis=0).max(), 0.0))))
     found = {designs.forms[n].cause for n in one.names}
-    if designs.strides.count > 1:  # what differs from stride to stride shows noise
+    if designs.strides.count > 1:  # differences between strides show noise
         found.add("marker_noise")
     return sorted(name for name, size in best.items() if size < SEEN_DEVIATIONS and name not in found)

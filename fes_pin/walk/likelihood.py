@@ -1,18 +1,18 @@
-"""The one likelihood by which sets of causes are judged: residuals of the ground reaction, as coloured noise.
+"""The Whittle likelihood of residuals of the ground reaction, by which sets of causes are judged.
 
-Residuals are waves of the stride, in the mean over strides: soft tissue moves alike in each, so more strides are no
-more evidence. They are Gaussian, independent from wave to wave and, after a rotation of the six channels, from channel
-to channel, with a variance whose logarithm is a level of the channel and a course over frequency that all channels
-share: Whittle's likelihood at the walk's own frequencies. Variances are taken from expected squares: the squares that
-effects and nuisance fitted away are added to those of the residuals first. Means over a stride are known
-better: momentum comes back to what it was, so a mean force is wrong by some 0.05 % of the weight (0.5 mm of noise at
-both ends of a stride), a mean moment by what a centre of mass 1 mm off makes.
+Residuals are waves of the mean stride: soft tissue moves alike in each stride, so that more strides are no more
+evidence. They are Gaussian and independent between waves and, after a rotation of the six channels, between channels.
+The logarithm of their variance is a level of the channel plus a function of frequency that all channels share.
+Variances are estimated from expected squares: the squares that effects and nuisance parameters explain are added to
+those of the residuals. Means over a stride are known better. As momentum returns to its initial value, a mean force is wrong by some
+0.05 % of the weight (0.5 mm of noise at both ends of a stride), and a mean moment by that of a centre of mass 1 mm off.
 
 Sizes of effects are integrated over a normal prior of their plausible sizes (Laplace's evidence, exact as effects are
-linear): that is the price of a parameter, log(1 + d^2) for one seen with d standard deviations of the prior.
+linear). The penalty of a parameter is therefore log(1 + d^2), with d the standard deviation of the prior over that of
+the estimate.
 
-Every set has nuisance parameters with normal priors, of which no cause is made (`nuisance`): errors of the motion that
-make the required reaction larger or smaller, landmarks that are not quite found, plates as good as their calibration.
+Every set has nuisance parameters with normal priors, which are no causes (`nuisance`): errors of the motion that scale
+the required reaction, misplaced landmarks, and plates as accurate as their calibration.
 """
 
 from __future__ import annotations
@@ -22,13 +22,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 ROUNDS = 8
-"""Of alternating weights and effects; the last changes a deviance by less than 0.1."""
+"""Alternations of weights and effects; the last changes a deviance by less than 0.1."""
 STEP_SD = 1.0
-"""Standard deviation of what is believed of a step of log variance beforehand: a factor e from one wave to the next."""
+"""Prior standard deviation of a step of the log variance: a factor e from one wave to the next."""
 PRIOR_LEFT = 1e-4
-"""Of the prior's weight, in reported sizes: an effect that nothing shows has a hundred times its plausible size."""
+"""Share of the prior's weight that is kept in reported sizes: an effect that is not identifiable has a standard
+deviation of a hundred times its plausible size."""
 FLOOR_N = 0.3
-"""N, or N m: a plate's own noise in a stride's wave; no residual is smaller."""
+"""Noise of a plate in a wave of a stride, N or N m: no residual is smaller."""
 MEAN_FORCE, MEAN_ARM_M, MEAN_TWIST_NM = 0.0005, 0.001, 1.5
 """Errors of mean force, in weights, and of mean level moments, in weights times m, that the nuisance does not hold; see
 above. The moment about the vertical has no weight in it: its error is that of the plates' free moment (a round
@@ -37,16 +38,16 @@ figure)."""
 
 @dataclass(frozen=True)
 class WalkNoise:
-    """What is common to all fits of a diagnosis.
+    """The noise model of all fits of a diagnosis.
 
     Attributes
     ----------
     harmonics
         (k,).
     turn
-        (6, 6): scale and rotation of the channels for waves; means keep theirs.
+        (6, 6): scale and rotation of the channels for waves; those of means are unchanged.
     mean_variance
-        (6,): of the means over a stride.
+        (6,): variances of the means over a stride.
     nuisance
         (n, 6, k, m): columns that every fit has, rotated, each in units of its prior's standard deviation.
     """
@@ -57,7 +58,7 @@ class WalkNoise:
     nuisance: np.ndarray
 
     def rotated(self, values: np.ndarray) -> np.ndarray:
-        """Signals (n, 6, k, ...) in rotated channels."""
+        """Return signals (n, 6, k, ...) in rotated channels."""
         out = np.einsum("ij,njk...->nik...", self.turn, values)
         means = self.harmonics == 0
         out[:, :, means] = values[:, :, means]
@@ -66,14 +67,14 @@ class WalkNoise:
 
 @dataclass(frozen=True)
 class Fitted:
-    """Effects at their most likely values under noise of their own.
+    """Effects at their most likely values, with the noise of their residual.
 
     Attributes
     ----------
     values, covariance
-        (p,), (p, p) of the effects: most likely under the noise that was found, without the prior of their sizes.
+        (p,), (p, p) of the effects: most likely values at the estimated noise, without the prior of their sizes.
     believed
-        (p,) with that prior, as the deviance has them.
+        (p,): values with that prior, as in the deviance.
     deviance
         -2 log evidence.
     variance
@@ -88,7 +89,7 @@ class Fitted:
 
 
 def rotation(left: np.ndarray, harmonics: np.ndarray) -> np.ndarray:
-    """Scale and rotation that make the waves of residuals (n, 6, k) uncorrelated between channels: (6, 6)."""
+    """Return scale and rotation that make the waves of residuals (n, 6, k) uncorrelated between channels: (6, 6)."""
     left = left[:, :, harmonics > 0]
     scale = 1.0 / np.maximum(np.sqrt(np.mean(left**2, axis=(0, 2))), FLOOR_N)
     scaled = (scale[:, None] * left).transpose(1, 0, 2).reshape(6, -1)
@@ -99,33 +100,33 @@ def rotation(left: np.ndarray, harmonics: np.ndarray) -> np.ndarray:
 
 
 def fit_walk(y: np.ndarray, x: np.ndarray, prior: np.ndarray, noise: WalkNoise) -> Fitted:
-    """Effects and noise, most likely together.
+    """Fit effects and noise together.
 
     Parameters
     ----------
     y, x
         (n, 6, k) and (n, 6, k, p), contrasts of strides in rotated channels.
     prior
-        (p,) standard deviation of each effect's size beforehand.
+        (p,): prior standard deviation of each effect's size.
     noise
-        What is common.
+        The noise model of all fits.
     """
     return fit_many(y[None], x, prior, noise)[0]
 
 
 def fit_many(y: np.ndarray, x: np.ndarray, prior: np.ndarray, noise: WalkNoise, rounds: int = ROUNDS) -> list[Fitted]:
-    """`fit_walk` of many at once.
+    """Make many fits of `fit_walk` at once.
 
     Parameters
     ----------
     y
         (b, n, 6, k).
     x, prior
-        (n, 6, k, p) and (p,), for all alike, or (b, n, 6, k, p) and (b, p).
+        (n, 6, k, p) and (p,) for all fits, or (b, n, 6, k, p) and (b, p).
     noise
-        What is common.
+        The noise model of all fits.
     rounds
-        Of alternating weights and effects.
+        Alternations of weights and effects.
     """
     count, p, size = len(y), x.shape[-1], y[0].size
     scaled = x * (prior if prior.ndim == 1 else prior[:, None, None, None])
@@ -155,7 +156,7 @@ def fit_many(y: np.ndarray, x: np.ndarray, prior: np.ndarray, noise: WalkNoise, 
 
 
 def by_frequency(values: np.ndarray, harmonics: np.ndarray) -> np.ndarray:
-    """Values (..., k) of coefficients, each the mean over those of its frequency."""
+    """Return values (..., k) of coefficients, each the mean over those of its frequency."""
     out = np.array(values)
     for h in np.unique(harmonics):
         out[..., harmonics == h] = values[..., harmonics == h].mean(axis=-1, keepdims=True)
@@ -163,10 +164,10 @@ def by_frequency(values: np.ndarray, harmonics: np.ndarray) -> np.ndarray:
 
 
 class Spectra:
-    """Variances exp(level + course over frequency), by Fisher scoring of gamma regression.
+    """Variances exp(level + function of frequency), by Fisher scoring of gamma regression.
 
-    The course takes a step at every wave, of any sign with a normal prior; `falling`: no step may go up. `white`
-    (b, n, 6, k) is a variance that white noise on the coordinates adds.
+    The function has a step at every wave, with a normal prior; with `falling` no step may be positive. `white`
+    (b, n, 6, k) is the additional variance by white noise on the coordinates.
     """
 
     def __init__(self, y: np.ndarray, noise: WalkNoise, falling: bool = False, white: np.ndarray | None = None) -> None:
@@ -185,7 +186,7 @@ class Spectra:
         self.white = white
 
     def update(self, squares: np.ndarray) -> np.ndarray:
-        """Variances (b, n, 6, k) after one round; `squares`, of the same shape, are expected squares of residuals."""
+        """Return variances (b, n, 6, k) after one round from expected squared residuals of the same shape."""
         slope, curve = self._scores(squares)
         moved = np.linalg.solve(curve, slope[:, :, None])[:, :, 0]
         self.level += np.clip(moved[:, :6], -2.0, 2.0)
@@ -195,7 +196,7 @@ class Spectra:
         return self._variance(squares.shape)
 
     def _scores(self, squares: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Slope (b, p) and expected curvature (b, p, p) of the log-likelihood by levels and steps."""
+        """Return slope (b, p) and expected curvature (b, p, p) of the log-likelihood by levels and steps."""
         known = self._variance(squares.shape)[..., self.waves]
         share = self._smooth()[:, None] / known
         gain = self._by_wave(share * 0.5 * (squares[..., self.waves] / known - 1.0))
@@ -203,7 +204,7 @@ class Spectra:
         return slope, self.curvature(share)
 
     def curvature(self, share: np.ndarray) -> np.ndarray:
-        """Expected curvature (b, p, p) by levels and steps, of their shares (b, n, 6, waves) in variances."""
+        """Return the expected curvature (b, p, p) by levels and steps, from shares (b, n, 6, waves) in variances."""
         weight = self._by_wave(0.5 * share**2) + 1e-9
         count, size = self.step.shape
         curve = np.zeros((count, 6 + size, 6 + size))
@@ -214,11 +215,11 @@ class Spectra:
         return curve
 
     def penalty(self) -> np.ndarray:
-        """Twice the negative log prior of the steps, (b,)."""
+        """Return twice the negative log prior of the steps, (b,)."""
         return np.sum((self.step / STEP_SD) ** 2, axis=1)
 
     def _by_wave(self, values: np.ndarray) -> np.ndarray:
-        """Sums over strides and over the coefficients of one frequency: (b, 6, frequencies)."""
+        """Return sums over strides and over the coefficients of one frequency: (b, 6, frequencies)."""
         return values.sum(axis=1) @ self.gather
 
     def _smooth(self) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Sets of forms as the search of `infer` sees them: fitted many at once, judged by evidence and by a simulated null."""
+"""Sets of forms for the search of `infer`: fitted many at once, judged by evidence and by a simulated null."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from fes_pin.walk.nulls import Nulls, simulated_nulls
 from fes_pin.workers import check_limit
 
 POLICY = Policy(beam=4, fitted=None, pairs=0, judged=4)
-"""Every form is fitted, so that no score proposes any."""
+"""Every form is fitted, so that no score test is needed."""
 MOST_FOR_NOISE = 2
-"""Causes in the set whose residual the noise is taken from, at most."""
+"""Most causes in the set from whose residual the noise is estimated."""
 ALIKE = 2
-"""Sets of the same causes, at other sites, that the search extends."""
+"""Number of sets of the same causes, at other sites, that the search extends."""
 TOGETHER = 64
-"""Fits that are made at once: as many as a processor's cache holds."""
+"""Fits that are made at once: as many as fit a processor's cache."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,11 +35,11 @@ class WalkFit:
     Attributes
     ----------
     names
-        Of the forms.
+        Names of the forms.
     fitted
         Their values, and the noise.
-    price
-        The deviance, infinite where a size is not possible. It holds the penalty of each parameter: sizes are
+    criterion
+        The deviance, infinite where a size is impossible. It includes the penalty of each parameter, as sizes are
         integrated over their priors.
     """
 
@@ -49,12 +49,12 @@ class WalkFit:
 
     @property
     def sse(self) -> float:
-        """The same: evidence has its penalty in it."""
+        """The same: evidence includes the penalty."""
         return self.criterion
 
     @property
     def degrees(self) -> int:
-        """Parameters."""
+        """Number of parameters."""
         return len(self.fitted.values)
 
 
@@ -63,17 +63,17 @@ class WalkModels(FittedSets[WalkFit, None]):
 
     Parameters
     ----------
-    banks
-        What is fitted.
+    designs
+        Design matrices of the recordings.
     seed
         Of the simulated null.
 
     Attributes
     ----------
     null
-        What simulated residuals without a cause show. None before the noise is known: then the evidence alone decides.
+        Results of simulated residuals without a cause. None before the noise is known: the evidence alone decides then.
     readings
-        By form whose parameter a trial shows directly, its value and standard deviation.
+        For forms whose parameter a trial shows directly, its value and standard deviation.
     """
 
     def __init__(self, designs: Designs, seed: int) -> None:
@@ -84,7 +84,7 @@ class WalkModels(FittedSets[WalkFit, None]):
         self.readings = dict(_read_off(designs))
 
     def with_noise_of(self, best: WalkFit) -> WalkModels:
-        """The same sets with channels rotated for the residual of one of them, and the null simulated in its noise."""
+        """Return the same sets with channels rotated for the residual of one set, and the null in its noise."""
         other = copy.copy(self)
         FittedSets.__init__(other)
         other.designs = self.designs.turned(self.designs.residual(best.names, best.fitted.values))
@@ -93,17 +93,17 @@ class WalkModels(FittedSets[WalkFit, None]):
         return other
 
     def nominal(self) -> WalkFit:
-        """Fit the set without a form."""
+        """Return the fit without a form."""
         return self.fit(())
 
     def candidates(self, base: WalkFit) -> dict[str, Candidate[None]]:
-        """Forms of causes and sites that a set has not: no two forms of one cause at one site."""
+        """Return forms of causes and sites that a set does not have: no two forms of one cause at one site."""
         forms = self.designs.forms
         taken = {forms[n].place for n in base.names}
         return {n: Candidate(0.0, None) for n, form in forms.items() if form.place not in taken}
 
     def begin(self, base: WalkFit, starts: Mapping[Names, None]) -> dict[Names, WalkFit]:
-        """Fit sets, those of as many parameters and one clock together, as long as the limit of time lets it."""
+        """Fit sets within the limit of time, those with the same number of parameters and clock together."""
         groups: dict[tuple[int, bool], list[Names]] = {}
         for names in starts:
             count = sum(len(self.designs.forms[n].parameters) for n in names)
@@ -116,21 +116,21 @@ class WalkModels(FittedSets[WalkFit, None]):
         return out
 
     def fit(self, names: Names) -> WalkFit:
-        """The fit of a set; kept."""
+        """Return the fit of a set, which is cached."""
         if names not in self.fits:
             (self.fits[names],) = self._fit_alike([names])
         return self.fits[names]
 
     def without(self, names: Names, name: str) -> WalkFit:
-        """The fit of a set less one form."""
+        """Return the fit of a set without one form."""
         return self.fit(tuple(n for n in names if n != name))
 
     def is_possible(self, fitted: WalkFit) -> bool:
-        """Whether every size of a fit is possible."""
+        """Return whether every size of a fit is possible."""
         return math.isfinite(fitted.criterion)
 
     def near(self, size: int, without: Sequence[Names] = ()) -> list[Names]:
-        """The best sets of a size, best first, but for some: at most `ALIKE` of the same causes."""
+        """Return the best sets of a size, best first, except some: at most `ALIKE` of the same causes."""
         count: Counter[tuple[str, ...]] = Counter()
         kept = []
         for names in self.ranked(size):
@@ -141,7 +141,7 @@ class WalkModels(FittedSets[WalkFit, None]):
         return kept
 
     def noise_p_value(self, gain: float, degrees: int) -> float:
-        """Chance of a gain where nothing is wrong, over all forms; 0 for any gain before the noise is known."""
+        """Return the p-value of a gain over all forms by the simulated null; 0 before the noise is known."""
         return float(gain <= 0.0) if self.null is None else self.null.family.p_value(gain)
 
     def level(self, fitted: WalkFit) -> float:
@@ -149,16 +149,16 @@ class WalkModels(FittedSets[WalkFit, None]):
         return WALK_LEVEL
 
     def near_rivals(self, found: SearchResult[WalkFit], name: str) -> list[WalkFit]:
-        """Sets with another form in the place of one whose odds against the best set are not strong, best first."""
+        """Return sets with another form in the place of one that are not strongly excluded, best first."""
         return [r for r in found.rivals[name] if r.criterion - found.best.criterion < STRONG_EVIDENCE]
 
     def sizes(self, one: WalkFit) -> dict[str, np.ndarray]:
-        """Values of a set's parameters by form; a shift counts from the clock as it was read."""
+        """Return values of a set's parameters by form; a shift is relative to the clock as read."""
         forms, later_s = self.designs.forms, self.designs.shifted.later_s
         return {n: v + later_s * forms[n].shifts for n, v in self._by_form(one, one.fitted.values)}
 
     def deviations(self, one: WalkFit) -> dict[str, np.ndarray]:
-        """Their standard deviations, wider where simulated soft tissue spreads values by more than they say."""
+        """Return their standard deviations, widened where values scatter more in simulations of soft tissue."""
         stds = np.sqrt(np.diag(one.fitted.covariance))
         spread = self.null.spread if self.null else {}
         return {n: v * np.maximum(spread.get(n, 1.0), 1.0) for n, v in self._by_form(one, stds)}
@@ -168,7 +168,7 @@ class WalkModels(FittedSets[WalkFit, None]):
         return zip(one.names, np.split(values, ends), strict=False)
 
     def _fit_alike(self, group: Sequence[Names]) -> list[WalkFit]:
-        """Fits of sets of as many parameters and one clock."""
+        """Return fits of sets with the same number of parameters and the same clock."""
         noise, forms = self.designs.noise, self.designs.forms
         y = noise.rotated(self.designs.design(group[0]).y)
         x = np.stack([self.designs.columns(names) for names in group])
@@ -183,7 +183,7 @@ class WalkModels(FittedSets[WalkFit, None]):
         return out
 
     def _may_be(self, name: str, value: float) -> bool:
-        """Whether a value has a meaning, and is what can be read off where it can."""
+        """Return whether a value has a meaning, and agrees with its direct reading where there is one."""
         if self.designs.forms[name].positive and value < 0.0:
             return False
         known = self.readings.get(name)
@@ -195,7 +195,7 @@ WalkSearch = Search[WalkFit, WalkModels]
 
 
 def _read_off(designs: Designs) -> Iterator[tuple[str, tuple[float, float]]]:
-    """Forms whose parameter a trial shows directly: the mean over trials, and its standard deviation."""
+    """Yield forms whose parameter a trial shows directly: the mean over trials, and its standard deviation."""
     for name, form in designs.forms.items():
         found = [form.reading(trial) for trial in designs.as_read.trials] if form.reading else []
         known = [one for one in found if one is not None]

@@ -1,4 +1,4 @@
-"""What residuals without a cause show: the law of the largest gain, and how wide values scatter."""
+"""Simulated null of a walk: distribution of the largest gain, and scatter of values, without a cause."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from fes_pin.walk.designs import Designs
 from fes_pin.walk.likelihood import fit_many
 
 SIMULATED = 100
-"""Residuals without a cause that the law of the largest gain is taken from."""
+"""Number of simulated residuals that give the distribution of the largest gain."""
 SIMULATED_ROUNDS = 4
 """Alternations of weights and sizes in a fit of a simulated residual."""
 FLOOR_SHARE = 0.3
-"""Share of the fitted noise, as an amplitude, that is simulated in addition to soft tissue."""
+"""Share of the fitted noise, in amplitude, that is simulated in addition to soft tissue."""
 
 
 @dataclass(frozen=True)
 class Nulls:
-    """What simulated residuals without a cause show.
+    """Results of simulated residuals without a cause.
 
     Attributes
     ----------
     family
-        Of the gains in evidence of all forms.
+        Family of the gains in evidence of all forms.
     spread
-        By form, (p,) root mean square of value over standard deviation: 1 where the likelihood's intervals are right.
+        For each form, (p,) root mean square of value over standard deviation: 1 if the intervals are right.
     """
 
     family: SimulatedFamily
@@ -35,7 +35,7 @@ class Nulls:
 
 
 def simulated_nulls(designs: Designs, variance: np.ndarray, seed: int) -> Nulls:
-    """What the library makes of residuals where there is no cause, in noise of this variance, (1, 6, k)."""
+    """Return the results of the library on residuals without a cause, in noise of this variance, (1, 6, k)."""
     drawn = _without_a_cause(designs, variance, seed)
     none = np.zeros((*variance.shape, 0))
     alone = [f.deviance for f in fit_many(drawn, none, np.zeros(0), designs.noise, SIMULATED_ROUNDS)]
@@ -50,10 +50,10 @@ def simulated_nulls(designs: Designs, variance: np.ndarray, seed: int) -> Nulls:
 
 
 def _without_a_cause(designs: Designs, variance: np.ndarray, seed: int) -> np.ndarray:
-    """Residuals in rotated channels: (draws, 1, 6, k).
+    """Return simulated residuals in rotated channels: (draws, 1, 6, k).
 
-    Noise is soft tissue's, errors in the coordinates carried through the body, in each wave as large as what was found
-    there, some of the fitted noise, and what is in every session.
+    They are the sum of soft tissue, as errors in the coordinates, scaled in each wave to the estimated noise, of a
+    share of the fitted noise, and of the ordinary errors of every session.
     """
     random = np.random.default_rng(seed)
     drawn = random.normal(size=(SIMULATED, *variance.shape)) * np.sqrt(variance)
