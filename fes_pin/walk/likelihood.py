@@ -4,8 +4,9 @@ Residuals are waves of the mean stride: soft tissue moves alike in each stride, 
 evidence. They are Gaussian and independent between waves and, after a rotation of the six channels, between channels.
 The logarithm of their variance is a level of the channel plus a function of frequency that all channels share.
 Variances are estimated from expected squares: the squares that effects and nuisance parameters explain are added to
-those of the residuals. Means over a stride are known better. As momentum returns to its initial value, a mean force is wrong by some
-0.05 % of the weight (0.5 mm of noise at both ends of a stride), and a mean moment by that of a centre of mass 1 mm off.
+those of the residuals. Means over a stride are known better. As momentum returns to its initial value, a mean force is
+wrong by some 0.05 % of the weight (0.5 mm of noise at both ends of a stride), and a mean moment by that of a centre of
+mass 1 mm off.
 
 Sizes of effects are integrated over a normal prior of their plausible sizes (Laplace's evidence, exact as effects are
 linear). The penalty of a parameter is therefore log(1 + d^2), with d the standard deviation of the prior over that of

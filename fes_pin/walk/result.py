@@ -1,4 +1,4 @@
-"""The answer of a diagnosis of walking: causes, how sure, with what gain, what stays open; and it in words."""
+"""The result of a diagnosis of walking: causes with significance and gain, lack of fit; and it in words."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ class WalkDiagnosis(Result):
     Attributes
     ----------
     remainder
-        Lack of fit: whether residuals of the same course come again in every stride.
+        Lack of fit: whether the same residual repeats in every stride.
     absorbed
-        Causes that these data could not show.
+        Causes that are not testable with these data.
     nominal_error, extended_error
         E in percent: on all strides, and on strides held out; None of a single stride.
     models, best
@@ -53,16 +53,16 @@ class WalkDiagnosis(Result):
 
     @property
     def model(self) -> Body:
-        """The body with the masses, centres and inertias that were found."""
+        """The body with the estimated masses, centres and inertias."""
         return extended_body(self.models, self.best)
 
     @property
     def judged_on(self) -> str:
-        """Of what the errors count: of the ground reaction that the motion requires."""
+        """The predictions whose errors count: the ground reaction that the motion requires."""
         return "the ground reaction"
 
     def errors(self) -> list[Explained]:
-        """Errors of the ground reaction, on all strides and on strides held out."""
+        """Errors of the ground reaction, on all strides and on held-out strides."""
         pairs = zip((FITTED, CROSS_VALIDATED), self.nominal_error, self.extended_error, strict=True)
         noise = self.ceiling_percent or None
         return [
@@ -72,7 +72,7 @@ class WalkDiagnosis(Result):
         ]
 
     def files(self) -> dict[str, str | bytes]:
-        """Content of every file of the diagnosis but the report and the playback, by name: with the extended body."""
+        """Return the content of every file of the diagnosis by name, without report and playback."""
         causes = [
             {"name": c.name, "site": c.site, "parameters": {n: one.value for n, one in c.parameters.items()}}
             for c in self.causes
@@ -84,7 +84,7 @@ class WalkDiagnosis(Result):
         return files
 
     def own_record(self) -> dict[str, Any]:
-        """What `diagnosis.json` has of a walk."""
+        """Return the part of `diagnosis.json` that only a walk has."""
         parameters = {
             f"{c.name}.{n}": {"value": shown(one.value), "std": shown(one.std)}
             for c in self.causes
@@ -104,7 +104,7 @@ class WalkDiagnosis(Result):
         }
 
     def _noise(self) -> dict[str, Any]:
-        """Root mean square of what the extended model leaves in the mean stride, by channel: N and N m."""
+        """Return the root mean square residual of the extended model in the mean stride, by channel: N and N m."""
         residual = self.models.designs.residual(self.best.names, self.best.fitted.values)
         size = np.sqrt(np.sum(residual[0] ** 2, axis=1))
         return {
@@ -112,13 +112,13 @@ class WalkDiagnosis(Result):
         }
 
     def effect(self, name: str) -> type[WalkEffect] | None:
-        """The class that describes a cause."""
+        """Return the class of a cause."""
         return next((e for e in EFFECTS if e.name == name), None)
 
     def notes(self) -> list[tuple[str, str]]:
-        """What is said besides the table, by topic."""
+        """Return notes in addition to the table, by topic."""
         where = f", most in {self.remainder.where}" if self.remainder.where else ""
-        state = "comes again in every stride" if self.remainder.unexplained else "nothing comes again in every stride"
+        state = "a residual repeats in every stride" if self.remainder.unexplained else "none repeats in every stride"
         rows = [
             ("noise from stride to stride alone", f"E {percent(self.ceiling_percent)}"),
             ("low pass", f"{self.cutoff_hz:g} Hz"),

@@ -1,4 +1,4 @@
-"""Signals of a walk stride by stride, as waves of the stride: what comes again in each, and what does not."""
+"""Signals of a walk by stride, as waves of the stride: means over strides, and differences between them."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ DEBOUNCE_S = 0.15
 
 @dataclass(frozen=True)
 class Strides:
-    """Windows of one stride each, and the waves that signals are taken apart into.
+    """Windows of one stride each, and the waves into which signals are decomposed.
 
     Attributes
     ----------
     windows
-        For each stride the scene's number, its samples, and the phase of each in [0, 1).
+        For each stride the number of its trial, its samples, and the phase of each in [0, 1).
     harmonics
         (k,) number of waves in a stride of every coefficient: 0, 1, 1, 2, 2, ...
     whole
-        Whether a window ends as it began, so that momentum comes back: a whole stride, or one who stands.
+        Whether a window ends as it began, so that momentum returns to its value: a whole stride, or standing.
     """
 
     windows: list[tuple[int, slice, np.ndarray]] = field(repr=False)
@@ -48,7 +48,8 @@ class Strides:
         return [np.linalg.pinv(_waves(phase, self.harmonics)) for _, _, phase in self.windows]
 
     def coefficients(self, signals: Sequence[np.ndarray]) -> np.ndarray:
-        """Coefficients of signals (n, 6, p), one a scene: (strides, 6, k, p); their squares sum to the mean square."""
+        """Return coefficients of signals (n, 6, p) of each trial: (strides, 6, k, p); their squares sum to the mean
+        square."""
         out = []
         for (trial, rows, _), inverse in zip(self.windows, self._inverses, strict=True):
             values = signals[trial][rows]
@@ -57,12 +58,12 @@ class Strides:
         return np.array(out)
 
     def first(self, values: np.ndarray) -> np.ndarray:
-        """Coefficients of signals (n, 6, draws) that are known in the first stride only: (draws, 6, k)."""
+        """Return coefficients of signals (n, 6, draws) that are known in the first stride only: (draws, 6, k)."""
         flat = self._inverses[0] @ values.reshape(len(values), -1)
         return np.moveaxis(flat.reshape(len(self.harmonics), *values.shape[1:]), (0, 2), (2, 0))
 
     def mean(self, signals: Sequence[np.ndarray]) -> np.ndarray:
-        """What all strides share: (1, 6, k, p)."""
+        """Return the mean coefficients over strides: (1, 6, k, p)."""
         return self.coefficients(signals).mean(axis=0, keepdims=True)
 
 

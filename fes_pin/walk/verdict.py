@@ -1,4 +1,4 @@
-"""The verdict on a set of causes of a walk: which are claimed, how large and certain each is, and its equivalents."""
+"""The verdict on causes of a walk: those that are named, with their size, significance and equivalents."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from fes_pin.walk.models import WalkFit, WalkModels, WalkSearch
 from fes_pin.walk.white_noise import white_noise
 
 ORDINARY_MM = 2.0
-"""Marker noise up to this is no cause: cameras' and fixations' own (L. Chiari et al., Gait Posture 21:197, 2005)."""
+"""Marker noise up to this is no cause: cameras and fixations have it (L. Chiari et al., Gait Posture 21, 2005)."""
 SURELY = normal_quantile(1.0 - CLAIM_LEVEL)
 """Standard deviations by which marker noise must exceed that."""
 
 
 @dataclass(frozen=True)
 class WalkWeighed(Weighed):
-    """What a walk says of each form of a set; `other_leg` is its gain on the other leg, None where it is of one leg."""
+    """Evidence of a walk on each form of a set; `other_leg` is its gain on the other leg, None for one leg."""
 
     lack_of_fit: Remainder
     other_leg: Mapping[str, float | None]
@@ -36,17 +36,17 @@ Judgement = State[WalkFit, WalkModels, WalkWeighed]
 
 
 class WalkVerdict(Verdict[WalkFit, WalkModels, WalkWeighed]):
-    """How it is judged what a search over sets of forms found.
+    """The verdict on what a search over sets of forms found.
 
-    A cause must be supported by strides that are held out, by their likelihood: it counts as noise what soft tissue,
-    landmarks and plates make in every stride, and a force in newtons is mostly that. What belongs to neither leg must
-    also predict the stances of one leg from those of the other. Of a single stride nothing can be held out; then only a
-    cause that is certain is named.
+    The likelihood of held-out strides must support a cause: it counts errors of soft tissue, landmarks and plates in
+    every stride as noise, which make up most of an error in newtons. A form that belongs to neither leg must also
+    predict the stances of one leg from those of the other. With a single stride nothing can be held out; only a cause
+    that is certain is then named.
 
     Parameters
     ----------
     search
-        That has run.
+        A search that has run.
     seed
         Of bootstrap intervals.
     """
@@ -56,7 +56,7 @@ class WalkVerdict(Verdict[WalkFit, WalkModels, WalkWeighed]):
         self.models, self.errors = search.models, StrideErrors(search.models, seed)
 
     def weigh(self, found: SearchResult[WalkFit]) -> WalkWeighed:
-        """What strides held out, the other leg and the test of lack of fit say of a set."""
+        """Return the evidence of held-out strides, of the other leg and of the test of lack of fit on a set."""
         designs, best, less = self.models.designs, found.best, found.without
         many = designs.strides.count > 1
         p_value, where = lack_of_fit(designs, best)
@@ -68,7 +68,7 @@ class WalkVerdict(Verdict[WalkFit, WalkModels, WalkWeighed]):
         )
 
     def unsupported(self, state: Judgement) -> list[str]:
-        """Forms that held-out strides, or the other leg, do not support."""
+        """Return forms that held-out strides, or the other leg, do not support."""
         return [n for n in state.names if not self._is_supported(state, n)]
 
     def _is_supported(self, state: Judgement, name: str) -> bool:
@@ -79,18 +79,18 @@ class WalkVerdict(Verdict[WalkFit, WalkModels, WalkWeighed]):
         return not weighed.evidence or is_supported(weighed.evidence[name], weighed.gains[name], alone)
 
     def _is_of_either(self, name: str) -> bool:
-        """Whether a form is of neither leg alone; a clock is of no leg."""
+        """Return whether a form belongs to neither leg alone; a clock belongs to no leg."""
         form = self.models.designs.forms[name]
         return not form.site.startswith(("left", "right")) and not form.shifts
 
     def lack_of_fit(self, state: Judgement) -> Remainder:
-        """Lack of fit: the residual comes again in every stride, or held-out strides rejected a cause."""
+        """Return the lack of fit: the residual repeats in every stride, or held-out strides rejected a cause."""
         remainder = state.weighed.lack_of_fit
         left = remainder.unexplained or bool(state.rejected)
         return replace(remainder, unexplained=left, where=remainder.where if left else None)
 
     def cause(self, state: Judgement, name: str) -> Cause:
-        """What is reported of one form of the set."""
+        """Return the report of one form of the set."""
         found, weighed, forms = state.found, state.weighed, self.models.designs.forms
         best, form = found.best, forms[name]
         near = self.models.near_rivals(found, name)
@@ -114,9 +114,9 @@ class WalkVerdict(Verdict[WalkFit, WalkModels, WalkWeighed]):
 
 
 def marker_noise(designs: Designs) -> Cause | None:
-    """White noise on the coordinates that is more than cameras' own, from what differs from stride to stride.
+    """Return white noise on the coordinates above that of cameras, from differences between strides; else None.
 
-    It is judged by its size, and by the likelihood of what differs: no model of the mean stride predicts it.
+    It is judged by its size and by the likelihood of these differences, as no model of the mean stride predicts it.
     """
     level, std, saved = white_noise(designs) or (0.0, 0.0, 0.0)
     evidence = Evidence(saved, saved, FITTED)

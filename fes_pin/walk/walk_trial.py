@@ -1,4 +1,4 @@
-"""What a diagnosis of walking sees of a trial: the residual of the ground reaction, and what could make it."""
+"""A trial of walking: the residual of the ground reaction, and the regressors of its possible causes."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class WalkTrial:
     centre
         (n, 3) m: the believed centre of mass.
     way
-        (n, 3) m: where the plates are, which a treadmill's belt leaves behind; zeros over ground.
+        (n, 3) m: the place of the plates relative to a treadmill's belt; zeros over ground.
     """
 
     name: str
@@ -71,10 +71,10 @@ class WalkTrial:
 
     @cached_property
     def true_feet(self) -> dict[str, np.ndarray]:
-        """What each foot's reaction would be if both together were what the motion requires: (n, 6).
+        """The reaction of each foot if both together were the required reaction: (n, 6).
 
-        The residual is shared out as the vertical load is. An error in proportion to the reaction is one in proportion
-        to this: were it counted from the reading, a gain that makes all readings small would make every residual small.
+        The residual is divided between the feet by their vertical load. A gain error is proportional to this reaction:
+        in proportion to the reading, a gain that makes all readings small would make every residual small.
         """
         up = {side: np.clip(wrench[:, 2], 0.0, None) for side, wrench in self.feet.items()}
         total = np.maximum(sum(up.values()), 1.0)
@@ -87,7 +87,7 @@ class WalkTrial:
 
     @cached_property
     def parameters(self) -> dict[str, np.ndarray]:
-        """By segment, (10,): what is believed."""
+        """By segment, (10,): the believed mass parameters."""
         return segment_parameters(self.motion)
 
     @cached_property
@@ -101,13 +101,13 @@ class WalkTrial:
         return self.motion.dt
 
     def force_at(self, point: np.ndarray, direction: np.ndarray) -> np.ndarray:
-        """A force of 1 N along world directions at points: (n, 6) about the centre; `point`, `direction` (n, 3)."""
+        """Return the wrench of 1 N along world directions at points: (n, 6); `point`, `direction` (n, 3)."""
         along = np.broadcast_to(direction, point.shape)
         return np.hstack([along, np.cross(point - self.centre, along)])
 
 
 def walk_trial_of(recording: WalkRecording, cutoff_hz: float, later_s: float = 0.0) -> WalkTrial:
-    """A trial as a scene; `later_s` reads the plates that much later than their clock says."""
+    """Return a recording as a trial; `later_s` reads the plates that much later than their clock says."""
     plates = recording.plates
     if later_s:
         time = recording.raw_time - later_s

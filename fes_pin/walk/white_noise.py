@@ -1,4 +1,4 @@
-"""White noise of markers, from what differs from stride to stride."""
+"""White noise of markers, estimated from differences between strides."""
 
 from __future__ import annotations
 
@@ -14,25 +14,25 @@ WHITE_TRIED = 0.2, 40.0, 200
 
 
 def white_level(y: np.ndarray, noise: WalkNoise, draws: np.ndarray) -> tuple[float, float, float]:
-    """White noise on the coordinates in what differs from stride to stride.
+    """Estimate white noise on the coordinates from differences between strides.
 
-    What else differs dies out with frequency; noise of differentiated coordinates grows. A stride is no whole period of
-    the noise, so that its waves are not independent of each other: what this does to the scatter of the level is taken
-    from the draws, as that of a score whose terms are correlated (H. White, Econometrica 50:1, 1982).
+    Other differences fall with frequency, while noise of differentiated coordinates grows. A stride is no whole period
+    of the noise, so that its waves are correlated. The scatter of the level is therefore taken from the draws, as that
+    of a score with correlated terms (H. White, Econometrica 50:1, 1982).
 
     Parameters
     ----------
     y
         (n, 6, k) differences of strides, in rotated channels.
     noise
-        Whose `nuisance` is not read.
+        The noise model; its `nuisance` is not used.
     draws
-        (d, 6, k) what noise of one unit leaves in a stride, in rotated channels.
+        (d, 6, k) residuals of a stride by noise of one unit, in rotated channels.
 
     Returns
     -------
     level, std, gain
-        Of the noise, in units, with its standard deviation; the deviance that it saves.
+        Level of the noise, in units, its standard deviation, and the fall of the deviance.
     """
     unit = by_frequency(np.mean(draws**2, axis=0), noise.harmonics)
     tried = np.concatenate([[0.0], np.geomspace(*WHITE_TRIED)])
@@ -55,19 +55,19 @@ def white_level(y: np.ndarray, noise: WalkNoise, draws: np.ndarray) -> tuple[flo
 
 
 def _spread_of_white(spectra: Spectra, share: np.ndarray, squares: np.ndarray) -> float:
-    """Standard deviation of the log of white noise's variance.
+    """Return the standard deviation of the logarithm of white noise's variance.
 
-    With its share s of a variance v, the score is sum s (y^2 / v - 1) / 2. Its information is less what the spectrum's
-    levels and steps explain as well. Its scatter is that of the draws in the white part, s^2 z^2 / 2.
+    With its share s of a variance v, the score is sum s (y^2 / v - 1) / 2. Its information is reduced by the part that
+    levels and steps of the spectrum explain. Its scatter is that of the draws in the white part, s^2 z^2 / 2.
 
     Parameters
     ----------
     spectra
-        Of all levels that were tried.
+        Spectra of all levels that were tried.
     share
-        (n, 6, waves) of white noise in the variance.
+        (n, 6, waves): share of white noise in the variance.
     squares
-        (d, 6, waves) of the draws over their mean.
+        (d, 6, waves): squares of the draws over their mean.
     """
     n, d = len(share), len(squares)
     curve = spectra.curvature((1.0 - share)[None])[0]
@@ -80,7 +80,7 @@ def _spread_of_white(spectra: Spectra, share: np.ndarray, squares: np.ndarray) -
 
 
 def white_noise(designs: Designs) -> tuple[float, float, float] | None:
-    """White noise of markers, mm, its standard deviation, and the deviance that it saves; None for a single stride."""
+    """Return white noise of markers, mm, its standard deviation, and its gain in deviance; None for a single stride."""
     if designs.strides.count < 2:
         return None
     y, _ = designs.by_stride(())
