@@ -162,37 +162,40 @@ def _often(repeats: int | None) -> str:
     return f"{'once decides' if repeats == 1 else f'{repeats} repeats decide'} 95 times in 100"
 
 
-def discriminations(
-    best: LikelihoodFit, rival: LikelihoodFit, trials: Sequence[Trial], study: Study
-) -> list[Discrimination | None]:
-    """Return the discrimination of two models by each trial; None for one beyond the measured range, or not finite."""
-    own = {n: v for n, v in best.unknowns[0].items() if n in best.model.own_unknowns()}
-    begin = [{**best.model.initial_unknowns(t), **own} for t in trials]
-    measured = []
-    for trial, one in zip(trials, Simulator(best.model, trials).run(best.values, begin), strict=True):
+def near_measured(best: LikelihoodFit, trials: Sequence[Trial], study: Study) -> list[tuple[Trial, Trial]]:
+    """Return the trials that a model predicts within the measured range, each without and with predicted outputs."""
+    ranges, out = _ranges(measured_columns(best.model, study.trials)), []
+    run = Simulator(best.model, trials).run(best.values, [_start(best, t) for t in trials])
+    for trial, one in zip(trials, run, strict=True):
         names = best.model.rig.outputs(trial.kind)
-        read = {n: one.readings[:, k] for k, n in enumerate(names) if n in best.noise}
-        measured.append(trial.with_columns(**read))
-    ranges = _ranges(measured_columns(best.model, study.trials))
-    kept = [all(_inside(t[n], r) for n, r in ranges.items() if n in t) for t in measured]
-    inside = [t for t, keep in zip(measured, kept, strict=True) if keep]
-    if not inside:
-        return [None] * len(trials)
-    begin = [u for u, keep in zip(begin, kept, strict=True) if keep]
-    there = [rival.model.initial_unknowns(t) for t in inside]
+        read = trial.with_columns(**{n: one.readings[:, k] for k, n in enumerate(names) if n in best.noise})
+        if all(_inside(read[n], limits) for n, limits in ranges.items() if n in read):
+            out.append((trial, read))
+    return out
+
+
+def _start(best: LikelihoodFit, trial: Trial) -> dict[str, float]:
+    """Return the unknowns that a trial starts with, those of effects as in the first trial of a fit."""
+    own = {n: v for n, v in best.unknowns[0].items() if n in best.model.own_unknowns()}
+    return {**best.model.initial_unknowns(trial), **own}
+
+
+def discriminations(
+    best: LikelihoodFit, rival: LikelihoodFit, near: Sequence[tuple[Trial, Trial]]
+) -> list[Discrimination]:
+    """Return the discrimination of two models by each of the trials of `near_measured`."""
+    trials = [read for _, read in near]
     if_best, slopes = (
-        LikelihoodProblem(one.model, inside, best.noise, one.free).linearize(one.values, start)
-        for one, start in ((rival, there), (best, begin))
+        LikelihoodProblem(one.model, trials, best.noise, one.free).linearize(one.values, start)
+        for one, start in (
+            (rival, [rival.model.initial_unknowns(read) for read in trials]),
+            (best, [_start(best, trial) for trial, _ in near]),
+        )
     )
     if_rival = [Linearized(-r.residual, b.jacobian, b.local) for r, b in zip(if_best, slopes, strict=True)]
     known = (normal_equations(rival.parts).hessian, normal_equations(best.parts).hessian)
-    lead = rival.criterion - best.criterion
-    found = iter(zip(if_best, if_rival, strict=True))
-    return [Discrimination(lead, _equations(*next(found)), known) if keep else None for keep in kept]
-
-
-def _equations(one: Linearized, other: Linearized) -> tuple[NormalEquations, NormalEquations]:
-    return normal_equations([one]), normal_equations([other])
+    news = [(normal_equations([one]), normal_equations([other])) for one, other in zip(if_best, if_rival, strict=True)]
+    return [Discrimination(rival.criterion - best.criterion, one, known) for one in news]
 
 
 def _ranges(measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, float]]:
@@ -212,17 +215,14 @@ def _best(
     best: LikelihoodFit, rivals: Mapping[str, LikelihoodFit], trials: Sequence[Trial], study: Study
 ) -> BestTrial | None:
     """Return the trial that separates the closest rival best, with its discrimination of each rival."""
-    each = {n: discriminations(best, rival, trials, study) for n, rival in rivals.items()}
-    found: list[BestTrial] = []
-    for k, trial in enumerate(trials):
-        of_trial = {n: p for n, many in each.items() if (p := many[k]) is not None and np.isfinite(p.worth)}
-        if len(of_trial) == len(rivals):
-            found.append((of_trial, trial))
-    return max(found, key=_worth, default=None)
+    near = near_measured(best, trials, study)
+    each = {n: discriminations(best, rival, near) for n, rival in rivals.items()} if near else {}
+    found = [({n: many[k] for n, many in each.items()}, trial) for k, (trial, _) in enumerate(near)]
+    return max((one for one in found if np.isfinite(_worth(one))), key=_worth, default=None)
 
 
 def _worth(found: BestTrial) -> float:
-    return min(p.worth for p in found[0].values())
+    return float(np.min([p.worth for p in found[0].values()]))
 
 
 def _refined(best: LikelihoodFit, rivals: Mapping[str, LikelihoodFit], found: BestTrial, study: Study) -> BestTrial:

@@ -14,7 +14,7 @@ from oracle.studies import ankle_rig
 from fes_pin.cli import main
 from fes_pin.data.study import write_study
 from fes_pin.data.trial import read_trial, trial_csv
-from fes_pin.diagnosis.experiment import ROOM, candidates, discriminations, next_experiment
+from fes_pin.diagnosis.experiment import ROOM, candidates, discriminations, near_measured, next_experiment
 from fes_pin.identify.fit import fit
 from fes_pin.identify.problem import measured_columns
 from fes_pin.models.effects import effect_named
@@ -80,9 +80,9 @@ def rivals():
 def test_what_is_expected_is_what_a_refit_cannot_take_up(rivals):
     """D against fits to the same data and the noiseless trial: linear theory, so for a trial that tells little."""
     study, best, rival = rivals
-    many = list(candidates(study))
-    expected = discriminations(best, rival, many, study)
-    kept = [(p, t) for p, t in zip(expected, many, strict=True) if p is not None and p.worth > 1.0]
+    near = near_measured(best, list(candidates(study)), study)
+    expected = discriminations(best, rival, near)
+    kept = [(p, t) for p, (t, _) in zip(expected, near, strict=True) if p.worth > 1.0]
     told, trial = sorted(kept, key=lambda pair: pair[0].worth)[len(kept) // 2]
     for way, (one, other) in enumerate(((best, rival), (rival, best))):
         column = one.model.rig.outputs(trial.kind)[0]
@@ -100,7 +100,7 @@ def test_a_proposed_trial_stays_near_what_was_measured(rivals):
     seen, y = measured_columns(best.model, study.trials)[column], predict(best.model, plan.trial)[column]
     room = ROOM * np.ptp(seen)
     assert seen.min() - room <= y.min() and y.max() <= seen.max() + room
-    fixed = [p.worth for p in discriminations(best, rival, list(candidates(study)), study) if p is not None]
+    fixed = [p.worth for p in discriminations(best, rival, near_measured(best, list(candidates(study)), study))]
     assert min(plan.expected) >= max(fixed)  # refined from the best of them
 
 
