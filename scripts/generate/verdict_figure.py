@@ -18,7 +18,8 @@ def main() -> None:
     print(diagnosis)
     (one,) = (r for r in replayed_trials(diagnosis) if r.measured.name == TRIAL)
     drawn = trial_drawing(one, diagnosis.extended.noise).svg
-    white = drawn.replace(">", '><rect width="100%" height="100%" fill="#ffffff"/>', 1)
+    sized = re.sub(r'viewBox="0 0 (\S+) (\S+)"', r'\g<0> width="\1" height="\2" font-family="sans-serif"', drawn)
+    white = sized.replace(">", '><rect width="100%" height="100%" fill="#ffffff"/>', 1)
     alone = re.sub(r"var\(--[\w-]+, (#\w+)\)", r"\1", white)  # there is no page whose colours it could have
     path = ANALYSIS / "figures" / "verdict.svg"
     path.parent.mkdir(exist_ok=True)
