@@ -8,6 +8,7 @@ from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.schema import RigSchema
@@ -117,9 +118,8 @@ def catalogue_of(library: Source | Sequence[Source] | None) -> Catalogue:
     """What is meant by a `library`: nothing, one source or several; a catalogue is taken as it is."""
     if isinstance(library, Catalogue):
         return library
-    if library is None:
-        return installed()
-    return load_library(*library) if isinstance(library, list | tuple) else load_library(library)  # type: ignore[arg-type]
+    several: Sequence[Any] = library if isinstance(library, list | tuple) else () if library is None else (library,)
+    return load_library(*several)
 
 
 @cache

@@ -77,7 +77,7 @@ def lowered(
     parts, texts, declared = dict[int, str](), [], dict[str, str]()
     inputs, outputs = ([f"%{k}{i}" for i in range(n)] for k, n in (("i", function.n_in()), ("o", function.n_out())))
     for stage in range(last + 1):
-        if stage < last and stage not in schedule.stages_kept:
+        if stage < last and stage not in {schedule.stages[i] for i in schedule.places}:  # nothing of it is kept
             continue
         lines = Lines(width)
         _Lowering(lines, schedule, stage).emit(inputs, outputs)
@@ -137,11 +137,6 @@ class _Schedule:
         self.nodes.append(node)
         self.stages.append(stage)
         return len(self.nodes) - 1
-
-    @property
-    def stages_kept(self) -> set[int]:
-        """Stages that something is kept of."""
-        return {self.stages[i] for i in self.places}
 
 
 class _Lowering:

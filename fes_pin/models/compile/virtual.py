@@ -17,7 +17,7 @@ class VirtualProgram:
 
     def __init__(self, equations: Equations) -> None:
         self.layout, self.equations = equations.layout, equations
-        self._trajectory = cache(self._make_trajectory)
+        self._trajectory = cache(lambda n, substeps: self._sample(substeps).mapaccum("trajectory", n, 2))
 
     def run(
         self, inputs: np.ndarray, values: np.ndarray, constants: np.ndarray, guess: np.ndarray, substeps: int
@@ -45,10 +45,6 @@ class VirtualProgram:
             with np.errstate(all="ignore"):
                 z -= float(np.clip(np.float64(g) / np.float64(slope), -REST_STEP, REST_STEP))
         return z
-
-    def _make_trajectory(self, n: int, substeps: int) -> ca.Function:
-        """A whole trial as one function: states and memories from sample to sample, a reading at each."""
-        return self._sample(substeps).mapaccum("trajectory", n, 2)
 
     def _sample(self, substeps: int) -> ca.Function:
         """From one sample to the next, by classical Runge-Kutta steps of order four."""
