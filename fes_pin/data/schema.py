@@ -290,6 +290,17 @@ def checked_numbers(
     return numbers
 
 
+def number_or_none(value: object, number: NumberKey, key: str, error: KeyFault) -> float | None:
+    """A number that may be missing.
+
+    Raises
+    ------
+    InputError
+        What `error` makes of the key and a message, for a value that is not the number it must be.
+    """
+    return None if value is None else number.check(value, partial(error, key))
+
+
 def check_known(names: Iterable[str], known: Collection[str], error: KeyFault, also: Iterable[str] = ()) -> None:
     """Refuse a name that is none of those known.
 

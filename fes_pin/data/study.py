@@ -32,13 +32,14 @@ from fes_pin.data.numbers import instance
 from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.recorded.columns import Columns
 from fes_pin.data.schema import (
-    NumberKey,
     Rigs,
     RigSchema,
     check_conditions,
     check_known,
     checked_numbers,
     known_rigs,
+    number_or_none,
+    positive,
     schema_of,
 )
 from fes_pin.data.show import by_columns, frame, table_html
@@ -128,8 +129,7 @@ class Study(ReadOnly):
         self._check_trials(trials, schema)
         if schema.inputs_required:  # else a trial without an input is one that nothing drives
             check_same_inputs([(t.kind, t.columns) for t in trials], schema, numbers["constants"], _fault_of(trials))
-        horizon = {HORIZON: self.horizon_s} if self.horizon_s is not None else {}
-        checked_numbers(horizon, {HORIZON: NumberKey("s", 0.0, required=False)}, fault_at("Study.{}"))
+        number_or_none(self.horizon_s, positive("s"), HORIZON, fault_at("Study.{}"))
         vars(self).update(numbers, files=files, folder=as_path(self.folder, "folder"), trials=trials, described=schema)
         self._freeze()
 
@@ -399,12 +399,12 @@ class _Reader(StudyTables):
         kind, role, group = checked_kind(self.schema, table.get("kind"), error), table.get("role"), table.get("group")
         check_labels(name, role, group, error)
         remarks = checked_remarks(table.get("remarks", ()), error)
-        passed = checked_numbers({k: table[k] for k in (LOW_PASS,) if k in table}, {LOW_PASS: POSITIVE_HZ}, error)
+        low_pass = number_or_none(table.get(LOW_PASS), POSITIVE_HZ, LOW_PASS, error)
         about = ("name", "kind", "role", "group", "remarks", LOW_PASS)
         rest = {key: value for key, value in table.items() if key not in (*named, *about)}
         numbers = check_conditions(self.schema, kind, rest, error)
         labels: dict[str, Any] = {"name": name, "role": role, "group": group, "conditions": numbers}
-        labels |= {"remarks": remarks, LOW_PASS: passed.get(LOW_PASS)}
+        labels |= {"remarks": remarks, LOW_PASS: low_pass}
         for key in named:
             if key not in table:
                 raise error(key, "missing; expected the path of a file inside the study")

@@ -11,7 +11,7 @@ from fes_pin.data.checks import check_constants, checked_label, known_constants
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import hold, read_json
 from fes_pin.data.recorded.columns import Columns, columns_of
-from fes_pin.data.schema import NumberKey, Rigs, RigSchema, check_known, one_of
+from fes_pin.data.schema import Rigs, RigSchema, check_known, number_or_none, one_of, positive
 from fes_pin.data.toml import Document
 from fes_pin.data.urdf import is_revolute, moving_joints
 
@@ -55,9 +55,8 @@ class StudyTables:
 
     def horizon(self) -> float | None:
         """How far ahead errors over a horizon look, s, where the study says so."""
-        table = self.document.table("study")
-        given = {HORIZON: table[HORIZON]} if HORIZON in table else {}
-        return self.document.numbers("study", given, {HORIZON: NumberKey("s", 0.0, required=False)}).get(HORIZON)
+        given = self.document.table("study").get(HORIZON)
+        return number_or_none(given, positive("s"), HORIZON, self.document.under("study"))
 
     def _study_table(self) -> tuple[str, str]:
         if "study" not in self.document.data:

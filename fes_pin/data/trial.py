@@ -28,7 +28,7 @@ from fes_pin.data.numbers import instance
 from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.recorded.columns import Columns
 from fes_pin.data.recorded.sniff import NEW_STUDY, read_csv_or_hint
-from fes_pin.data.schema import NumberKey, RigSchema, check_conditions, checked_numbers, schema_of
+from fes_pin.data.schema import NumberKey, RigSchema, check_conditions, checked_numbers, number_or_none, schema_of
 from fes_pin.data.show import frame
 from fes_pin.data.table import MIN_ROWS, Table, check_time, check_times, format_csv
 
@@ -98,8 +98,7 @@ class Trial(ReadOnly):
         remarks = checked_remarks(self.remarks, error)
         given = {key: checked_mapping(getattr(self, key), error, key) for key in ("columns", "conditions")}
         conditions = checked_numbers(given["conditions"], dict.fromkeys(given["conditions"], NumberKey("")), error)
-        low_pass = {} if self.low_pass_hz is None else {LOW_PASS: self.low_pass_hz}
-        passed = checked_numbers(low_pass, {LOW_PASS: POSITIVE_HZ}, error).get(LOW_PASS)
+        low_pass = number_or_none(self.low_pass_hz, POSITIVE_HZ, LOW_PASS, error)
         time = _numbers(self.time, "time_s", self)
         columns = {name: _numbers(values, name, self) for name, values in given["columns"].items()}
         if self.as_read is not None:
@@ -109,7 +108,7 @@ class Trial(ReadOnly):
         if odd := [name for name, values in columns.items() if values.shape != time.shape]:
             raise self.error(f"expected shape {time.shape} as of the time, found {columns[odd[0]].shape}", odd[0])
         check_times(time, self.error, half_digit=self.as_read.half_digit if self.as_read else None)
-        vars(self).update(time=time, columns=columns, conditions=conditions, low_pass_hz=passed, remarks=remarks)
+        vars(self).update(time=time, columns=columns, conditions=conditions, low_pass_hz=low_pass, remarks=remarks)
         self._freeze()
 
     def _freeze(self) -> None:
@@ -392,7 +391,7 @@ def read_trial(
     given = {} if conditions is None else checked_mapping(conditions, error, "conditions")
     numbers = check_conditions(schema, kind, given, error)
     labels: dict[str, Any] = {"name": label, "kind": kind, "conditions": numbers}
-    labels |= {"role": role, "group": group, "low_pass_hz": low_pass_hz}
+    labels |= {"role": role, "group": group, LOW_PASS: number_or_none(low_pass_hz, POSITIVE_HZ, LOW_PASS, error)}
     if own is not None:
         instance(own, Columns, "own")
     with hashing() as sha256:
