@@ -174,5 +174,5 @@ def test_a_low_pass_is_checked_of_a_trial_that_is_read_by_itself(tmp_path):
     (first,) = sorted((studies.ankle(tmp_path) / "trials").iterdir())[:1]
     conditions = {"load_kg": 1.0}
     assert fp.read_trial(first, rig="ankle", conditions=conditions, low_pass_hz=6.0).low_pass_hz == 6.0
-    with pytest.raises(fp.InputError, match="low_pass_hz: expected a number above 0 in Hz, found 0.0"):
+    with pytest.raises(fp.InputError, match=r"low_pass_hz: expected a number above 0 in Hz, found 0\.0"):
         fp.read_trial(first, rig="ankle", conditions=conditions, low_pass_hz=0.0)

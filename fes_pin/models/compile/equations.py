@@ -206,9 +206,16 @@ class Tangents:
         """Sensitivities of what a trial begins with, the static equilibrium moving along."""
         return self.through(f, (self.z, -self.through(self.g, along=along) / self.g_z), along=along)
 
-    def patterns(self) -> tuple[Any, Any]:
-        """Entries of the sensitivities of states and memories that can be other than zero."""
-        s_pattern, r_pattern = self.at_start(self.x0).sparsity(), self.at_start(self.m0).sparsity()
+    def patterns(self, states: Any = None) -> tuple[Any, Any]:
+        """Entries of the sensitivities of states and memories that can be other than zero.
+
+        Parameters
+        ----------
+        states
+            Those of the states, if that is known.
+        """
+        s_pattern = self.at_start(self.x0).sparsity() if states is None else states
+        r_pattern = self.at_start(self.m0).sparsity()
         while True:
             s, r = ca.SX.sym("S", s_pattern), ca.SX.sym("R", r_pattern)
             wider_s = s_pattern.unite(self.through(self.rates, (self.x, s), (self.m, r)).sparsity())

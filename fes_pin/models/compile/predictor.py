@@ -164,10 +164,8 @@ def derive_predictor(model: Model, layout: Layout) -> Equations:
     uncertain = _Uncertainty(d, model)
     count, width = uncertain.count, len(layout.columns)
     whole = ca.Sparsity.dense(count, width)
-    _, r_pattern = d.patterns()
+    _, r_pattern = d.patterns(whole)
     s, r = ca.SX.sym("S", whole), ca.SX.sym("R", r_pattern)
-    r_pattern = _wider(d, s, r_pattern)
-    r = ca.SX.sym("R", r_pattern)
     inner = ((d.x, s), (d.m, r))
     lower = ca.Sparsity.lower(count)
     state = ca.vertcat(d.x, nonzeros(s, whole), nonzeros(uncertain.lower, lower))
@@ -193,15 +191,6 @@ def derive_predictor(model: Model, layout: Layout) -> Equations:
         correct=(given, _corrected(d, uncertain, s, inner, packed)),
         follow=([state, reached, *during], [packed(reached, *_followed(d, uncertain, s, r, reached))]),
     )
-
-
-def _wider(d: Carried, s: Any, pattern: Any) -> Any:
-    """Entries of the memories' sensitivities that can be other than zero where all of the states' can."""
-    while True:
-        wider = pattern.unite(d.through(d.after, (d.x, s), (d.m, ca.SX.sym("R", pattern))).sparsity())
-        if wider.nnz() == pattern.nnz():
-            return pattern
-        pattern = wider
 
 
 def _followed(d: Carried, uncertain: _Uncertainty, s: Any, r: Any, reached: Any) -> tuple[Any, Any]:
