@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import tempfile
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,6 +13,7 @@ import typer
 from fes_pin.cli.group import python_names, remark
 from fes_pin.cli.options import Exclude, Force, Libraries, Trials, numbers_of, output, pairs, study_of
 from fes_pin.cli.progress import catalogue_with, say_whose_code
+from fes_pin.data.as_read import HeldFile
 from fes_pin.data.errors import InputError
 from fes_pin.data.read_files import note_read
 
@@ -143,7 +143,11 @@ def _trial(
     conditions = numbers_of("--set", said)
     schema = model.rig.described()
     own = None if columns_of is None else read_columns(columns_of, rigs=catalogue.schemas())
-    with _by_option({"kind", *conditions, *schema.conditions}), _readable(path) as file:
+    file = path
+    if path == STANDARD:
+        file = HeldFile.holding("stdin.csv", sys.stdin.buffer.read())
+        note_read("/dev/stdin")  # a file that the shell gave
+    with _by_option({"kind", *conditions, *schema.conditions}):
         try:
             return read_trial(file, rig=schema, kind=kind, conditions=conditions, inputs_only=inputs_only, own=own)
         except InputError as error:
@@ -161,19 +165,6 @@ def _by_option(settings: Collection[str]) -> Iterator[None]:
         if error.row is None and error.column in settings:
             raise InputError(error.message, column=f"--set {error.column}") from None
         raise
-
-
-@contextmanager
-def _readable(path: Path) -> Iterator[Path]:
-    """The file, or a copy of standard input."""
-    if path != STANDARD:
-        yield path
-        return
-    with tempfile.TemporaryDirectory(prefix="fes-pin-") as folder:
-        copy = Path(folder) / "stdin.csv"
-        copy.write_bytes(sys.stdin.buffer.read())
-        note_read("/dev/stdin")  # a file that the shell gave
-        yield copy
 
 
 def _along(path: Path, model: Model, trial: Trial, horizon_s: float) -> Trial:

@@ -30,7 +30,7 @@ def as_path(value: str | Path, name: str = "path") -> Path:
         Anything else than text or a path.
     """
     try:
-        return Path(value)
+        return value if isinstance(value, Path) else Path(value)
     except TypeError:
         raise InputError(f"expected a path, found a {type(value).__name__}", column=name) from None
 

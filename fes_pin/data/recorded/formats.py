@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from fes_pin.data.errors import InputError
-from fes_pin.data.files import read_bytes, what_is_at
+from fes_pin.data.files import as_path, read_bytes, what_is_at
 from fes_pin.data.libraries import optional_library
 from fes_pin.data.markers import TIME, c3d_points, trc_points
 from fes_pin.data.motion import read_motion
@@ -72,7 +72,7 @@ def read_recording(path: str | Path, form: TextForm | None = None, wanted: Seque
         The file is not what its suffix says, a library is not installed, or no file of this kind can be read; the
         message says what to do.
     """
-    path = Path(path)
+    path = as_path(path)
     suffix = path.suffix.lower()
     check_suffix(path)
     if suffix not in _READERS:

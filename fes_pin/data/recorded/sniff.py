@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fes_pin.data.errors import InputError
-from fes_pin.data.files import read_bytes, read_text
+from fes_pin.data.files import as_path, read_bytes, read_text
 from fes_pin.data.recorded.formats import check_suffix, is_text
 from fes_pin.data.recorded.text import DELIMITERS, MISSING, TextForm, cells_of, read_csv
 from fes_pin.data.table import Table
@@ -123,7 +123,7 @@ def read_csv_or_hint(path: str | Path) -> Table:
     InputError
         As `read_csv`.
     """
-    path = Path(path)
+    path = as_path(path)
     check_suffix(path)
     if not is_text(path):
         raise InputError(f"expected CSV, found {path.suffix}; {NEW_STUDY}", file=path)

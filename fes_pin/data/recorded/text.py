@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from fes_pin.data.errors import InputError
-from fes_pin.data.files import read_text
+from fes_pin.data.files import as_path, read_text
 from fes_pin.data.table import MIN_ROWS, Table
 
 DELIMITERS = (";", "\t", ",", " ")
@@ -116,7 +116,7 @@ def read_csv(path: str | Path, wanted: Sequence[str] | None = None) -> Table:
         No header, a duplicated or nameless column, fewer than 3 rows, a ragged row, text or nothing where a number
         belongs, a number that is not finite: with its row and column.
     """
-    return read_text_recording(Path(path), TextForm(strict=True), wanted)
+    return read_text_recording(as_path(path), TextForm(strict=True), wanted)
 
 
 def read_text_recording(path: Path, form: TextForm, wanted: Sequence[str] | None = None) -> Table:
