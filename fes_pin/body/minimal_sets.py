@@ -242,8 +242,7 @@ def _smallest(linear: LinearBody, inputs: Inputs, asked: _Question, alternatives
 def _leaning(plans: Plans, lean_deg: float) -> list[Demand]:
     """The posture, and a lean each way in each falling mode, held or brought to rest."""
     still, leans = np.zeros(len(plans.modes)), lean_deg * plans.leans
-    watched: list[int] = []
-    return [Demand(plans.program(start, still), plans.owner, watched) for start in [still, *leans, *-leans]]
+    return [Demand(plans.program(start, still), plans.owner) for start in [still, *leans, *-leans]]
 
 
 def _in_turn(plans: Plans, lean_deg: float) -> tuple[np.ndarray, np.ndarray]:
