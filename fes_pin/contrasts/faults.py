@@ -11,7 +11,7 @@ import numpy as np
 from fes_pin.contrasts.fits import GroupedFits
 from fes_pin.contrasts.grouped import Grouped
 from fes_pin.contrasts.groups import in_groups
-from fes_pin.contrasts.models import ContrastModels, ContrastSearch, Found
+from fes_pin.contrasts.models import ContrastModels, Found
 from fes_pin.data.log import EFFORT
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.conditions import Conditions, Restated
@@ -22,7 +22,7 @@ from fes_pin.infer.levels import CLAIM_LEVEL
 from fes_pin.workers import in_parallel
 
 
-class GroupConditions(Conditions[ContrastSearch, Found]):
+class GroupConditions(Conditions[Grouped, ContrastModels]):
     """Conditions of the trials of a contrast: an outlier is one among the trials of its own group."""
 
     def misread(self, trials: Sequence[Trial], searched: Found | None) -> Misread | None:
@@ -35,15 +35,11 @@ class GroupConditions(Conditions[ContrastSearch, Found]):
             return None
         return replace(first, p_value=len(groups) * first.p_value)
 
-    def has_causes(self, searched: Found) -> bool:
-        """Return whether any cause or change was found."""
-        return bool(searched.best.items)
-
-    def leaves_noise(self, made: Restated[ContrastSearch, Found]) -> bool:
+    def leaves_noise(self, made: Restated[Grouped, ContrastModels]) -> bool:
         """Return True: where nothing changed and nothing is wrong, no explanation is simpler."""
         return True
 
-    def saved(self, searched: Found, trials: Sequence[Trial], made: Restated[ContrastSearch, Found]) -> float:
+    def saved(self, searched: Found, trials: Sequence[Trial], made: Restated[Grouped, ContrastModels]) -> float:
         """Return the fall of the criterion, with the noise of the restated trials."""
         best, after = searched.best, made.searched.best
         fits = GroupedFits(self.nominal, in_groups(trials), best.is_driven)

@@ -13,29 +13,20 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Generic, Protocol, TypeVar
+from typing import Generic
 
 import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.misread import Misread, restated_trials, takes_most
 from fes_pin.infer.levels import PARAMETER_PENALTY, SEPARABLE
+from fes_pin.infer.search import F, M, Search, SearchResult
 from fes_pin.models.model import Model
 from fes_pin.workers import OutOfTime
 
 
-class Stoppable(Protocol):
-    """A search that a limit of time may end."""
-
-    was_stopped: bool
-
-
-S = TypeVar("S", bound=Stoppable)
-R = TypeVar("R")
-
-
 @dataclass(frozen=True)
-class Restated(Generic[S, R]):
+class Restated(Generic[F, M]):
     """A search of trials of which one is restated.
 
     Attributes
@@ -50,11 +41,11 @@ class Restated(Generic[S, R]):
 
     misread: Misread
     trials: list[Trial]
-    search: S
-    searched: R
+    search: Search[F, M]
+    searched: SearchResult[F]
 
 
-class Conditions(ABC, Generic[S, R]):
+class Conditions(ABC, Generic[F, M]):
     """Search trials, and again with an outlying trial restated; the lower penalised likelihood is the answer.
 
     Parameters
@@ -65,37 +56,33 @@ class Conditions(ABC, Generic[S, R]):
         Search of trials.
     """
 
-    def __init__(self, nominal: Model, run: Callable[[list[Trial]], tuple[S, R]]) -> None:
+    def __init__(self, nominal: Model, run: Callable[[list[Trial]], tuple[Search[F, M], SearchResult[F]]]) -> None:
         self.nominal, self.run = nominal, run
 
     @abstractmethod
-    def misread(self, trials: Sequence[Trial], searched: R | None) -> Misread | None:
+    def misread(self, trials: Sequence[Trial], searched: SearchResult[F] | None) -> Misread | None:
         """Return the trial that is an outlier under the causes that were found, or under the nominal model."""
 
     @abstractmethod
-    def has_causes(self, searched: R) -> bool:
-        """Return whether a search found any cause."""
-
-    @abstractmethod
-    def saved(self, searched: R, trials: Sequence[Trial], made: Restated[S, R]) -> float:
+    def saved(self, searched: SearchResult[F], trials: Sequence[Trial], made: Restated[F, M]) -> float:
         """Return by how much the criterion falls from the trials as stated to the restated ones."""
 
-    def leaves_noise(self, made: Restated[S, R]) -> bool:
+    def leaves_noise(self, made: Restated[F, M]) -> bool:
         """Return whether no test finds a lack of fit in the restated trials."""
         return False
 
-    def is_explained(self, made: Restated[S, R]) -> bool:
+    def is_explained(self, made: Restated[F, M]) -> bool:
         """Return whether no restated trial is an outlier any more.
 
         Under a model with an error of its own, a trial may be an outlier by that error.
         """
         return True
 
-    def search(self, trials: Sequence[Trial]) -> tuple[S, R, Restated[S, R] | None]:
+    def search(self, trials: Sequence[Trial]) -> tuple[Search[F, M], SearchResult[F], Restated[F, M] | None]:
         """Return the search, its result, and the restated trials; None if none was restated."""
         first = self._misread(trials, None)
         made = self._restated(trials, first) if first is not None and takes_most(first) else None  # one is always worst
-        if made is not None and not self.has_causes(made.searched) and self.leaves_noise(made):
+        if made is not None and not made.searched.without and self.leaves_noise(made):
             return made.search, made.searched, made
         search, searched = self.run(list(trials))
         if made is None and not search.was_stopped:
@@ -104,31 +91,35 @@ class Conditions(ABC, Generic[S, R]):
             return search, searched, None
         return made.search, made.searched, made
 
-    def _by_causes(self, trials: Sequence[Trial], searched: R, first: Misread | None) -> Restated[S, R] | None:
+    def _by_causes(
+        self, trials: Sequence[Trial], searched: SearchResult[F], first: Misread | None
+    ) -> Restated[F, M] | None:
         """Return a search with the trial restated that is an outlier under the causes found, if that explains it."""
-        misread = self._misread(trials, searched) if self.has_causes(searched) else first
+        misread = self._misread(trials, searched) if searched.without else first
         made = None if misread is None else self._restated(trials, misread)
         return made if made is not None and self.is_explained(made) else None
 
-    def _is_cheaper(self, search: S, searched: R, trials: Sequence[Trial], made: Restated[S, R]) -> bool:
+    def _is_cheaper(
+        self, search: Search[F, M], searched: SearchResult[F], trials: Sequence[Trial], made: Restated[F, M]
+    ) -> bool:
         """Return whether the criterion falls by more than the penalty of one condition among all that are stated."""
         if search.was_stopped or made.search.was_stopped:
             return False
         criterion = PARAMETER_PENALTY + 2.0 * math.log(sum(len(self.nominal.rig.stated(t)) for t in trials))
         return self.saved(searched, trials, made) > criterion + SEPARABLE
 
-    def _misread(self, trials: Sequence[Trial], searched: R | None) -> Misread | None:
+    def _misread(self, trials: Sequence[Trial], searched: SearchResult[F] | None) -> Misread | None:
         """Return a misreading; None where time is over, or where the model cannot be evaluated."""
         try:
             return self.misread(trials, searched)
         except (OutOfTime, ArithmeticError, np.linalg.LinAlgError):
             return None
 
-    def _restated(self, trials: Sequence[Trial], misread: Misread) -> Restated[S, R]:
+    def _restated(self, trials: Sequence[Trial], misread: Misread) -> Restated[F, M]:
         """Return a search of the restated trials, made again with the value by the causes that it finds."""
         other = restated_trials(self.nominal, trials, misread)
         search, searched = self.run(other)
-        if self.has_causes(searched) and not search.was_stopped:
+        if searched.without and not search.was_stopped:
             again = self._misread(trials, searched)
             if again is not None and (again.trial, again.condition) == (misread.trial, misread.condition):
                 misread, other = again, restated_trials(self.nominal, trials, again)

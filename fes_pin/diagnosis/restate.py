@@ -16,7 +16,7 @@ from fes_pin.diagnosis.misread import NAME, Misread, find_misread, restated_tria
 from fes_pin.diagnosis.parts import in_parts
 from fes_pin.diagnosis.remainder.lack_of_fit import lack_of_fit
 from fes_pin.diagnosis.result import Diagnosis
-from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodSearch
+from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodModels, LikelihoodSearch
 from fes_pin.identify.fit import fit_multistart, rough_noise
 from fes_pin.identify.likelihood_fit import LikelihoodFit, maximum_from
 from fes_pin.identify.per_trial import halves
@@ -28,19 +28,15 @@ from fes_pin.models.stage import Stage
 
 Run = Callable[[list[Trial]], tuple[LikelihoodSearch, Found]]
 """Search of trials: returns the search and its result."""
-Made = Restated[LikelihoodSearch, Found]
+Made = Restated[LikelihoodFit, LikelihoodModels]
 
 
-class StudyConditions(Conditions[LikelihoodSearch, Found]):
+class StudyConditions(Conditions[LikelihoodFit, LikelihoodModels]):
     """Conditions of the trials of a diagnosis."""
 
     def misread(self, trials: Sequence[Trial], searched: Found | None) -> Misread | None:
         """Return the trial that is an outlier under the causes found, or under the nominal model."""
         return find_misread(Model(self.nominal.rig) if searched is None else searched.best.model, trials)
-
-    def has_causes(self, searched: Found) -> bool:
-        """Return whether any cause was found."""
-        return bool(searched.best.model.effects)
 
     def leaves_noise(self, made: Made) -> bool:
         """Return whether the restated trials have no lack of fit."""
