@@ -1,7 +1,7 @@
 """Which part of walking can stimulated nerves make, which pulse widths do it, and what is short, and why?
 
 Measured walking (two strides, one adult) gives the joint torques; what ligaments and resting muscle give by themselves
-(Riener and Edrich 1999, healthy legs) is taken off; four sets of nerves are asked for the rest, with the strength of
+(Riener and Edrich 1999, healthy legs) is taken off; four sets of nerves are asked for the others, with the strength of
 paralysed muscle, weaker and stronger ones beside it, and with forces that fall off over length and speed. Levers of
 the trunk's muscles are round figures of the size that imaging gives (Jorgensen et al. 2001, McGill et al. 1993),
 constant over posture: read "legs and trunk" as a sign and a size, no more (fes_pin/muscles/tables/SOURCE.md).

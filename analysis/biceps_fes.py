@@ -1,8 +1,8 @@
-"""How well can the force of an unseen train of pulses be foretold?
+"""How well can the force of an unseen train of pulses be predicted?
 
 A human biceps under surface stimulation, twenty trains of thirty pulses at 31 Hz, one every two seconds (public data).
 Models of the literature are ranked on whole trains left out. What they all miss is then taken apart: how much of it any
-model could have, how much is a train's own, whether something before a train foretells that, and how much of it the
+model could have, how much is a train's own, whether something before a train predicts that, and how much of it the
 first 0.3 s of the train tell.
 Run the cells, or `python analysis/biceps_fes.py`; the picture goes to out/biceps_fes.png.
 """
@@ -52,7 +52,7 @@ def left_out(k):
 
 FITS = [fit_problem(Problem(model, left_out(k), WHITE), model.parameters()) for k in range(len(TRAINS))]
 WHOLE = [t["force_n"] for t in TRAINS]
-FORETOLD = [fp.simulate(f.model, t)["force_n"] for f, t in zip(FITS, TRAINS, strict=True)]
+PREDICTED = [fp.simulate(f.model, t)["force_n"] for f, t in zip(FITS, TRAINS, strict=True)]
 TEMPLATE = [np.delete(FORCE, k, axis=0).mean(axis=0) for k in range(len(TRAINS))]
 
 
@@ -62,10 +62,10 @@ def pooled(errors):
 
 
 def times(strengths):
-    return pooled([y - s * f for y, s, f in zip(WHOLE, strengths, FORETOLD, strict=True)])
+    return pooled([y - s * f for y, s, f in zip(WHOLE, strengths, PREDICTED, strict=True)])
 
 
-own = np.array([y @ f / (f @ f) for y, f in zip(WHOLE, FORETOLD, strict=True)])
+own = np.array([y @ f / (f @ f) for y, f in zip(WHOLE, PREDICTED, strict=True)])
 free, known = times(np.ones(len(own))), times(own)
 template = pooled(FORCE - np.array(TEMPLATE))
 print(
@@ -73,7 +73,7 @@ print(
 )
 print(f"{name}, times each train's own strength, which only the train itself tells: {known:.2f} N")
 
-# %% Does anything before a train foretell its strength? Each predictor by least squares on the other trains
+# %% Does anything before a train predict its strength? Each predictor by least squares on the other trains
 BEFORE = {
     "time in the session": START,
     "time and its square": np.column_stack([START, START**2]),
@@ -93,8 +93,8 @@ def by_the_others(predictor, strengths):
     return np.sum(design * np.array(lines), axis=1)
 
 
-foretold_by = {label: times(by_the_others(predictor, own)) for label, predictor in BEFORE.items()}
-for label, missed in foretold_by.items():
+predicted_by = {label: times(by_the_others(predictor, own)) for label, predictor in BEFORE.items()}
+for label, missed in predicted_by.items():
     print(f"  strength by {label}: {missed:.2f} N")
 following = np.corrcoef(own[1:], own[:-1])[0, 1]
 rng = np.random.default_rng(0)
@@ -104,8 +104,8 @@ print(f"correlation of a train's strength with that of the train before: {follow
 few = np.flatnonzero(PULSES.max() > PULSES)
 print(f"trains of {PULSES.min():.0f} pulses, not {PULSES.max():.0f}: {few}, strengths {own[few].round(2)}")
 
-# %% The first 0.3 s of a train given: what the model tells of the rest, alone and with what all trains have in common
-rest, alone, shared, told_rest = [], [], [], {}
+# %% The first 0.3 s of a train given: what the model then predicts, alone and with what all trains have in common
+rest, alone, shared, predicted_rest = [], [], [], {}
 for k, (fitted, train) in enumerate(zip(FITS, TRAINS, strict=True)):
     step = round(4e-3 / train.dt)
     begun, end = round(GIVEN_S / (step * train.dt)), SHORTEST // step
@@ -116,23 +116,23 @@ for k, (fitted, train) in enumerate(zip(FITS, TRAINS, strict=True)):
     common = np.mean([r for r, _ in others], axis=0)
     differs = own_part([(r - common, j) for r, j in others], [begun] * len(others))
     shared.append(differs.left((r - common, j), begun))
-    told_rest[k] = (np.arange(begun, end) * step * train.dt, shared[-1])
+    predicted_rest[k] = (np.arange(begun, end) * step * train.dt, shared[-1])
 free_rest, from_model, from_both = (pooled(x) for x in (rest, alone, shared))
-print(f"the rest of a train after {GIVEN_S} s: free {free_rest:.2f} N, its beginning given {from_model:.2f} N,")
+print(f"what follows of a train after {GIVEN_S} s: free {free_rest:.2f} N, its beginning given {from_model:.2f} N,")
 print(f"and with what all other trains show beyond the model {from_both:.2f} N")
-print("So nothing before a train foretells more than 29 or 30 pulses do: what is left whole is a train's own strength.")
+print("So nothing before a train predicts more than 29 or 30 pulses do: the strength of a train remains its own.")
 
 # %% Three trains from their first 0.3 s, their strengths over the session, and what each step is worth
 figure, axes = plt.subplots(1, 3, figsize=(14, 4.2), width_ratios=(1.6, 1.2, 1.5))
 for k, colour in ((2, "C0"), (9, "C1"), (16, "C2")):
     time = np.arange(SHORTEST) * TRAINS[k].dt
     axes[0].plot(time, FORCE[k], color=colour, lw=0.8, alpha=0.6)
-    late, left = told_rest[k]
+    late, left = predicted_rest[k]
     step = round(4e-3 / TRAINS[k].dt)
     measured = FORCE[k][: SHORTEST // step * step].reshape(-1, step).mean(axis=1)[-len(left) :]
     axes[0].plot(late, measured - left, color=colour, lw=1.6, label=f"train {k}: {pooled([left]):.1f} N")
 axes[0].axvline(GIVEN_S, color="0.7", lw=0.8)
-axes[0].set(title="measured (thin), foretold from the first 0.3 s", xlabel="time, s", ylabel="force, N")
+axes[0].set(title="measured (thin), predicted from the first 0.3 s", xlabel="time, s", ylabel="force, N")
 axes[0].legend(fontsize=8, loc="lower center")
 axes[1].plot(START, own, "o-", color="0.4", ms=4, lw=0.6)
 axes[1].plot(START[few], own[few], "s", color="C3", ms=6, label=f"{PULSES.min():.0f} pulses")
@@ -142,7 +142,7 @@ steps = {
     **{m.name: m.rmse["force_n"]["free"] for m in reversed(ranked.models)},
     "mean of other trains": template,
     f"{name}, train left out": free,
-    **{f"+ {n}": foretold_by[n] for n in ("time in the session", "the train before", "number of pulses")},
+    **{f"+ {n}": predicted_by[n] for n in ("time in the session", "the train before", "number of pulses")},
     "+ its own strength": known,
     "rest, free": free_rest,
     "rest, 0.3 s given": from_model,

@@ -123,25 +123,25 @@ for pair in PAIRS:
         ankle = TrueAnkle(true, seed)
         study = ankle.study()
         found = [diagnose_joint(study)]
-        first, promised, came, words = state(found[0], true), [], [], []
+        first, expected, came, words = state(found[0], true), [], [], []
         while len(came) < MOST_TRIALS and (plan := found[-1].next_experiment) and plan.trial is not None:
             trial = ankle.run(replace(plan.trial, name=f"next{len(came)}"))
             study = replace(study, trials=(*study.trials, trial))
             found.append(diagnose_joint(study))
             rival = next(n for n in plan.separates[::-1] if n != true)
             before, after = (lead(d, true, rival) for d in found[-2:])
-            promised.append(plan.promised[plan.separates.index(true)] if true in plan.separates else math.nan)
+            expected.append(plan.expected[plan.separates.index(true)] if true in plan.separates else math.nan)
             came.append(after - before)
-            numbers = f"{before:.1f} -> {after:.1f} ({came[-1]:.0f}, promised {promised[-1]:.0f})"
-            words.append(numbers if math.isfinite(came[-1] + promised[-1]) else f"for {' | '.join(plan.separates)}")
+            numbers = f"{before:.1f} -> {after:.1f} ({came[-1]:.0f}, expected {expected[-1]:.0f})"
+            words.append(numbers if math.isfinite(came[-1] + expected[-1]) else f"for {' | '.join(plan.separates)}")
         last = state(found[-1], true)
         if last != "resolved":
             words.append(" ".join(" | ".join((c.name, *c.equivalents)) for c in found[-1].causes) or "nothing is named")
-        stories[pair, seed] = (true, first, last, promised, came, found)
+        stories[pair, seed] = (true, first, last, expected, came, found)
         print(f"  {true:26s}{first:>9s}  {'; '.join(words)}{'; ' if words else ''}{last}")
 
 # %% The picture: the first study's proposed trial, what both rivals had said of it, and all leads before and after
-true, _, _, promised, came, found = stories[PAIRS[0], 0]
+true, _, _, expected, came, found = stories[PAIRS[0], 0]
 before, trial = found[0].study, found[1].study.trials[-1]
 column = "force_n" if trial.kind == "isometric" else "angle_rad"
 said = {}
@@ -167,8 +167,8 @@ near.legend(fontsize=10)
 false = LAG if true == DELAY else DELAY
 missed = {n: (trial[column] - y) ** 2 / NOISE[column] ** 2 for n, y in said.items()}
 evidence.plot(trial.time, np.cumsum(missed[false] - missed[true]), "k", label="rivals as fitted to the study")
-evidence.axhline(promised[0], color="tab:green", ls="--", label="promised, the wrong one fitted anew")
-evidence.axhline(came[0], color="tab:red", ls=":", label="came, both fitted anew")
+evidence.axhline(expected[0], color="tab:green", ls="--", label="expected, the wrong one fitted again")
+evidence.axhline(came[0], color="tab:red", ls=":", label="came, both fitted again")
 evidence.set(
     xlabel="time (s)", ylabel="twice the log-likelihood", title=f"evidence for the {words[true]} as the trial runs"
 )
@@ -202,6 +202,6 @@ for pair in PAIRS:
     print(
         f"{pair[0]} or {pair[1]}: {len(open_)} of {STUDIES} studies could not tell (the true one ahead in {ahead}); "
         f"the proposed trial resolved {once} to the true cause, up to {MOST_TRIALS} of them {ends.count('resolved')}, "
-        f"open {ends.count('open')}, wrong {ends.count('wrong')}; what came over what was promised: median "
+        f"open {ends.count('open')}, wrong {ends.count('wrong')}; what came over what was expected: median "
         f"{np.median(share):.2f}, {min(share):.2f} to {max(share):.2f}"
     )

@@ -1,7 +1,7 @@
 """What does a pendulum lose its swing to?
 
 One release of a real pendulum, 55 s at 1 kHz in six parts (public data); its authors' model knows viscous friction
-only. Four parts are diagnosed. The last two, smaller swings, are then foretold from their first sample alone: by the
+only. Four parts are diagnosed. The last two, smaller swings, are then predicted from their first sample alone: by the
 model as it was believed, fitted to the same four parts, and by what the diagnosis made of it.
 Run the cells, or `python analysis/free_pendulum.py`; the picture goes to out/free_pendulum.png.
 """
@@ -33,7 +33,7 @@ print(found)
 
 
 # %% The last swings, from their first sample on
-def foretold(model, trial):
+def predicted(model, trial):
     first = {f"{n}0": float(trial[n][0]) for n in ("position", "velocity")}
     return predict(model, Trial(trial.name, "motion", {}, trial.time, first))["position"]
 
@@ -41,7 +41,7 @@ def foretold(model, trial):
 HELD = [t for t in STUDY.trials if t.role == "held_out"]
 MODELS = {"viscous friction only": found.nominal.model, "with what was found": found.model}
 missed = {
-    name: [1e3 * float(np.sqrt(np.mean((t["position"] - foretold(model, t)) ** 2))) for t in HELD]
+    name: [1e3 * float(np.sqrt(np.mean((t["position"] - predicted(model, t)) ** 2))) for t in HELD]
     for name, model in MODELS.items()
 }
 for name, errors in missed.items():
@@ -52,14 +52,14 @@ trial, colours = HELD[-1], {"viscous friction only": "C0", "with what was found"
 figure, axes = plt.subplots(1, 3, figsize=(14, 4.2), width_ratios=(2, 2, 1.4))
 axes[0].plot(trial.time, trial["position"] - np.pi, color="0.6", lw=2.5, label="measured, held out")
 for k, (name, model) in enumerate(MODELS.items()):
-    shown = foretold(model, trial)
+    shown = predicted(model, trial)
     axes[0].plot(trial.time, shown - np.pi, color=colours[name], lw=0.8, label=name)
     axes[1].plot(trial.time, 1e3 * (trial["position"] - shown), color=colours[name], lw=0.8)
     axes[2].bar(np.arange(2) + 0.4 * k - 0.2, missed[name], 0.4, color=colours[name])
-axes[0].set(title=f"{trial.name}, foretold from its first sample", xlabel="time, s", ylabel="angle from hanging, rad")
+axes[0].set(title=f"{trial.name}, predicted from its first sample", xlabel="time, s", ylabel="angle from hanging, rad")
 axes[0].set_ylim(-0.45, 0.8)
 axes[0].legend(loc="upper right", fontsize=8)
-axes[1].set(title="measured less foretold", xlabel="time, s", ylabel="angle, mrad")
+axes[1].set(title="measured less predicted", xlabel="time, s", ylabel="angle, mrad")
 axes[2].set(ylabel="rms error of the angle, mrad", title="both trials held out")
 axes[2].set_xticks(range(2), [t.name for t in HELD])
 figure.tight_layout()

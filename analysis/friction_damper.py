@@ -70,7 +70,7 @@ for group in GROUPS[1:3]:
     print(f"{group} over {first}: {by_fit:.2f} fitted, {by_eye:.2f} on the loops")
 print(f"the levels' ratios differ from those on the loops by {100.0 * off:.1f} % at most")
 masses = [20e-3 * f.values["inertia_scale"] for f in fits.values()]
-print(f"what is left: the stand rings, which makes the fitted mass {min(masses):.1f} to {max(masses):.1f} t, too much")
+print(f"unexplained: the stand rings, which makes the fitted mass {min(masses):.1f} to {max(masses):.1f} t, too much")
 
 # %% Loops of trials that no fit has seen
 figure, axes = plt.subplots(1, len(GROUPS), figsize=(15, 4.2), sharey=True)

@@ -1,9 +1,9 @@
-"""Does a Hill-type muscle that nobody wrote down foretell stretch-shortening cycles?
+"""Does a Hill-type muscle that nobody wrote down predict stretch-shortening cycles?
 
 A rat's gastrocnemius on a lever, stimulated at 100 Hz (public data): isometric trains, quick releases and shortening
 ramps are fitted, 54 stretch-shortening cycles take no part. The nominal model is a lag and a gain. Causes join one by
 one, each time the one that lowers the error of the fitted trials most, until none lowers it by a hundredth; what each
-is worth is told on the cycles. The authors' own Hill-type models come to 10.0 and 11.8 % there.
+is worth is judged on the cycles. The authors' own Hill-type models come to 10.0 and 11.8 % there.
 Run the cells, or `python analysis/rat_muscle.py`; the picture goes to out/rat_muscle.png.
 """
 
@@ -82,8 +82,8 @@ STARTS = (
     effects.Potentiation(),
 )
 best = fitted(fp.nominal_model(STUDY))
-told = [("lag and gain", *on_the_cycles(best.model))]
-print(f"{'lag and gain':30s} cycles {told[-1][1]:.3f} N, {told[-1][2]:.1f} % of peak")
+found = [("lag and gain", *on_the_cycles(best.model))]
+print(f"{'lag and gain':30s} cycles {found[-1][1]:.3f} N, {found[-1][2]:.1f} % of peak")
 while len(best.model.effects) < 8:
     have = {e.name for e in best.model.effects}
     tried = [fitted(best.model + one) for one in STARTS if one.name not in have]
@@ -92,14 +92,14 @@ while len(best.model.effects) < 8:
         break
     (name,) = {e.name for e in better.model.effects} - have
     best = better
-    told.append((name, *on_the_cycles(best.model)))
-    print(f"+ {name:28s} cycles {told[-1][1]:.3f} N, {told[-1][2]:.1f} % of peak")
+    found.append((name, *on_the_cycles(best.model)))
+    print(f"+ {name:28s} cycles {found[-1][1]:.3f} N, {found[-1][2]:.1f} % of peak")
 print(best)
 
 # %% Against the authors' predictions of the same trials
 AUTHORS = json.loads((FOLDER / "reference.json").read_text())["ssc"]
 improved, traditional = (AUTHORS[f"{m}_rmse_percent_of_peak"] for m in ("IM", "TM"))
-print(f"stretch-shortening cycles, never fitted: {told[-1][2]:.1f} % of peak")
+print(f"stretch-shortening cycles, never fitted: {found[-1][2]:.1f} % of peak")
 print(f"the authors: {improved:.1f} % by their improved method, {traditional:.1f} % by the traditional one")
 
 # %% The diagnosis by itself, where it was run: fes-pin diagnose FOLDER --out out/rat_diagnosed (11 minutes)
@@ -109,13 +109,13 @@ if DIAGNOSED.exists():
     print(f"by `fes-pin diagnose`, cycles held out: {newton:.3f} N, {percent:.1f} % of peak")
 
 
-# %% What no fitted trial foretells: how strong the muscle is in each train
+# %% What no fitted trial predicts: how strong the muscle is in each train
 def strengths(trial):
-    """Measured over foretold peak force of each train of pulses."""
-    pulses, foretold = np.flatnonzero(trial["stim"] > 0), fp.simulate(best.model, trial)["force_n"]
+    """Measured over predicted peak force of each train of pulses."""
+    pulses, predicted = np.flatnonzero(trial["stim"] > 0), fp.simulate(best.model, trial)["force_n"]
     trains = np.split(pulses, np.flatnonzero(np.diff(pulses) > 50) + 1)
     spans = [slice(t[0], t[-1] + 30) for t in trains]
-    return np.array([trial["force_n"][s].max() / foretold[s].max() for s in spans])
+    return np.array([trial["force_n"][s].max() / predicted[s].max() for s in spans])
 
 
 of_trains = {t.name: strengths(t) for t in CYCLES}
@@ -123,7 +123,7 @@ failed = [n for n, s in of_trains.items() if s.min() < 0.1]
 first, last = (np.median([s[k] for n, s in of_trains.items() if n not in failed]) for k in (0, -1))
 weaker = best.model.with_parameters({"gain": best.model.parameters()["gain"] * float(first)})
 print(f"a train that brings no force: {', '.join(failed)}")
-print(f"peak force over what is foretold, median: first train {first:.3f}, last {last:.3f}")
+print(f"peak force over what is predicted, median: first train {first:.3f}, last {last:.3f}")
 print(f"with the strength of the first trains: {on_the_cycles(weaker)[1]:.1f} % of peak")
 
 # %% Two of the cycles, and what each cause was worth
@@ -131,13 +131,13 @@ figure, axes = plt.subplots(1, 3, figsize=(14, 4.2), width_ratios=(2, 2, 1.4))
 for axis, name in zip(axes, ("ssc_pa07_1", "ssc_pb06_1"), strict=False):
     trial = STUDY.trial(name)
     axis.plot(trial.time, trial["force_n"], color="0.5", lw=1.2, label="measured")
-    axis.plot(trial.time, fp.simulate(best.model, trial)["force_n"], color="C3", lw=1.0, label="foretold")
+    axis.plot(trial.time, fp.simulate(best.model, trial)["force_n"], color="C3", lw=1.0, label="predicted")
     length = axis.twinx()
     length.plot(trial.time, 1e3 * trial["length_m"], color="C0", lw=0.6, alpha=0.6)
     length.set_ylabel("length, mm", color="C0")
     axis.set(title=f"{name}: {error_of(best.model, trial)[1]:.1f} % of peak", xlabel="time, s", ylabel="force, N")
 axes[0].legend(loc="upper right", fontsize=8)
-axes[2].barh([n for n, _, _ in told], [p for _, _, p in told], color="0.7")
+axes[2].barh([n for n, _, _ in found], [p for _, _, p in found], color="0.7")
 axes[2].axvline(improved, color="C2", lw=1.0, label="authors, improved")
 axes[2].axvline(traditional, color="C1", lw=1.0, label="authors, traditional")
 axes[2].invert_yaxis()

@@ -298,11 +298,11 @@ def normal(seed: int, seconds: float = BOUT_S) -> Bout:
 
 @dataclass(frozen=True)
 class Abuse:
-    """What two controllers did whose callers do anything: steps, pauses, limits that were refused, what went wrong."""
+    """What two controllers did whose callers do anything: steps, pauses, limits that were rejected, what went wrong."""
 
     steps: int
     pauses: int
-    refused: int
+    rejected: int
     wrong: tuple[str, ...]
 
 
@@ -311,7 +311,7 @@ LIMIT_UNITS = {"pulse_width_us": 1e3, "rate_us_per_s": 1e3, "charge_uc_per_s": 1
 
 
 def limits_of(rng: np.random.Generator) -> StimulationLimits:
-    """Limits of a clinic, in one of three draws with a slip of units; such are refused, and drawn again."""
+    """Limits of a clinic, in one of three draws with a slip of units; such are rejected, and drawn again."""
     given = {
         "pulse_width_us": rng.uniform(200.0, 1000.0),
         "rate_us_per_s": rng.uniform(1000.0, 20_000.0),
@@ -342,14 +342,14 @@ def must_not_be(controller: PositionController, widths: list[float], stopped: in
 def abused(seed: int, steps: int = 2000) -> Abuse:
     """Two legs of one clinic, given one observer: one is moved, one is to rest; readings, references, times, pauses and
     resets are anything."""
-    rng, refused, wrong, legs = np.random.default_rng([seed, 78]), 0, [], []
+    rng, rejected, wrong, legs = np.random.default_rng([seed, 78]), 0, [], []
     model = ankle_of(BELIEVED)
     shared = JointObserver(AnkleDynamics.of(model, BELIEVED.load_kg))
     while len(legs) < 2:
         try:
             legs.append(PositionController(model, BELIEVED.load_kg, shared, limits_of(rng)))
         except InputError:
-            refused += 1
+            rejected += 1
     joints, rest, pauses = [RunningTwin(BELIEVED, max_step_s=STEP_S) for _ in legs], BELIEVED.rest_angle(), 0
     now, given, stopped = 0.0, [[0.0], [0.0]], [0, 0]
     for k in range(steps):
@@ -381,17 +381,17 @@ def abused(seed: int, steps: int = 2000) -> Abuse:
                 wrong.append(f"{place}for a leg that is to rest")
             if controller.status.is_fault and stopped[leg] > 60:
                 controller.reset()
-    return Abuse(2 * steps, pauses, refused, tuple(wrong))
+    return Abuse(2 * steps, pauses, rejected, tuple(wrong))
 
 
 def show_abuse(outcomes: Iterable[Abuse]) -> None:
     """What came of it."""
     every = list(outcomes)
-    steps, pauses, refused = (sum(getattr(o, n) for o in every) for n in ("steps", "pauses", "refused"))
+    steps, pauses, rejected = (sum(getattr(o, n) for o in every) for n in ("steps", "pauses", "rejected"))
     wrong = [line for o in every for line in o.wrong]
     print(
-        f"{steps} steps of controllers that were given one observer, {pauses} pauses, {refused} limits with a slip of "
-        f"units or without room refused: {len(wrong)} widths that must not be"
+        f"{steps} steps of controllers that were given one observer, {pauses} pauses, {rejected} limits with a slip of "
+        f"units or without room rejected: {len(wrong)} widths that must not be"
     )
     for line in wrong[:20]:
         print(f"  {line}")

@@ -132,7 +132,7 @@ class _Path:
         return Extreme(x, math.inf, passed[-1][3], math.inf, math.inf, np.array(passed))
 
     def _across(self, curvature: np.ndarray) -> float:
-        """Curvature of E along the direction with the rest free."""
+        """Curvature of E along the direction with all other parameters free."""
         d, f = self.direction, self.free
         own = float(d @ curvature @ d)
         if not f.shape[1]:

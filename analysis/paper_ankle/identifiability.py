@@ -1,7 +1,7 @@
 """What trials can and cannot tell of the ankle's constants, found from the model and said in words.
 
 Every constant is moved a little, in its logarithm, and the readings are watched. Directions in which nothing moves are
-combinations that no amount of such data can show; what is left is a set of products, like a / J, that the data
+combinations that no amount of such data can show; what can be found is a set of products, like a / J, that the data
 determine.
 """
 

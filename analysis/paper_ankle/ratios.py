@@ -152,7 +152,7 @@ class Optimum(Tabulated):
     curvature
         Gauss-Newton Hessian of E there, shape (3, 3).
     gradient_norm
-        Largest part of E that a Newton step of one ratio alone still promises, percent.
+        Largest part of E that a Newton step of one ratio alone still predicts, percent.
     """
 
     x: np.ndarray

@@ -1,7 +1,7 @@
 """The plain linear filter on (alpha, beta) with the measured force as regressor.
 
 It is what a linear Kalman filter for these two usually is, and it takes the noise of the regressor for motion: its tau
-comes out short.
+is estimated as too short.
 """
 
 from __future__ import annotations

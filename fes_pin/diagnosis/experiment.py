@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -57,6 +58,13 @@ class NextExperiment:
     separates: tuple[str, str]
     trial: Trial | None
     expected: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def promised(self) -> tuple[float, float]:
+        """`expected` by its old name. Deprecated."""
+        said = "NextExperiment.promised is NextExperiment.expected now; it ends with version 0.3"
+        warnings.warn(said, DeprecationWarning, stacklevel=2)
+        return self.expected
 
     def record(self) -> dict[str, Any]:
         """Return the experiment as JSON files have it; the inputs are in `NEXT_FILE`."""

@@ -150,7 +150,7 @@ def single_call() -> list[tuple]:
 def horizon() -> list[tuple]:
     """Ten steps of 30 channels at 30 Hz with lag, rate limit and price of change, along a smooth torque.
 
-    With fatigue the program is made anew at every pulse.
+    With fatigue the program is made again at every pulse.
     """
     torque = smooth_torque(420, 14.0)
     rows = []

@@ -91,7 +91,7 @@ def _median(function, times: int) -> float:
 
 
 def _medians(ours, theirs, turns: int = 7, times: int = 60) -> tuple[float, float]:
-    """Of both, measured by turns: what slows the machine for a while slows either."""
+    """Times of both, measured alternately, so that a slow machine slows both."""
     pairs = [(_times(ours, times), _times(theirs, 1)) for _ in range(turns)]
     return float(np.median([p[0] for p in pairs])), float(np.median([p[1] for p in pairs]))
 

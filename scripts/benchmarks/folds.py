@@ -1,4 +1,4 @@
-"""What folds choose anew among the sets that were fitted, against a whole diagnosis without the fold's trials.
+"""What folds choose again among the sets that were fitted, against a whole diagnosis without the fold's trials.
 
     .venv/bin/python scripts/benchmarks/folds.py [--count 20] [--distance 25] [--seed 0]
 
@@ -40,7 +40,7 @@ def main() -> None:
     parser.add_argument("--distance", type=int, default=25)
     parser.add_argument("--seed", type=int, default=0)
     given = parser.parse_args()
-    alike, once, anew = Counter[str](), 0.0, 0.0
+    alike, once, again = Counter[str](), 0.0, 0.0
     with tempfile.TemporaryDirectory(prefix="folds") as folder:
         for item in drawn(given.count, given.distance, given.seed):
             study = make(item, Path(folder)).study
@@ -56,7 +56,7 @@ def main() -> None:
                     others = tuple(t for i, t in enumerate(study.trials) if i not in held)
                     found = diagnose_joint(replace(study, trials=others))
                     nested += any(names & {c.name, *c.equivalents} for c in found.causes)
-                anew += time.perf_counter() - began
+                again += time.perf_counter() - began
                 quick = cause.chosen_again[0] if cause.chosen_again else 0
                 alike["both"] += min(quick, nested)
                 alike["only among the sets"] += max(quick - nested, 0)
@@ -64,7 +64,7 @@ def main() -> None:
                 alike["neither"] += len(folds) - max(quick, nested)
                 print(f"{item.name}: {cause.name} {quick} and {nested} of {len(folds)} folds", flush=True)
     print(", ".join(f"{n}: {alike[n]}" for n in ("both", "only among the sets", "only the whole diagnosis", "neither")))
-    print(f"one diagnosis of each study {once:.0f} s, whole diagnoses anew in their folds {anew:.0f} s")
+    print(f"one diagnosis of each study {once:.0f} s, whole diagnoses again in their folds {again:.0f} s")
 
 
 if __name__ == "__main__":

@@ -114,7 +114,7 @@ def _torques(drafts: Sequence[Draft], count: int) -> np.ndarray | None:
 
 
 TORQUE_SHARE = 0.6
-"""Share of the third noise family that is a random torque; the rest is ARMA noise of the sensor."""
+"""Share of the third noise family that is a random torque; the others are ARMA noise of the sensor."""
 
 
 def sensor_family(item: Item) -> tuple[str, float]:

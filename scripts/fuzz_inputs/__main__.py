@@ -13,7 +13,7 @@ from fuzz_inputs.cases import KINDS, READING_KINDS
 
 
 def main() -> None:
-    """Run the cases asked for, print each that broke a promise, and how many there were."""
+    """Run the cases asked for, print each that broke a rule, and how many there were."""
     parser = argparse.ArgumentParser(prog="scripts/fuzz", description=__doc__)
     parser.add_argument("--count", type=int, default=5000, help="cases")
     parser.add_argument("--first", type=int, default=0, help="number of the first case")
@@ -37,8 +37,8 @@ def main() -> None:
             for code, count in code_counts.items():
                 codes[code] = codes.get(code, 0) + count
     print(
-        f"{len(numbers)} cases of seed {given.seed}: {codes[0]} answered, {codes[2]} refused in one line, {bad} broke "
-        f"a promise; slowest {slowest:.0f} s; {time.monotonic() - began:.0f} s in all"
+        f"{len(numbers)} cases of seed {given.seed}: {codes[0]} answered, {codes[2]} rejected in one line, {bad} broke "
+        f"a rule; slowest {slowest:.0f} s; {time.monotonic() - began:.0f} s in all"
     )
     raise SystemExit(bool(bad))
 

@@ -1,4 +1,4 @@
-"""One call of the command line in a process of its own, and whether it kept its promises.
+"""One call of the command line in a process of its own, and whether it kept the rules.
 
 Exit code 0, or 2 with one line on standard error and nothing on standard output; no traceback, no end by a signal,
 within its time, and nothing written outside the folder or file that it was given, whatever is spoilt.
@@ -34,7 +34,7 @@ CHANGES = {"os.mkdir", "os.rename", "os.remove", "os.rmdir", "os.symlink", "os.l
 MOVES = {"os.rename", "os.symlink", "os.link"}
 REMOVALS = {"os.remove", "os.rmdir"}
 NO_FOLDER = -1
-"""Stands for the descriptor of the folder that a removed path is relative to, where none was given."""
+"""Replaces the descriptor of the folder that a removed path is relative to, where none was given."""
 PARTIAL = ".fes_pin-"
 """What is not whole yet has a name that begins so, beside its destination."""
 IMPORTED = ("scipy.signal", "fes_pin.data.new_study", "fes_pin.data.new_body_study", "fes_pin.diagnosis.testable")
@@ -54,7 +54,7 @@ class Answer:
     strays: tuple[str, ...]
 
     def faults(self, written: bool) -> list[str]:
-        """Promises that were broken; `written` tells whether the call left anything behind."""
+        """Rules that were broken; `written` says whether the call left anything behind."""
         found = [f"wrote outside: {s}" for s in self.strays]
         if self.code in {-signal.SIGXCPU, -signal.SIGKILL}:
             return [*found, "did not end in time"]

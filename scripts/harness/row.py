@@ -21,7 +21,7 @@ class Row:
     sets
         Each named cause or change with what cannot be told from it, in their order.
     left
-        Something is left that nothing named explains.
+        Lack of fit: the residual is more than noise.
     estimates
         Name, truth, estimate of the nominal model (None where it has none), estimate and its standard deviation.
     errors
@@ -63,7 +63,7 @@ class Row:
     @property
     def right(self) -> bool:
         """Nothing is named where nothing is hidden; one cause stands in the first set, of more each in a set of its
-        own; of what the library does not have it is said that something is left."""
+        own; of what the library does not have a lack of fit is reported."""
         if self.outside:
             return self.left
         if not self.hidden:

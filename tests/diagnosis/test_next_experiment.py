@@ -102,6 +102,8 @@ def test_a_proposed_trial_stays_near_what_was_measured(rivals):
     assert seen.min() - room <= y.min() and y.max() <= seen.max() + room
     fixed = [p.worth for p in discriminations(best, rival, near_measured(best, list(candidates(study)), study))]
     assert min(plan.expected) >= max(fixed)  # refined from the best of them
+    with pytest.warns(DeprecationWarning, match="expected now"):
+        assert plan.promised == plan.expected
 
 
 def test_the_next_experiment_can_be_read_back_and_predicted(tmp_path):
