@@ -1,4 +1,4 @@
-"""What of a cohort is on disk: each study's answer whole or absent, so that a run that was killed goes on."""
+"""Answers of a cohort on disk: each complete or absent, so that a run that was killed can go on."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Store:
         return self.folder / "studies" / name
 
     def has(self, work: Work, key: str) -> bool:
-        """True if the answer is there and still holds: the same files, versions, seed, limit and library."""
+        """Return whether a valid answer exists: of the same files, versions, seed, limit and library."""
         state = self._read(self.place(work.name) / STATE)
         return state.get("key") == key and not state.get("again", False)
 

@@ -47,7 +47,7 @@ class Work:
     command: str = ""
 
     def key(self) -> str:
-        """What the answer depends on: the study's files, the code, the versions, seed, limit and library."""
+        """Return the key of an answer: the study's files, the code, the versions, seed, limit and library."""
         files = [hashlib.sha256(Path(n).read_bytes()).hexdigest() for n in self.library if Path(n).is_file()]
         used = [asdict(self) | {"folder": "", "command": ""}, hashes(Path(self.folder)), versions(), code_hash(), files]
         return hashlib.sha256(json.dumps(used, sort_keys=True).encode()).hexdigest()
@@ -55,7 +55,7 @@ class Work:
 
 @dataclass(frozen=True)
 class Answer:
-    """What became of it.
+    """The outcome of one study.
 
     Attributes
     ----------

@@ -35,7 +35,7 @@ MODELS = (
     "ahead: each sample from what was measured up to the study's horizon before it. Of walking E is that of the ground "
     "reaction which the motion requires."
 )
-"""What is said of the errors of studies."""
+"""Words about the errors of studies."""
 
 
 def cohort_html(

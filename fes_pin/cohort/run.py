@@ -35,7 +35,7 @@ from fes_pin.verdict.files import OF_ALL, OF_WALKS
 
 @dataclass(frozen=True)
 class CohortProgress:
-    """How far a cohort is.
+    """Progress of a cohort.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ class CohortProgress:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Cohort(Saveable):
-    """What came of the studies; each table is a sequence of rows, by the columns of its CSV file."""
+    """Results of the studies; each table is a sequence of rows, by the columns of its CSV file."""
 
     studies: Sequence[Row]
     causes: Sequence[Row]

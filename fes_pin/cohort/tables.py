@@ -20,7 +20,7 @@ ERRORS = {f"{model}_{n}_percent": (model, n) for model in ("nominal", "extended"
 
 
 def study_rows(kept: Iterable[Kept]) -> list[Row]:
-    """What was found of each study; of a study that failed its error, and None or NaN for what was not computed."""
+    """Return the result of each study; its error if it failed, and None or NaN for values that were not computed."""
     return [_study(one) for one in kept]
 
 

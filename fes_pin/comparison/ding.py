@@ -15,11 +15,11 @@ TAU_C_S = 0.020
 TAU_1_S = 0.050957
 """Time constant of the force without strong cross bridges, s: Ding et al. 2000, at rest; it also scales `gain`."""
 TAU_2_S = 0.060
-"""What strong cross bridges add to it, s: Ding et al. 2000, about."""
+"""Increase of it by strong cross bridges, s: about that of Ding et al. 2000."""
 K_M = 0.103
 """Half saturation of troponin at rest: Ding et al. 2000."""
 R_0 = 1.04
-"""What R_0 exceeds K_m by: Ding et al. 2003."""
+"""Difference of R_0 and K_m: Ding et al. 2003."""
 
 
 @dataclass(frozen=True)

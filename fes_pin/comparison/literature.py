@@ -39,7 +39,7 @@ CALCIUM_S = 0.04
 DELAY_S = 0.025
 """From pulse to force, s: Riener and Fuhr 1998."""
 RECOVERY_S = 30.0
-"""Of fatigue, s: Riener and Fuhr 1998."""
+"""Time constants of fatigue, s: Riener and Fuhr 1998."""
 
 Made = Callable[[Sequence[Trial]], tuple[Effect, ...]]
 
@@ -98,7 +98,7 @@ class Published:
 
 
 def is_felt(model: Model, effect: Effect, trials: Sequence[Trial]) -> bool:
-    """True if an effect is of the rig, and acts in some of the trials."""
+    """Return whether an effect belongs to the rig and acts in some of the trials."""
     rig = model.rig
     return rig.takes(effect) and any(effect.signal in rig.changeable(t.kind, rig.input_columns(t)) for t in trials)
 

@@ -24,9 +24,9 @@ from fes_pin.infer.noise import thin
 STEP_S = 4e-3
 """Samples are averaged to this time step, s, as the noise's are: `infer.noise.FASTEST_S`."""
 WORTH = (1.0, 3.0, 10.0, 30.0, 100.0)
-"""How many samples may weigh as one: errors of a model have a correlation time of some tenths of a second."""
+"""Most samples that count as one: errors of a model have a correlation time of some tenths of a second."""
 TURNS = 40
-"""Of expectation and maximisation; D then moves by less than a hundredth."""
+"""Steps of expectation and maximisation; the last changes D by less than a hundredth."""
 FEWEST = 4
 """Least number of trials from which the differences between trials are estimated."""
 
@@ -35,7 +35,7 @@ Pair = tuple[np.ndarray, np.ndarray]
 
 @dataclass(frozen=True)
 class OwnPart:
-    """How much trials differ: D in units of `scale`, s^2 c.
+    """Differences between trials: D in units of `scale`, s^2 c.
 
     Attributes
     ----------

@@ -21,7 +21,7 @@ from fes_pin.infer.result import shown
 
 @dataclass(frozen=True)
 class Apart:
-    """How much more a model misses than the best: the difference of E on held-out trials, and its interval.
+    """Difference of a model's E to that of the best on held-out trials, with its interval.
 
     Attributes
     ----------
@@ -35,7 +35,7 @@ class Apart:
 
     @property
     def told(self) -> bool:
-        """True if the interval lies above zero."""
+        """Whether the interval is above zero, so that the difference is significant."""
         return self.low > 0.0
 
     def record(self) -> dict[str, Any]:
@@ -245,7 +245,7 @@ def _unit(column: str) -> str:
 
 
 def notes(found: Comparison) -> list[str]:
-    """What stands beneath the table."""
+    """Return the notes under the table."""
     how = "each trial by fits without it" if found.by == "folds" else "trials that the study holds out"
     lines = [f"root mean squared error on whole trials left out ({how}); in brackets the error E of eq. (2)"]
     for one in found.models:

@@ -1,1 +1,1 @@
-"""What is section II's own: eq. (1) in plain numbers, gain and time constant pulse by pulse, the passive antagonist."""
+"""Methods of the paper's section II: eq. (1) in plain numbers, gain and time constant by pulse, passive antagonist."""

@@ -57,7 +57,7 @@ class Antagonist(Tabulated):
 
     @property
     def constants(self) -> dict[str, float]:
-        """As the numbers of a study's `[rig.passive]`."""
+        """Return the numbers of a study's `[rig.passive]`."""
         return dict(zip(NAMES, (float(v) for v in self.values), strict=True))
 
     def __str__(self) -> str:

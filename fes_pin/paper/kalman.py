@@ -28,7 +28,7 @@ from fes_pin.data.trial import Trial
 from fes_pin.muscles.recruitment import LinearRecruitment
 
 START_TIME_CONSTANT_S = 0.1
-"""Where the search for tau starts, s: twice the paper's; its band reaches from 0 to beyond 1 s."""
+"""Start value of tau, s: twice the paper's; its band reaches from 0 to beyond 1 s."""
 START_ALPHA_STD = 0.1
 
 
@@ -233,7 +233,7 @@ def track_gain(trial: Trial, constants: Mapping[str, float], noise_std: float, w
 
 
 def history_of(tracker: GainFilter, trial: Trial) -> GainHistory:
-    """What a filter has estimated after each sample of a trial."""
+    """Return the estimates of a filter after each sample of a trial."""
     rows = []
     for force, width in zip(trial["force_n"], trial["pulse_width_us"], strict=True):
         tracker.step(float(force), float(width))

@@ -7,7 +7,7 @@ from fes_pin.data.study import Study
 REPORT_FILE, NEXT_FILE = "report.html", "next_trial.csv"
 OF_ALL = ("diagnosis.json", "model.toml", REPORT_FILE, NEXT_FILE)
 OF_WALKS = ("body.urdf", "playback.html")
-"""What is written of a study, at most, and of a walk besides; the next trial where one is proposed."""
+"""Files of a study at most, and further files of a walk; the next trial where one is proposed."""
 
 
 def answer_names(study: Study) -> tuple[str, ...]:

@@ -20,7 +20,7 @@ _OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 
 
 def cache_folder() -> Path:
-    """Where compiled models are kept: `FES_PIN_CACHE`, else the user's cache folder.
+    """Return the folder of compiled models: `FES_PIN_CACHE`, else the user's cache folder.
 
     Raises
     ------
@@ -37,7 +37,7 @@ def cache_folder() -> Path:
 
 
 def read_cached(key: str) -> bytes | None:
-    """What the cache holds of a key, or None; an entry that is damaged, or that others can write, counts as none."""
+    """Return the entry of a key, or None; an entry that is damaged, or that others can write, counts as none."""
     try:
         with _own(cache_folder(), os.O_DIRECTORY) as folder, _own(_entry(key), os.O_NOFOLLOW, folder) as handle:
             data = b"".join(iter(lambda: os.read(handle, 1 << 24), b""))

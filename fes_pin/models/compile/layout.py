@@ -11,7 +11,7 @@ from fes_pin.models.session import PAST
 WIDTH = 4
 """Lanes that run side by side: one AVX2 register. With eight, models with sensitivities spill (1.4 times slower)."""
 WIDE = 8
-"""The same without sensitivities: a chain of operations that wait for each other is as long for eight as for four."""
+"""Lanes without sensitivities: a chain of dependent operations takes as long for eight lanes as for four."""
 
 REST_ITERATIONS = 40
 """Newton steps to the static equilibrium; steps are held to REST_STEP, so 40 of them cross any joint's range."""
@@ -58,12 +58,12 @@ class Layout:
 
 
 def widest(columns: Sequence[str]) -> int:
-    """How many lanes may run side by side with sensitivities to such columns, or with none."""
+    """Return the number of lanes of a batch with sensitivities to such columns, or with none."""
     return WIDTH if columns else WIDE
 
 
 def width_of(count: int) -> int:
-    """How many lanes a program has that runs so many trials at most."""
+    """Return the number of lanes of a program for at most so many trials."""
     return WIDTH if count <= WIDTH else WIDE
 
 

@@ -161,7 +161,7 @@ class _Lowering:
                 self.lines.store(self._made[k], KEPT, self.schedule.places[k])
 
     def _value(self, k: int, inputs: Sequence[str]) -> Value:
-        """What an instruction gives: made here, or read."""
+        """Return the value of an instruction: computed here, or read."""
         if k not in self._made:
             node = self.schedule.nodes[k]
             if node.op == ca.OP_CONST:

@@ -29,7 +29,7 @@ def compiling_target(name: str, features: str) -> llvm.TargetMachine:
 
 
 def made_for() -> str:
-    """What object code is made for and by: processor, its features, compiler."""
+    """Return the target and maker of object code: processor, its features, compiler."""
     return " ".join((*settings.target(), "llvmlite", llvmlite.__version__))
 
 

@@ -46,7 +46,7 @@ class NativeProgram:
 
 
 def compile_equations(equations: Equations) -> bytes:
-    """What a `NativeProgram` is made from: its sizes in one line, then object code."""
+    """Content of a `NativeProgram`: its sizes in one line, then object code."""
     text, sizes = emit(equations)
     return json.dumps(asdict(sizes)).encode() + b"\n" + compile_object(text)
 
@@ -108,7 +108,7 @@ class _Loop:
 
     @property
     def state(self) -> ir.Value:
-        """Where the states are."""
+        """Return the pointer to the states."""
         return self.b.load(self._states[0])
 
     def _next_state(self, name: str, given: Sequence[ir.Value], *written: ir.Value) -> None:
@@ -132,7 +132,7 @@ class _Loop:
         self.b.call(self.parts[name], [*given, self.kept[name], *written])
 
     def _before(self, name: str, given: Sequence[ir.Value], stage: int) -> None:
-        """What an earlier stage of a function can work out, if anything."""
+        """Return the part of a function that an earlier stage can compute, if any."""
         part = self.made[name].parts.get(stage, name)
         if part != name:
             self.b.call(self.parts[part], [*given, self.kept[name]])
@@ -246,5 +246,5 @@ class _Loop:
         self._store(b.fadd(state, b.fmul(forward, rate)), self.stage, i)
 
     def _splat(self, value: float) -> ir.Constant:
-        """The same number in every lane."""
+        """Return the same number in every lane."""
         return ir.Constant(self.vector, [value] * self.vector.count)

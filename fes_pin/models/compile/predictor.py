@@ -103,7 +103,7 @@ class _Uncertainty:
         return out
 
     def _moves(self, unknowns: Sequence[str], fast: bool) -> Any:
-        """How far, or how fast, a trial moves whose start is unknown; 0 where it is known."""
+        """Range or speed of a trial with an unknown initial state; 0 where it is known."""
         return next((self.d.sym.c[f"prior.{n}"] for n in unknowns if ("velocity" in n) == fast), 0.0)
 
     def _read_slopes(self, moved: Any) -> list[Any]:

@@ -96,7 +96,7 @@ def derived(model: Model, layout: Layout) -> Equations:
 
 
 def _classes(model: Model) -> tuple[type, ...]:
-    """What writes the equations: the classes of rig and effects, also somebody else's of the same name."""
+    """Return the key of the equations: the classes of rig and effects, own ones of the same name too."""
     return (type(model.rig), *(type(e) for e in model.effects))
 
 

@@ -29,7 +29,7 @@ import scipy.special
 LEAST = 1e-20
 """Variance that a slack has at least, in its unit squared: nothing is divided by 0."""
 MIDDLE, DEGREE = 4.0, 16
-"""Of the polynomial of Mills' ratio in 4 / (4 + z): it errs by 4e-12 of it at most (`tests/models/test_slack.py`)."""
+"""Degree of the polynomial of Mills' ratio in 4 / (4 + z), of relative error 4e-12 (`tests/models/test_slack.py`)."""
 NARROW, TINY = 1e-9, 1e-100
 """Share between two ends, in those beyond them and by itself, below which it is as if only the nearer end cut."""
 
@@ -233,7 +233,7 @@ def _mills(z: Any) -> Any:
 
 @cache
 def _coefficients() -> tuple[float, ...]:
-    """Of the polynomial in 2 t - 1, t = MIDDLE / (MIDDLE + z), that is Mills' ratio over t from 0 to infinity."""
+    """Return coefficients of the polynomial in 2 t - 1, t = MIDDLE / (MIDDLE + z), that is Mills' ratio over t."""
 
     def over_t(x: np.ndarray) -> np.ndarray:
         t = 0.5 * (x + 1.0)

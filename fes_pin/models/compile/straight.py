@@ -33,12 +33,12 @@ class Lines:
         self.declared: dict[str, str] = {}
 
     def splat(self, value: float) -> Value:
-        """The same number in every lane."""
+        """Return the same number in every lane."""
         bits = struct.unpack("<Q", struct.pack("<d", value))[0]
         return self._everywhere(self.vector, f"double 0x{bits:016x}")
 
     def splat_int(self, value: int) -> Value:
-        """The same integer in every lane."""
+        """Return the same integer in every lane."""
         return self._everywhere(self.integers, f"i64 {int(value)}")
 
     def _everywhere(self, kind: str, text: str) -> Value:
@@ -50,7 +50,7 @@ class Lines:
         return Value(kind, name)
 
     def operation(self, name: str, one: Value, other: Value, flags: Sequence[str] = ()) -> Value:
-        """Of two values of a type: fadd, fsub, fmul, fdiv, add, sub, shl, ashr, and, or, xor."""
+        """Return an operation on two values of a type: fadd, fsub, fmul, fdiv, add, sub, shl, ashr, and, or, xor."""
         return self._made(one.type, f"{' '.join((name, *flags))} {one.type} {one.text}, {other.text}")
 
     fadd, fsub = partialmethod(operation, "fadd"), partialmethod(operation, "fsub")
@@ -77,7 +77,7 @@ class Lines:
         return self._made(yes.type, f"select {self._mask} {mask.text}, {yes.type} {yes.text}, {no.type} {no.text}")
 
     def bits_as(self, one: Value, kind: str) -> Value:
-        """The same bits as another type."""
+        """Return the same bits as another type."""
         return self._made(kind, f"bitcast {one.type} {one.text} to {kind}")
 
     def intrinsic(self, name: str, args: Sequence[Value]) -> Value:

@@ -22,7 +22,7 @@ def __getattr__(name: str) -> Any:  # each has parameters of its own, which no t
 
 
 def __dir__() -> list[str]:
-    """What is written here, and the classes of the effects."""
+    """Return the public names of this module and the classes of the effects."""
     return sorted((*globals(), *(one.__name__ for one in EFFECTS)))
 
 

@@ -64,5 +64,5 @@ class Backlash(Effect):
         return {"followed": s.q}
 
     def start_variances(self, reach: Scalar, speed: Scalar) -> ByName:
-        """Where in the slack a trial begins nobody knows: evenly spread over 2 half_width."""
+        """Return the variance of the unknown initial position in the slack: uniform over 2 half_width."""
         return {"followed": self.half_width**2 / 3.0}

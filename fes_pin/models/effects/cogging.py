@@ -52,7 +52,7 @@ class Cogging(Effect):
         return {**grids, "waves": tuple(waves)}
 
     def limits(self, measured: Measured) -> Bounds:
-        """What does not come again within the measured range is not seen to be periodic."""
+        """Return a lower bound of the waves in a turn: they must repeat within the measured range."""
         size = _range(measured)
         return {"waves": (FEWEST * TURN / size, np.inf)} if size > 0.0 else {}
 

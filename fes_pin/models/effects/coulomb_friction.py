@@ -101,7 +101,7 @@ class CoulombFriction(Effect):
 
     @classmethod
     def grids(cls, measured: Measured) -> Grids:
-        """Of a joint, speeds in the measure of its own, which a sine is below for a fifth of the time, more or less."""
+        """Return grids of speeds in proportion to those of the joint; a sine is slower a fifth of the time."""
         grids, speed, info = super().grids(measured), _usual_speed(measured), cls.parameters()
         tried: dict[str, tuple[Sequence[float], float]] = {
             "presliding": (WAYS, _imposed_way(measured)),
@@ -141,7 +141,7 @@ class CoulombFriction(Effect):
         return value - most * self._acting(most, value, s)[0]
 
     def _held(self, y: Scalar, s: Signals) -> Scalar:
-        """What holds the joint at rest, in units of the largest friction."""
+        """Return the friction that holds the joint at rest, in units of the largest friction."""
         if hasattr(s.own, "anchor"):
             return (s.q - s.own.anchor) / self._way(s)
         beyond = 0.5 * (_length(y + 1.0) + _length(y - 1.0))
@@ -154,7 +154,7 @@ class CoulombFriction(Effect):
         return {"anchor": s.q} if hasattr(s.own, "anchor") else {}
 
     def start_variances(self, reach: Scalar, speed: Scalar) -> ByName:
-        """How far the contact is stretched when a trial begins nobody knows."""
+        """Return the variance of the unknown initial stretch of the contact."""
         return {"anchor": self.stretch**2 / 3.0}
 
     def _way(self, s: Signals) -> Scalar:
@@ -200,13 +200,13 @@ def _stopping(s: Signals) -> Scalar:
 
 
 def _free_way(measured: Measured) -> float:
-    """How far a motion goes that is read as a position, rad or m; 0 of others."""
+    """Return the range of a motion that is read as a position, rad or m; 0 for others."""
     position = measured.get("position", np.empty(0))
     return float(np.ptp(position)) if len(position) and np.array_equal(position, measured.get("reading", ())) else 0.0
 
 
 def _imposed_way(measured: Measured) -> float:
-    """How far an imposed motion goes, rad or m; 0 where the motion is what is read."""
+    """Return the range of an imposed motion, rad or m; 0 where the motion is the reading."""
     position = measured.get("position", measured.get("angle_rad", np.zeros(1)))
     return 0.0 if np.array_equal(position, measured.get("reading", ())) else float(np.ptp(position))
 

@@ -25,7 +25,7 @@ class EffortOffset(Effect):
     name, stage, signal, rigs = "effort_offset", Stage.JOINT, "effort", ("joint",)
 
     def limits(self, measured: Measured) -> Bounds:
-        """No more than the largest effort that was commanded: more would be another rig."""
+        """Return bounds by the largest commanded effort: a larger offset is implausible."""
         return {"offset": symmetric(float(np.max(np.abs(measured.get("effort", np.zeros(1))))))}
 
     def apply(self, value: Scalar, s: Signals) -> Scalar:

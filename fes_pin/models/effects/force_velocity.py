@@ -45,13 +45,13 @@ class ForceVelocity(Effect):
         return {**super().grids(measured), "bend": (), "hill": (4.0,), "plateau": (1.0, 4.0)}
 
     def limits(self, measured: Measured) -> Bounds:
-        """Of a joint, down to half a radian a second; an imposed motion shows that a muscle is damped, not driven."""
+        """Return bounds, for a joint down to half a radian a second; in imposed motion a muscle is damped only."""
         if "length_m" in measured:
             return {"slope_s_per_rad": (0.0, 1e4)}
         return {"slope_s_per_rad": (0.0 if "torque_nm" in measured else -0.5, 2.0)}
 
     def apply(self, value: Scalar, s: Signals) -> Scalar:
-        """Of a joint; a muscle on a lever has its fibres' speed from `balanced`, and v = 0 here."""
+        """Return the effort of a joint; a muscle on a lever has its fibres' speed from `balanced`, and v = 0 here."""
         if s.kind == "imposed":
             return value * self.factor(s.v)
         x = self.slope_s_per_rad * s.v

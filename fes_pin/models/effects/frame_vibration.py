@@ -40,7 +40,7 @@ class FrameVibration(Effect):
         return {"angle": s.own.rate, "rate": self._swing(s, s.driving)}
 
     def start_variances(self, reach: Scalar, speed: Scalar) -> ByName:
-        """Where a trial begins in motion, the frame swings already."""
+        """Return the variance of the frame's initial motion, in trials that begin in motion."""
         swings = (self.coupling * speed) ** 2
         return {"angle": swings / (TURN * self.frequency_hz) ** 2, "rate": swings}
 

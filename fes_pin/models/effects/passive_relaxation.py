@@ -38,6 +38,6 @@ class PassiveRelaxation(Effect):
         return {"relaxed": s.q}
 
     def start_variances(self, reach: Scalar, speed: Scalar) -> ByName:
-        """Where a trial begins in motion, how it moved before nobody knows: the damper is late, within what it does."""
+        """Return the variance of the damper's initial state, which is unknown in trials that begin in motion."""
         late = self.relaxation_s * speed
         return {"relaxed": late * late * reach * reach / (late * late + reach * reach + NOTHING)}

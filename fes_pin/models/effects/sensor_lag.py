@@ -43,7 +43,7 @@ class SensorLag(Effect):
         return {"filtered": s.sensed - lag_time(self._lag(), s.step) * s.sensed_rate}
 
     def start_variances(self, reach: Scalar, speed: Scalar) -> ByName:
-        """Where a trial begins in motion, how it moved before nobody knows."""
+        """Return the variance of the initial lag, which is unknown in trials that begin in motion."""
         return {"filtered": (self._lag() * speed) ** 2}
 
     def _lagged(self, s: Signals) -> tuple[Scalar, Scalar]:

@@ -22,7 +22,7 @@ class SensorOffset(Effect):
     name, stage, signal, rigs = "sensor_offset", Stage.SENSOR, "reading", ("ankle", "joint", "muscle")
 
     def limits(self, measured: Measured) -> Bounds:
-        """No more than the sensor's readings differ by: more would be another place."""
+        """Return bounds by the range of the sensor's readings: a larger offset is implausible."""
         return {"offset": symmetric(reading_range(measured))}
 
     def apply(self, value: Scalar, s: Signals) -> Scalar:

@@ -44,7 +44,7 @@ class SeriesElasticity(Effect):
         return {**super().grids(measured), "toe": (0.05 * way,), "toe_force": (max(0.25 * force, 1e-3),)}
 
     def limits(self, measured: Measured) -> Bounds:
-        """No tendon stretches by more than a tenth of muscle and tendon under the largest force: it tears before."""
+        """Return bounds by a tenth of the length of muscle and tendon: a tendon tears before it stretches so far."""
         if "length_m" not in measured:
             return {}
         longest = 0.1 * float(np.max(measured["length_m"]))
@@ -52,7 +52,7 @@ class SeriesElasticity(Effect):
         return {"compliance": (0.0, longest / force), "toe": (0.0, longest), "toe_force": (0.05 * force, force)}
 
     def elongation(self, s: Signals) -> Scalar:
-        """Of the tendon, m."""
+        """Return the stretch of the tendon, m."""
         tension = s.own.tension
         return self.compliance * tension + self.toe * (1.0 - exp(-tension / self.toe_force))
 

@@ -134,7 +134,7 @@ class Ankle(Rig):
         return np.asarray(recruitment_of(trial["pulse_width_us"], *known))
 
     def driving_sizes(self, trials: Sequence[Trial]) -> dict[str, float]:
-        """Of a free motion what the cable's torque would be at the start values."""
+        """Return the torque of the cable in a free motion at the start values."""
         if all(t.kind != IMPOSED for t in trials):
             c, moved = self.constants, [float(np.mean(self.recruited(t) ** 2)) for t in trials if t.kind == "motion"]
             size = float(self.gain * c["force_scale_n"] * c["moment_arm_m"]) * math.sqrt(max(moved, default=0.0))

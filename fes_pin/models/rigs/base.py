@@ -1,4 +1,4 @@
-"""What every rig provides: names of its signals and the equations of its nominal model."""
+"""Base of rigs: names of the signals and equations of the nominal model."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ IMPOSED_STOPPING = 1e9
 """Rate at which friction could stop an imposed motion, 1/s: it does not, and its direction is that of the velocity."""
 
 RUN_OUT = "inertia over damping"
-"""What a joint without gravity has for a time constant; lightly damped, it outlasts any trial."""
+"""Time constant of a joint without gravity; that of light damping is longer than any trial."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -51,11 +51,11 @@ class Rig(ReadOnly):
     fitted: tuple[str, ...] | None = dataclasses.field(default=None, kw_only=True)
     """Names of the parameters that a nominal fit moves; all of them by default."""
     session: Session = dataclasses.field(default=(), kw_only=True)
-    """What was stimulated when, of trials that say when they began."""
+    """Earlier stimulation, of trials that state when they began."""
 
     name: ClassVar[str]
     schema: ClassVar[RigSchema]
-    """What a study of it must and may hold: keys, columns, units."""
+    """Schema of its studies: required and optional keys, columns, units."""
     like: ClassVar[tuple[str, ...]] = ()
     """Names of other rigs whose effects it can have as well."""
     needed: ClassVar[tuple[str, ...]] = ()
@@ -67,7 +67,7 @@ class Rig(ReadOnly):
     rate_of: ClassVar[Mapping[str, str]] = {}
     """Readings that are the rate of another, and may have been computed from it: their column and the other's."""
     begins: ClassVar[str] = ""
-    """Where a prediction of it begins, one sentence; "" where nothing needs saying."""
+    """Initial state of its predictions in one sentence; "" where none is needed."""
 
     def __post_init__(self) -> None:
         names, schema = tuple(self.parameters()), self.schema
@@ -87,7 +87,7 @@ class Rig(ReadOnly):
 
     @classmethod
     def described(cls) -> RigSchema:
-        """What a study of it must and may hold, with its name and this class."""
+        """Return the schema of its studies, with its name and this class."""
         return dataclasses.replace(cls.schema, name=cls.name, owner=cls)
 
     @classmethod
@@ -104,12 +104,12 @@ class Rig(ReadOnly):
 
     @classmethod
     def takes(cls, effect: type[Effect] | Effect) -> bool:
-        """True if the effect can be part of it."""
+        """Return whether the effect can be part of it."""
         return cls.is_one_of(effect.rigs)
 
     @classmethod
     def is_one_of(cls, rigs: Collection[str]) -> bool:
-        """True if it, or one that it is like, has one of these names."""
+        """Return whether it, or a rig that it extends, has one of these names."""
         return not {cls.name, *cls.like}.isdisjoint(rigs)
 
     def time_constants(self, kinds: Collection[str]) -> dict[str, float]:
@@ -233,7 +233,7 @@ class Rig(ReadOnly):
         return ("imposed_start",) if kind == IMPOSED else ()
 
     def stated(self, trial: Trial) -> dict[str, float]:
-        """What a trial says it was run at, and may have been read wrong, by name: conditions that the equations read.
+        """Return the stated conditions of a trial that the equations read and that may be misread, by name.
 
         Where motion is imposed also its position, by the first sample of its column.
         """
@@ -271,7 +271,7 @@ class Rig(ReadOnly):
         return {}
 
     def is_driven(self, trials: Sequence[Trial]) -> bool:
-        """True if a recorded effort drives the rig in these trials."""
+        """Return whether a recorded effort drives the rig in these trials."""
         return False
 
     def driving_sizes(self, trials: Sequence[Trial]) -> dict[str, float]:
@@ -280,7 +280,7 @@ class Rig(ReadOnly):
         return {}
 
     def guess(self, trial: Trial) -> float:
-        """Where the search for the static equilibrium starts."""
+        """Return the start of the search for the static equilibrium."""
         return 0.0
 
     def set_rest(self, s: Signals, z: Any) -> None:
@@ -288,7 +288,7 @@ class Rig(ReadOnly):
         raise NotImplementedError
 
     def rest_residual(self, s: Signals, z: Any) -> Any:
-        """What is zero at the static equilibrium; called after `rates` at rest."""
+        """Return the expressions that are zero at the static equilibrium; called after `rates` at rest."""
         raise NotImplementedError
 
     def sample(self, s: Signals) -> dict[str, Any]:

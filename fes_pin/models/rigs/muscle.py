@@ -134,7 +134,7 @@ class Muscle(Rig):
         return {"act": s.act_rate}
 
     def _elongation(self, s: Signals) -> Any:
-        """Of what is in series with the fibres, m."""
+        """Return the length of the elements in series with the fibres, m."""
         return sum((e.elongation(s.of(e)) for e in s.effects if e.signal == "fibre"), start=0.0)
 
     def _tendon_force(self, s: Signals) -> Any:

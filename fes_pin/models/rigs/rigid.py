@@ -95,5 +95,5 @@ def joint_inertia(model: pin.Model) -> float:
 
 
 def joint_is_revolute(model: pin.Model) -> bool:
-    """True for a revolute or continuous joint, False for a prismatic one."""
+    """Return whether a joint is revolute or continuous; False for a prismatic one."""
     return "P" not in model.joints[1].shortname().removeprefix("JointModel")[:2]

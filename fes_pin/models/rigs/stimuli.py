@@ -14,7 +14,7 @@ from fes_pin.models.stage import Signals
 RATES_HZ = (8.0, 15.0, 31.0, 45.0)
 """Pulse rates that are proposed, from single twitches to a fused contraction."""
 ON_AND_PAUSE_S = ((7.0, 1.0), (1.0, 1.0), (0.3, 0.7))
-"""Of trains: how long each lasts, and the pause after it."""
+"""Length of trains, and the pause after each, s."""
 LAST_S = 0.8
 """A proposed train ends so long before the trial does: the muscle's relaxation is seen."""
 
