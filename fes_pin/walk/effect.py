@@ -119,20 +119,3 @@ def segment_form(
         return np.sum([trial.regressors[s] @ d for s, d in change(trial.parameters).items()], axis=0)
 
     return Form(cause, site, parameters, units, plausible, columns, segments=change)
-
-
-def central(parameters: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
-    """Return mass, centre (3,) and inertia about the centre (3, 3) of ten mass parameters."""
-    mass = float(parameters[0])
-    centre = parameters[1:4] / mass
-    return mass, centre, _matrix(parameters[4:]) - mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
-
-
-def _matrix(six: np.ndarray) -> np.ndarray:
-    xx, xy, yy, xz, yz, zz = six
-    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-
-
-def six_of(matrix: np.ndarray) -> np.ndarray:
-    """Return a symmetric matrix in Pinocchio's order: xx, xy, yy, xz, yz, zz."""
-    return np.array([matrix[0, 0], matrix[0, 1], matrix[1, 1], matrix[0, 2], matrix[1, 2], matrix[2, 2]])

@@ -6,12 +6,12 @@ from dataclasses import replace
 from xml.etree.ElementTree import tostring
 
 import numpy as np
+import pinocchio as pin
 from defusedxml.ElementTree import fromstring
 
 from fes_pin.body.build import Body
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import in_full
-from fes_pin.walk.effect import central
 from fes_pin.walk.models import WalkFit, WalkModels
 
 ROUNDED = 1e-3
@@ -52,8 +52,8 @@ def with_segments(body: Body, parameters: dict[str, np.ndarray]) -> Body:
         name = link.get("name", "")
         if name not in parameters:
             continue
-        mass, centre, inertia = central(parameters[name])
-        moments = np.linalg.eigvalsh(inertia)
+        one = pin.Inertia.FromDynamicParameters(parameters[name])
+        mass, moments = one.mass, np.linalg.eigvalsh(one.inertia)
         if mass <= 0.0 or moments[0] <= 0.0 or moments[2] > (moments[0] + moments[1]) * (1.0 + ROUNDED):
             raise InputError(
                 f"no body has a {name} of {mass:.3g} kg with moments {np.round(moments, 5).tolist()} kg m2"
@@ -61,14 +61,13 @@ def with_segments(body: Body, parameters: dict[str, np.ndarray]) -> Body:
         inertial = link.find("inertial")
         if inertial is None:
             raise InputError("the link has no inertial element", column=name)
-        for child in list(inertial):
-            if child.tag == "origin":
-                child.set("xyz", in_full(*centre))
-            elif child.tag == "mass":
-                child.set("value", in_full(mass))
-            elif child.tag == "inertia":
-                for key, (i, k) in {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2),
-                                    "izz": (2, 2)}.items():  # fmt: skip
-                    child.set(key, in_full(inertia[i, k]))
+        six = pin.Inertia(0.0, np.zeros(3), one.inertia).toDynamicParameters()[4:]
+        written = {
+            "origin": {"xyz": in_full(*one.lever)},
+            "mass": {"value": in_full(mass)},
+            "inertia": dict(zip(("ixx", "ixy", "iyy", "ixz", "iyz", "izz"), map(in_full, six), strict=True)),
+        }
+        for child in inertial:
+            child.attrib.update(written.get(child.tag, {}))
     text = '<?xml version="1.0"?>\n' + tostring(tree, encoding="unicode") + "\n"
     return replace(body, urdf=text, label=f"{body.label}, extended")

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
+from scipy.ndimage import distance_transform_edt
 
 from fes_pin.body.joints import SIDES
 from fes_pin.data.errors import InputError
@@ -122,14 +123,9 @@ def _at(at: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 def _held(point: np.ndarray, loaded: np.ndarray) -> np.ndarray:
     """Points of loaded samples; others as at the nearest loaded one in time."""
-    rows = np.flatnonzero(loaded)
-    if not len(rows):
+    if not loaded.any():
         return np.zeros_like(point)
-    after = np.clip(np.searchsorted(rows, np.arange(len(loaded))), 0, len(rows) - 1)
-    before = np.clip(after - 1, 0, None)
-    count = np.arange(len(loaded))
-    nearest = np.where(np.abs(rows[before] - count) <= np.abs(rows[after] - count), rows[before], rows[after])
-    return point[nearest]
+    return point[distance_transform_edt(~loaded, return_distances=False, return_indices=True)[0]]
 
 
 def pressure_and_free_moment(wrench: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

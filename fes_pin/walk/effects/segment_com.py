@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 import numpy as np
+import pinocchio as pin
 
-from fes_pin.walk.effect import AXES, SITES, Form, WalkEffect, central, segment_form, six_of
+from fes_pin.walk.effect import AXES, SITES, Form, WalkEffect, segment_form
 
 _PLAUSIBLE = {"trunk": 0.03, "pelvis": 0.02}
 """m; limbs 0.015: a shank is some 0.05 m thick about its centre."""
@@ -49,8 +50,9 @@ def _shifted(
 
 
 def _along(believed: np.ndarray, axis: int) -> np.ndarray:
-    """Derivative of the ten parameters by the centre's place along one axis."""
-    mass, centre, _ = central(believed)
-    unit = np.eye(3)[axis]
-    grown = mass * (2.0 * centre[axis] * np.eye(3) - np.outer(unit, centre) - np.outer(centre, unit))
-    return np.concatenate([[0.0], mass * unit, six_of(grown)])
+    """Derivative of the ten parameters by the centre's place along an axis, to which they are quadratic: half of what
+    1 m ahead and 1 m behind differ by.
+    """
+    one = pin.Inertia.FromDynamicParameters(believed)
+    ahead, behind = (pin.Inertia(one.mass, one.lever + way * np.eye(3)[axis], one.inertia) for way in (1.0, -1.0))
+    return 0.5 * (ahead.toDynamicParameters() - behind.toDynamicParameters())

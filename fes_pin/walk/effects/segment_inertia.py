@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 import numpy as np
+import pinocchio as pin
 
-from fes_pin.walk.effect import SITES, Form, WalkEffect, central, segment_form, six_of
+from fes_pin.walk.effect import SITES, Form, WalkEffect, segment_form
 
 
 class SegmentInertia(WalkEffect):
@@ -28,6 +29,7 @@ class SegmentInertia(WalkEffect):
 
 def _scaled(segments: tuple[str, ...]) -> Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]]:
     def change(believed: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-        return {s: np.concatenate([np.zeros(4), six_of(central(believed[s])[2])])[:, None] for s in segments}
+        inertias = {s: pin.Inertia.FromDynamicParameters(believed[s]).inertia for s in segments}
+        return {s: pin.Inertia(0.0, np.zeros(3), i).toDynamicParameters()[:, None] for s, i in inertias.items()}
 
     return change
