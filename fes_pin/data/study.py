@@ -26,7 +26,7 @@ from fes_pin.data.checks import (
     known_constants,
 )
 from fes_pin.data.errors import InputError, fault_at
-from fes_pin.data.files import as_path, hold, write_files
+from fes_pin.data.files import as_path, hold, what_is_at, write_files
 from fes_pin.data.motion import GROUND_REACTION
 from fes_pin.data.numbers import instance
 from fes_pin.data.read_only import ReadOnly
@@ -45,7 +45,7 @@ from fes_pin.data.schema import (
 from fes_pin.data.show import by_columns, frame, table_html
 from fes_pin.data.study_tables import HORIZON, StudyTables, check_files
 from fes_pin.data.table import format_csv
-from fes_pin.data.toml import document_of, read_toml
+from fes_pin.data.toml import Document, document_of, read_toml
 from fes_pin.data.trial import LOW_PASS, POSITIVE_HZ, Trial, check_trial, read_body_trial, read_trial, trial_csv
 
 if TYPE_CHECKING:
@@ -316,15 +316,8 @@ def read_study(path: str | Path, *, rigs: Rigs | None = None) -> Study:
     InputError
         For anything that is not as the study format says: with file, row, and column or dotted key.
     """
-    path = as_path(path)
-    try:
-        if not path.exists():
-            raise InputError("no such study; expected a folder with study.toml", file=path)
-        folder = path.is_dir()
-    except (OSError, ValueError) as error:
-        raise error if isinstance(error, InputError) else InputError(f"cannot be read: {error}", file=path) from error
     with hashing() as sha256:
-        document = read_toml(path / "study.toml" if folder else path)
+        document = _document(path)
     study = _Reader(document, known_rigs(rigs)).study()
     vars(study)["as_read"] = AsRead(sha256, study.digest())
     return study
@@ -349,9 +342,17 @@ def read_columns(path: str | Path, *, rigs: Rigs | None = None) -> Columns | Non
     InputError
         As `read_study`, of everything but the trials.
     """
-    path = Path(path)
-    tables = StudyTables(read_toml(path / "study.toml" if path.is_dir() else path), known_rigs(rigs))
+    tables = StudyTables(_document(path), known_rigs(rigs))
     return tables.columns_table(tables.rig_table()[1])
+
+
+def _document(path: str | Path) -> Document:
+    """The `study.toml` of a folder, or the file itself."""
+    path = as_path(path)
+    found = what_is_at(path)
+    if found == "nothing":
+        raise InputError("no such study; expected a folder with study.toml", file=path)
+    return read_toml(path / "study.toml" if found == "a folder" else path)
 
 
 class _Reader(StudyTables):

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from fes_pin.data.errors import InputError
-from fes_pin.data.files import as_path, read_bytes, what_is_at
+from fes_pin.data.files import as_path, read_bytes
 from fes_pin.data.libraries import optional_library
 from fes_pin.data.markers import TIME, c3d_points, trc_points
 from fes_pin.data.motion import read_motion
@@ -77,9 +77,6 @@ def read_recording(path: str | Path, form: TextForm | None = None, wanted: Seque
     check_suffix(path)
     if suffix not in _READERS:
         return read_text_recording(path, form or TextForm(), wanted)
-    found = what_is_at(path)
-    if found != "a file":
-        raise InputError(f"expected a file, found {found}", file=path)
     read_bytes(path)  # their libraries open it themselves
     recording = _READERS[suffix](path, wanted)
     sizes = {len(values) for values in recording.columns.values()}
