@@ -8,6 +8,7 @@ import shlex
 import sys
 import tomllib
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -87,14 +88,12 @@ def hashes(folder: Path) -> dict[str, str]:
         tables = tomllib.loads(read_bytes(folder / "study.toml").decode("utf-8-sig"))
     except (InputError, ValueError):
         return {}
-    out = {"study.toml": _sha256(folder / "study.toml")}
-    for text in _texts(tables):
-        try:
+    out = {}
+    for text in ("study.toml", *_texts(tables)):
+        with suppress(ValueError, OSError, InputError):
             path = inside(folder, text)
             if path.is_file():
-                out[text] = _sha256(path)
-        except (ValueError, OSError, InputError):
-            continue
+                out[text] = hashlib.sha256(read_bytes(path)).hexdigest()
     return out
 
 
@@ -107,7 +106,3 @@ def _texts(value: Any) -> Iterator[str]:
     elif isinstance(value, list):
         for one in value:
             yield from _texts(one)
-
-
-def _sha256(path: Path) -> str:
-    return hashlib.sha256(read_bytes(path)).hexdigest()

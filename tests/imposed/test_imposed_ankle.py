@@ -8,6 +8,7 @@ import pinocchio as pin
 import pytest
 from imposed_rigs import ankle
 from imposed_rigs.motion import drawn
+from models.cases import foot
 from scipy.integrate import solve_ivp
 
 from fes_pin.cli import main
@@ -20,7 +21,6 @@ from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.predict import predict
 from fes_pin.models.rigs import Ankle
-from fes_pin.models.rigs.rigid import point_foot
 from fes_pin.models.simulate import simulate
 from fes_pin.models.store import load_model, save_model
 
@@ -48,7 +48,7 @@ def test_unstimulated_the_torque_is_that_of_inverse_dynamics():
     """Of Pinocchio's RNEA on the motion itself, with the antagonist and damping of eq. (1) taken off."""
     motion, trial = moved()
     q, v, a = (motion.at(trial.time, k) for k in range(3))
-    body = point_foot(ankle.KNOWN["foot_mass_kg"], ankle.KNOWN["com_distance_m"], RIG.inertia_kgm2)
+    body = foot(ankle.KNOWN["foot_mass_kg"], ankle.KNOWN["com_distance_m"], RIG.inertia_kgm2)
     data = body.createData()
     needed = np.array([pin.rnea(body, data, *(np.array([x[k]]) for x in (q, v, a)))[0] for k in range(len(q))])
     antagonist = ankle.KNOWN["f0_n"] * np.expm1(ankle.KNOWN["f1_per_rad"] * (q - ankle.KNOWN["theta_r_rad"]))

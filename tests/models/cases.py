@@ -1,12 +1,14 @@
 """Small rigs, trials and model structures that the tests of the engine share."""
 
 import numpy as np
+import pinocchio as pin
 
 from fes_pin.data.trial import Trial
 from fes_pin.models.compile import program
 from fes_pin.models.effects import EFFECTS, effects_for
 from fes_pin.models.model import Model
 from fes_pin.models.rigs import Ankle, Joint, Muscle
+from fes_pin.models.rigs.rigid import point_foot
 
 ANKLE = {
     "foot_mass_kg": 0.12,
@@ -123,3 +125,11 @@ def forget_programs():
     """Drop the programs that are kept in memory, as if this process had just begun; those on disk stay."""
     program._PROGRAMS.clear()
     program._say_slow.cache_clear()
+
+
+def foot(mass_kg, com_distance_m, inertia_kgm2):
+    """The ankle's point foot with an inertia about the joint that is larger."""
+    model = point_foot(mass_kg, com_distance_m)
+    about_centre = (inertia_kgm2 - mass_kg * com_distance_m**2) * np.eye(3)
+    model.inertias[1] = pin.Inertia(mass_kg, model.inertias[1].lever, about_centre)
+    return model

@@ -47,22 +47,11 @@ def _ankle_rig() -> pin.Model:
     return load_urdf(urdf_path("ankle_rig.urdf"))
 
 
-def point_foot(mass_kg: float, com_distance_m: float, inertia_kgm2: float | None = None) -> pin.Model:
-    """The ankle rig's URDF with the foot's mass, its centre and, if given, its inertia about the joint.
-
-    Without an inertia the foot is a point mass.
-
-    Raises
-    ------
-    ValueError
-        If the inertia is smaller than m l^2.
-    """
+def point_foot(mass_kg: float, com_distance_m: float) -> pin.Model:
+    """The ankle rig's URDF with the foot as a point mass so far from the joint."""
     model = _ankle_rig().copy()
-    about_com = 0.0 if inertia_kgm2 is None else inertia_kgm2 - mass_kg * com_distance_m**2
-    if about_com < 0.0:
-        raise ValueError(f"expected an inertia of at least m l^2, {mass_kg * com_distance_m**2:g} kg m2")
     direction = model.inertias[1].lever / np.linalg.norm(model.inertias[1].lever)
-    model.inertias[1] = pin.Inertia(mass_kg, com_distance_m * direction, about_com * np.eye(3))
+    model.inertias[1] = pin.Inertia(mass_kg, com_distance_m * direction, np.zeros((3, 3)))
     return model
 
 
