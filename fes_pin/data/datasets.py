@@ -122,11 +122,8 @@ def fetch(name: str) -> Path:
         if (folder / name / "study.toml").is_file():
             return folder / name
     how = dataset.by_hand or f"`fes-pin datasets {name}` fetches it"
-    raise InputError(
-        f"no {name}/study.toml there, nor in another folder that {VARIABLE} names; {how} ({dataset.origin}, "
-        f"{dataset.licence})",
-        file=folders()[0],
-    )
+    missing = f"no {name}/study.toml there, nor in another folder that {VARIABLE} names"
+    raise InputError(f"{missing}; {how} ({dataset.origin}, {dataset.licence})", file=folders()[0])
 
 
 def download_all(

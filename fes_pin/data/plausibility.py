@@ -114,11 +114,9 @@ def _check_counts(study: Study | ToPredict, moving: Sequence[tuple[Trial, str]])
     most = sum(int(h.sum()) for h in hunting) > 0.5 * sum(map(len, hunting))
     if most and others < wanted:
         names = ", ".join(dict.fromkeys(n for _, n in moving))
-        raise InputError(
-            f"{names} only goes to and fro between two counts: expected at least {wanted} other readings, "
-            f"{SAMPLES_EACH} for each value of [start]; found {others}",
-            file=study.folder,
-        )
+        expected = f"expected at least {wanted} other readings, {SAMPLES_EACH} for each value of [start]"
+        message = f"{names} only goes to and fro between two counts: {expected}; found {others}"
+        raise InputError(message, file=study.folder)
 
 
 def _driving(study: Study | ToPredict, trial: Trial) -> tuple[str, ...]:
@@ -150,11 +148,8 @@ def _check_rows(study: Study | ToPredict) -> None:
     wanted = SAMPLES_EACH * len(study.start)
     found = sum(map(len, fitted))
     if fitted and found < wanted:
-        raise InputError(
-            f"expected at least {wanted} samples, {SAMPLES_EACH} for each value of [start], in all trials together; "
-            f"found {found}",
-            file=study.folder,
-        )
+        expected = f"expected at least {wanted} samples, {SAMPLES_EACH} for each value of [start]"
+        raise InputError(f"{expected}, in all trials together; found {found}", file=study.folder)
 
 
 def _inputs(study: Study | ToPredict) -> Iterable[str]:

@@ -452,13 +452,8 @@ def write_study(study: Study, folder: str | Path) -> None:
         file = trial.name if _PLAIN.fullmatch(trial.name) else f"trial~{place + 1}"  # which is no plain name
         named = _trial_files(schema, trial, file)
         contents |= named
-        labels: dict[str, Any] = {
-            "role": trial.role,
-            "group": trial.group,
-            LOW_PASS: trial.low_pass_hz,
-            "remarks": list(trial.remarks),
-        }
-        labels["name"] = trial.name if file != trial.name else None
+        labels: dict[str, Any] = {n: getattr(trial, n) for n in ("role", "group", LOW_PASS)}
+        labels |= {"remarks": list(trial.remarks), "name": trial.name if file != trial.name else None}
         known = {"kind": trial.kind, **trial.conditions, **{n: v for n, v in labels.items() if v}}
         tables.append({**dict(zip(schema.recordings, named, strict=True)), **known})
     head = {"name": study.name, "rig": study.rig, **({HORIZON: study.horizon_s} if study.horizon_s else {})}

@@ -69,9 +69,8 @@ class Table:
         """The error that names this file, a sample's row (or the header's) and a column."""
         row = (self.header_row or None) if sample is None else int(self.rows[sample])
         called = self.called.get(column, column)
-        return InputError(
-            message, file=self.path, row=row, column=column if called == column else f"{called} ({column})"
-        )
+        place = column if called == column else f"{called} ({column})"
+        return InputError(message, file=self.path, row=row, column=place)
 
 
 def check_time(table: Table) -> None:
