@@ -86,10 +86,8 @@ def modes(
         from fes_pin.body.observability import fewest_goniometers
 
         best = fewest_goniometers(linear, within_deg=doubt)
-        lines.append(
-            f"\nFewest goniometers that leave every fall known to {doubt:g} deg ({len(best)} such sets; the best):"
-            f"\n{best[0]}"
-        )
+        fewest = f"Fewest goniometers that leave every fall known to {doubt:g} deg"
+        lines.append(f"\n{fewest} ({len(best)} such sets; the best):\n{best[0]}")
     typer.echo("\n".join(lines))
 
 
@@ -147,10 +145,8 @@ def nerves(
     whose += " (paralysed, stimulated muscle)" if strength is None else ""
     lines.append(f"At {chosen.assumed_strength:g} {whose} {held}")
     if held.falling:
-        lines.append(
-            f"It may be {low:.2g} to {high:.2g}: the least of these leans is "
-            f"{weak.least_lean_deg:.1f} to {strong.least_lean_deg:.1f} degrees."
-        )
+        leans = f"{weak.least_lean_deg:.1f} to {strong.least_lean_deg:.1f} degrees"
+        lines.append(f"It may be {low:.2g} to {high:.2g}: the least of these leans is {leans}.")
         lines.append(f"With these nerves: {catchable(linear, inputs, settle)}")
     if influence is not None:
         lines.append(f"\n{influence_table(result, influence)}")
@@ -197,9 +193,8 @@ def view(
     from fes_pin.view.viewer import show_influence, show_mode, show_posture
 
     if page:
-        raise InputError(
-            f"found {page[0]!r}; expected --walk FILE to play coordinates, and --out PAGE.html for the page to write"
-        )
+        expected = "expected --walk FILE to play coordinates, and --out PAGE.html for the page to write"
+        raise InputError(f"found {page[0]!r}; {expected}")
     if sum(choice is not None for choice in (mode, nerve, walk)) > 1:
         raise InputError("choose one of --mode, --nerve and --walk")
     if out is None and not live:

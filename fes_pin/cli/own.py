@@ -125,9 +125,8 @@ def new_study(
     for own, theirs, unit in made.taken:
         typer.echo(f"{own:16s} is {theirs}{f', in {unit}' if unit else ''}")
     if "motion" in made.kinds and schema.outputs.get(IMPOSED) in {own for own, _, _ in made.taken}:
-        typer.echo(
-            f"{schema.outputs[IMPOSED]} is taken as what drives it; where the motion drives: --set kind={IMPOSED}"
-        )
+        effort = schema.outputs[IMPOSED]
+        typer.echo(f"{effort} is taken as what drives it; where the motion drives: --set kind={IMPOSED}")
     typer.echo("\n".join(odd_lines(study, warnings)))
     place = shlex.quote(str(folder))
     typer.echo(f"wrote {folder / 'study.toml'}: look at it, then run")

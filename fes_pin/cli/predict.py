@@ -175,9 +175,8 @@ def _along(path: Path, model: Model, trial: Trial, horizon_s: float) -> Trial:
 
     random = load_random(path)
     if random is None:
-        raise InputError(
-            "expected a table [random], as diagnose writes it: --horizon needs to know the noise", file=path
-        )
+        message = "expected a table [random], as diagnose writes it: --horizon needs to know the noise"
+        raise InputError(message, file=path)
     return derived_trial(trial, columns=predict_ahead(model, trial, random, horizon_s))
 
 

@@ -176,9 +176,8 @@ def check_values(
             message = f"reaches {most:.4g} us, and no pulse is so short: is it in {'ms' if most > 0.002 else 's'}?"
             raise error(message, "pulse_width_us", int(np.argmax(width)))
         if most > LONGEST_PULSE_US:
-            raise error(
-                f"reaches {most:g} us, and no pulse is so long: is it in ns?", "pulse_width_us", int(width.argmax())
-            )
+            message = f"reaches {most:g} us, and no pulse is so long: is it in ns?"
+            raise error(message, "pulse_width_us", int(width.argmax()))
     if "stim" in columns and (other := ~np.isin(columns["stim"], (0.0, 1.0))).any():
         sample = int(np.argmax(other))
         raise error(f"expected 0 or 1, found {columns['stim'][sample]:g}", "stim", sample)
@@ -210,9 +209,8 @@ def check_constants(schema: RigSchema, constants: Mapping[str, float], files: Co
         key = "threshold_us" if threshold is None else "saturation_us"
         raise error(key, "missing; threshold_us and saturation_us go together")
     if threshold is not None and saturation is not None and saturation <= threshold:
-        raise error(
-            "saturation_us", f"expected a saturation above the threshold of {threshold:g} us, found {saturation:g}"
-        )
+        message = f"expected a saturation above the threshold of {threshold:g} us, found {saturation:g}"
+        raise error("saturation_us", message)
     if absent := [key for key in schema.either if key not in constants and not files]:
         expected = ", or ".join((" and ".join(schema.either), *schema.files))
         raise error(absent[0], f"missing; expected {expected}")

@@ -178,9 +178,8 @@ def _fetched(name: str, target: Path, unverified: bool, outputs: Outputs) -> Fil
     if not trusted and other and not unverified:
         found = f"{len(other)} of {len(dataset.converted)} trials differ from those that the documentation was written"
         hint = "unverified=True keeps them all the same"
-        raise InputError(
-            f"{found} with ({other[0]} is one), and no checksum of its origin is known; {hint}", column=name
-        )
+        message = f"{found} with ({other[0]} is one), and no checksum of its origin is known; {hint}"
+        raise InputError(message, column=name)
     about = f"# From {dataset.origin}\n# {dataset.licence}; converted by fes-pin datasets. {dataset.reference}".rstrip()
     made["study.toml"] = f"{about}\n{made['study.toml']}"
     return made

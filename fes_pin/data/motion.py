@@ -216,9 +216,8 @@ def _right_plate(table: Table, names: Mapping[str, str]) -> str:
         load = np.clip(table.columns[names[f"{plate}_Fy"]], 0.0, None)
         across[plate] = float(load @ table.columns[names[f"{plate}_copz"]] / max(load.sum(), 1e-9))
     if abs(across["1"] - across["2"]) < APART_M:
-        raise table.error(
-            "expected columns that name the foot, r_ and l_: the plates' order does not show it", names["1_Fy"]
-        )
+        message = "expected columns that name the foot, r_ and l_: the plates' order does not show it"
+        raise table.error(message, names["1_Fy"])
     return max(across, key=lambda plate: across[plate])
 
 

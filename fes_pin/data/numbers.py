@@ -31,9 +31,8 @@ def instance(value: _Value, kind: type | UnionType, name: str, how: str = "") ->
         Anything else.
     """
     if not isinstance(value, kind):
-        raise InputError(
-            f"expected a {getattr(kind, '__name__', kind)}, found a {type(value).__name__}{how}", column=name
-        )
+        message = f"expected a {getattr(kind, '__name__', kind)}, found a {type(value).__name__}{how}"
+        raise InputError(message, column=name)
     return value
 
 

@@ -276,9 +276,8 @@ def _held(trial: Trial, name: str) -> list[str]:
     still = 1.0 - len(changes) / max(len(values) - 1, 1)
     every = np.diff(changes)
     if still > 0.4 and len(every) > 3 and (count := int(np.median(every))) > 1 and np.mean(every % count == 0) > 0.95:
-        return [
-            f"{name} changes only every {count} samples in trial {trial.name}: it was sampled more slowly, and held"
-        ]
+        held = f"{name} changes only every {count} samples in trial {trial.name}"
+        return [f"{held}: it was sampled more slowly, and held"]
     ends = np.r_[-1, changes, len(values) - 1]
     lengths = np.diff(ends)
     longest = int(np.argmax(lengths))

@@ -332,9 +332,8 @@ def save_result(result: Saveable, path: str | Path) -> None:
     """
     if not isinstance(result, Saveable):
         kind = type(result).__name__
-        raise InputError(
-            f"expected a result of diagnose, contrast, compare, fit or a cohort, found {kind}", column="result"
-        )
+        message = f"expected a result of diagnose, contrast, compare, fit or a cohort, found {kind}"
+        raise InputError(message, column="result")
     write_text(path, result.to_json())
 
 

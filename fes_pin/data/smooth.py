@@ -60,9 +60,8 @@ def low_pass(values: np.ndarray, dt: float, cutoff_hz: float = CUTOFF_HZ) -> np.
         return np.array(values, dtype=float)
     reach = int(np.ceil(1.0 / (cutoff_hz * dt)))
     if len(values) <= reach:
-        raise InputError(
-            f"{len(values)} samples are too few for a low pass of {cutoff_hz:g} Hz; {reach + 1} are needed"
-        )
+        few = f"{len(values)} samples are too few for a low pass of {cutoff_hz:g} Hz"
+        raise InputError(f"{few}; {reach + 1} are needed")
     return sosfiltfilt(_butterworth(design * dt), values, axis=0, padlen=reach)
 
 

@@ -337,9 +337,8 @@ def check_trial(
     check_conditions(schema, kind, trial.conditions, trial.key_error)
     check_columns([n for n in trial.columns if n not in also], schema, kind, inputs_only, trial.error)
     if "angle_rad" in trial.conditions:
-        check_values(
-            {"angle_rad": np.array([trial.conditions["angle_rad"]])}, schema, lambda m, c, _: trial.error(m, c)
-        )
+        held = {"angle_rad": np.array([trial.conditions["angle_rad"]])}
+        check_values(held, schema, lambda message, column, _: trial.error(message, column))
     check_values(trial.columns, schema, trial.error, threshold_us)
 
 

@@ -309,7 +309,6 @@ class _Urdf:
             wanted = "a finite number" if count == 1 else f"{count} finite numbers"
             raise self.error(f"expected {wanted} as {key} of <{element.tag}>, found {found}", name)
         if element.tag != "limit" and max(map(abs, values)) > LARGEST:
-            raise self.error(
-                f"expected {key} of <{element.tag}> below {LARGEST:g} in SI units, found {text!r:.40}", name
-            )
+            message = f"expected {key} of <{element.tag}> below {LARGEST:g} in SI units, found {text!r:.40}"
+            raise self.error(message, name)
         return values

@@ -131,9 +131,8 @@ class Model:
         return (self.rig.name, *(f"{e.name} of each trial" if e.each_trial else e.name for e in self.effects))
 
     def __repr__(self) -> str:
-        return (
-            f"Model {' + '.join(self.structure())}: {', '.join(f'{n} = {v:.4g}' for n, v in self.parameters().items())}"
-        )
+        values = ", ".join(f"{n} = {v:.4g}" for n, v in self.parameters().items())
+        return f"Model {' + '.join(self.structure())}: {values}"
 
     def _repr_html_(self) -> str:
         info = self.parameter_info()

@@ -144,9 +144,8 @@ def table_of_lines(
     body, rows = _body(lines, form)
     if len(body) < MIN_ROWS:
         row = int(rows[-1]) if len(rows) else form.first_row - 1
-        raise InputError(
-            f"expected at least {MIN_ROWS} rows of numbers, found {len(body)}", file=path, row=row, column=names[0]
-        )
+        message = f"expected at least {MIN_ROWS} rows of numbers, found {len(body)}"
+        raise InputError(message, file=path, row=row, column=names[0])
     places = [names.index(n) for n in chosen]
     values = _fast(body, form, places, len(names))
     if values is None:

@@ -65,10 +65,8 @@ class Gaussian:
         toward = ca.mtimes(self.covariance, slack.T)
         std = ca.sqrt(ca.fmax(ca.mtimes(slack, toward), 0.0) + LEAST)
         share, middle, spread = _between(*((None if e is None else (e - mean) / std) for e in (low, high)))
-        less = (1.0 - spread) / (std * std)
-        return share, Gaussian(
-            self.mean + toward * (middle / std), self.covariance - less * ca.mtimes(toward, toward.T)
-        )
+        covariance = self.covariance - (1.0 - spread) / (std * std) * ca.mtimes(toward, toward.T)
+        return share, Gaussian(self.mean + toward * (middle / std), covariance)
 
 
 def mixed(shares: list[Any], parts: list[Gaussian]) -> Gaussian:

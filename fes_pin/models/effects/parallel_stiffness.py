@@ -39,10 +39,8 @@ class ParallelStiffness(Effect):
         angles = next((measured[n] for n in ("angle_rad", "position", "length_m") if n in measured), None)
         if angles is None:
             return super().grids(measured)
-        return {
-            **super().grids(measured),
-            "rest_angle_rad": tuple(float(np.quantile(angles, q)) for q in (0.5, 0.0, 1.0)),
-        }
+        places = tuple(float(np.quantile(angles, q)) for q in (0.5, 0.0, 1.0))
+        return {**super().grids(measured), "rest_angle_rad": places}
 
     def limits(self, measured: Measured) -> Bounds:
         """The spring rests at an angle that the joint comes near; elsewhere it would be a constant torque."""

@@ -162,11 +162,8 @@ class Joint(Rig):
             position, rate = float(trial["position"][0]), first_rate(trial.time, trial["position"])
         if "velocity" in trial.columns:
             rate = float(trial["velocity"][0])
-        conditions = trial.conditions
-        return {
-            "initial_position": float(conditions.get("position0", position)),
-            "initial_velocity": float(conditions.get("velocity0", rate)),
-        }
+        position, rate = trial.conditions.get("position0", position), trial.conditions.get("velocity0", rate)
+        return {"initial_position": float(position), "initial_velocity": float(rate)}
 
     def is_driven(self, trials: Sequence[Trial]) -> bool:
         return any("effort" in t.columns and t.kind != IMPOSED for t in trials)
