@@ -4,6 +4,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+from identify.rigs import as_likely
 
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
@@ -93,8 +94,8 @@ def diagnosed(
         causes=causes,
         remainder=Remainder(unexplained, 1e-5 if unexplained else 0.4, "rate" if unexplained else None),
         absorbed=("sensor_offset",),
-        nominal=nominal,
-        extended=extended,
+        nominal=as_likely(nominal),
+        extended=as_likely(extended),
         nominal_error=(9.1, 9.8),
         extended_error=(1.8, None),
         ceiling_percent=1.7,
