@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar, copy_context
 from typing import TypeVar
 
+from numpy.linalg import LinAlgError
 from threadpoolctl import OpenBLASController, threadpool_limits
 
 from fes_pin.settings import threads
@@ -147,3 +148,18 @@ def check_limit() -> None:
     """
     if time.monotonic() > _END.get():
         raise OutOfTime
+
+
+def attempted(ask: Callable[[], Out], otherwise: Out, seconds: float | None = None) -> Out:
+    """Return what is asked; `otherwise` where time is over, or where it meets numbers that cannot be calculated with.
+
+    Parameters
+    ----------
+    seconds
+        Limit of time; by default that of the innermost `time_limit`.
+    """
+    try:
+        with time_limit(seconds_left() if seconds is None else seconds):
+            return ask()
+    except (ArithmeticError, LinAlgError, OutOfTime):
+        return otherwise

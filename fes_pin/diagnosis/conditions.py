@@ -15,14 +15,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Generic
 
-import numpy as np
-
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.misread import Misread, restated_trials, takes_most
 from fes_pin.infer.levels import PARAMETER_PENALTY, SEPARABLE
 from fes_pin.infer.search import F, M, Search, SearchResult
 from fes_pin.models.model import Model
-from fes_pin.workers import OutOfTime
+from fes_pin.workers import attempted
 
 
 @dataclass(frozen=True)
@@ -110,10 +108,7 @@ class Conditions(ABC, Generic[F, M]):
 
     def _misread(self, trials: Sequence[Trial], searched: SearchResult[F] | None) -> Misread | None:
         """Return a misreading; None where time is over, or where the model cannot be evaluated."""
-        try:
-            return self.misread(trials, searched)
-        except (OutOfTime, ArithmeticError, np.linalg.LinAlgError):
-            return None
+        return attempted(lambda: self.misread(trials, searched), None)
 
     def _restated(self, trials: Sequence[Trial], misread: Misread) -> Restated[F, M]:
         """Return a search of the restated trials, made again with the value by the causes that it finds."""

@@ -40,7 +40,7 @@ from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.rigs.base import Rig
-from fes_pin.workers import OutOfTime, Progress, noting_stops, one_thread_each, time_limit
+from fes_pin.workers import Progress, attempted, noting_stops, one_thread_each, time_limit
 
 LOOKED = 0.1
 """Share of a limit of time that the checks of the fitted nominal model may take in addition."""
@@ -201,11 +201,7 @@ def _low_passed(diagnosis: Diagnosis, end: float) -> Study | None:
     if not diagnosis.remainder.unexplained or diagnosis.is_driven or restated:
         return None
     nominal, study = diagnosis.nominal, diagnosis.study
-    try:
-        with time_limit(end - time.perf_counter()):
-            cutoff = low_pass_of(nominal.model, nominal.trials)
-    except (ArithmeticError, np.linalg.LinAlgError, OutOfTime):
-        return None
+    cutoff = attempted(lambda: low_pass_of(nominal.model, nominal.trials), None, end - time.perf_counter())
     log = Log(low_pass_hz=cutoff)
     return None if cutoff is None else replace(study, trials=tuple(log.applied(t) for t in study.trials))
 

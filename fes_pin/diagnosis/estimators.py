@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from fes_pin.data.schema import IMPOSED
 from fes_pin.diagnosis.decide.by_prediction import FEWEST, best_predicting
 from fes_pin.diagnosis.decide.rivals import not_excluded
 from fes_pin.diagnosis.errors_ahead import squared_errors
 from fes_pin.diagnosis.search.cause_sets import names_of
 from fes_pin.diagnosis.search.likelihood_fits import MEASUREMENT, PROCESS, WHITE
-from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodSearch, NominalFitError
+from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodModels, LikelihoodSearch
 from fes_pin.identify.likelihood_fit import LikelihoodFit, with_white_process_noise
 from fes_pin.identify.process_noise import step_s
 from fes_pin.infer.held_out import held_out_gain
 from fes_pin.infer.levels import NOTHING_PERCENT
 from fes_pin.infer.search import Policy
-from fes_pin.workers import OutOfTime, in_parallel, time_limit
+from fes_pin.workers import attempted, in_parallel
 
 WHITE_PROCESS_NOISE = (
     "process noise is modelled as white: with coloured process noise the same model predicted worse over the horizon"
@@ -33,14 +31,16 @@ def searched(search: LikelihoodSearch) -> tuple[LikelihoodSearch, Found]:
     found = search.run()
     if search.was_stopped or search.models.noise != MEASUREMENT:
         return search, found
-    try:
-        with time_limit(search.seconds_left):
-            acting = search.models.with_process_noise(found.best)
-    except (ArithmeticError, np.linalg.LinAlgError, OutOfTime):
-        return search, found
+    acting = attempted(lambda: search.models.with_process_noise(found.best), found.best, search.seconds_left)
     if not acting.criterion < found.best.criterion:
         return search, found
-    return _with_process_noise(search) or (search, found)
+    other = LikelihoodSearch(search.models.with_noise(PROCESS), search.progress)
+    return _ended(other, attempted(other.run, None, search.seconds_left)) or (search, found)
+
+
+def _ended(search: LikelihoodSearch, found: Found | None) -> tuple[LikelihoodSearch, Found] | None:
+    """Return a search with its result; None if it did not end."""
+    return None if found is None or search.was_stopped else (search, found)
 
 
 def least_error(search: LikelihoodSearch) -> tuple[LikelihoodSearch, Found] | None:
@@ -54,37 +54,21 @@ def least_error(search: LikelihoodSearch) -> tuple[LikelihoodSearch, Found] | No
     if search.models.answered or search.was_stopped:
         return None
     other = LikelihoodSearch(search.models.with_noise(WHITE), search.progress)
-    try:
-        with time_limit(search.seconds_left):
-            if len(search.models.trials) < FEWEST:
-                other.models.nominal()
-                return other, other.result(())
-            found = other.run()
-            return None if other.was_stopped else (other, other.result(best_predicting(other, names_of(found.best))))
-    except (ArithmeticError, np.linalg.LinAlgError, OutOfTime, NominalFitError):
-        return None
 
+    def chosen() -> Found:
+        if len(search.models.trials) < FEWEST:
+            other.models.nominal()
+            return other.result(())
+        return other.result(best_predicting(other, names_of(other.run().best)))
 
-def _with_process_noise(search: LikelihoodSearch) -> tuple[LikelihoodSearch, Found] | None:
-    """Search the same causes with process noise; return None if the search did not end."""
-    other = LikelihoodSearch(search.models.with_noise(PROCESS), search.progress)
-    try:
-        with time_limit(search.seconds_left):
-            found = other.run()
-    except (ArithmeticError, np.linalg.LinAlgError, OutOfTime, NominalFitError):
-        return None
-    return None if other.was_stopped else (other, found)
+    return _ended(other, attempted(chosen, None, search.seconds_left))
 
 
 def found_with_white_process_noise(search: LikelihoodSearch, found: Found) -> LikelihoodFit | None:
     """Return the best set fitted with white process noise; None where no coloured process noise acts."""
     if search.was_stopped or not search.models.answered or not _has_coloured_noise(found.best):
         return None
-    try:
-        with time_limit(search.seconds_left):
-            return with_white_process_noise(found.best)
-    except (ArithmeticError, np.linalg.LinAlgError, OutOfTime):
-        return None
+    return attempted(lambda: with_white_process_noise(found.best), None, search.seconds_left)
 
 
 def judged_again(search: LikelihoodSearch, found: Found, white: LikelihoodFit) -> tuple[LikelihoodSearch, Found] | None:
@@ -100,17 +84,17 @@ def judged_again(search: LikelihoodSearch, found: Found, white: LikelihoodFit) -
     white
         The fit of `found_with_white_process_noise`.
     """
-    try:
-        with time_limit(search.seconds_left):
-            if not _predicts_better(white, search, found):
-                return None
-            sets = search.models.begun_with([white, *_parts_and_rivals(found)])
-            again = LikelihoodSearch(sets, search.progress, Policy(given=names_of(white)))
-        with time_limit(search.seconds_left):
-            other = again.run()
-    except (ArithmeticError, np.linalg.LinAlgError, OutOfTime, NominalFitError):
+
+    def begun() -> LikelihoodModels | None:
+        if not _predicts_better(white, search, found):
+            return None
+        return search.models.begun_with([white, *_parts_and_rivals(found)])
+
+    sets = attempted(begun, None, search.seconds_left)
+    if sets is None:
         return None
-    return None if again.was_stopped else (again, other)
+    again = LikelihoodSearch(sets, search.progress, Policy(given=names_of(white)))
+    return _ended(again, attempted(again.run, None, search.seconds_left))
 
 
 def _predicts_better(white: LikelihoodFit, search: LikelihoodSearch, found: Found) -> bool:

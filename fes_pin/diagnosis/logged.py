@@ -8,8 +8,6 @@ from dataclasses import replace
 from functools import cached_property
 from typing import TypeVar
 
-import numpy as np
-
 from fes_pin.data.answered import ControllerAnswer
 from fes_pin.data.log import Log, answered
 from fes_pin.data.trial import Trial
@@ -27,7 +25,7 @@ from fes_pin.identify.effort_timing import (
 from fes_pin.identify.likelihood_fit import LikelihoodFit, maximum_from, with_white_process_noise
 from fes_pin.infer.levels import PARAMETER_PENALTY
 from fes_pin.models.model import Model
-from fes_pin.workers import OutOfTime, in_parallel, time_limit
+from fes_pin.workers import attempted, in_parallel
 
 T = TypeVar("T")
 
@@ -116,11 +114,7 @@ class LogFaults:
 
     def _in_time(self, ask: Callable[[], T], otherwise: T) -> T:
         """Return an estimate, or another value if it is not finite or time is over."""
-        try:
-            with time_limit(self._end - time.perf_counter()):
-                return ask()
-        except (ArithmeticError, np.linalg.LinAlgError, OutOfTime):
-            return otherwise
+        return attempted(ask, otherwise, self._end - time.perf_counter())
 
 
 def with_timing_of(log: Log, timed: Log) -> Log:

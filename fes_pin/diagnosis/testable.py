@@ -32,7 +32,7 @@ from fes_pin.models.catalogue import Catalogue, installed
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.simulate import simulated_trial
-from fes_pin.workers import OutOfTime, one_thread_each
+from fes_pin.workers import attempted, one_thread_each
 
 LONGEST_SHIFT = 0.25
 """Largest shift of a trial in time that is tried, either way, as a share of its length."""
@@ -112,12 +112,13 @@ def given_away(study: Study) -> list[str]:
     nominal, trials = _to_fit(study)
     if is_fed_back(nominal.rig, trials):
         return []
+
+    def of_fit() -> list[str]:
+        fitted = _fitted(nominal, trials)
+        return _given_away(nominal, trials, fitted) if math.isfinite(fitted.sse) else []
+
     with one_thread_each():
-        try:
-            fitted = _fitted(nominal, trials)
-            return _given_away(nominal, trials, fitted) if math.isfinite(fitted.sse) else []
-        except (ArithmeticError, np.linalg.LinAlgError, OutOfTime):
-            return []
+        return attempted(of_fit, [])
 
 
 def _given_away(model: Model, trials: Sequence[Trial], fitted: Fit) -> list[str]:

@@ -25,7 +25,7 @@ from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
 
 
-class NominalFitError(Exception):
+class NominalFitError(ArithmeticError):
     """Error for a study to which not even the nominal model can be fitted.
 
     Parameters
