@@ -51,7 +51,7 @@ class CaughtLeans(Leans):
         return "\n".join(lines)
 
 
-def modal_bound(linear: LinearBody, inputs, lag_s: float = 0.0, gravity: bool = True) -> np.ndarray:
+def modal_bound(linear: LinearBody, inputs, gravity: bool = True) -> np.ndarray:
     """Leans at rest beyond which no stimulation of these inputs catches a falling mode, were it the only one.
 
     Parameters
@@ -60,9 +60,6 @@ def modal_bound(linear: LinearBody, inputs, lag_s: float = 0.0, gravity: bool = 
         From `linearize`, at rest.
     inputs
         `Inputs`, `Nerves`, or names of joints.
-    lag_s
-        First-order lag of the torques behind the stimulation, s, for muscles that held the posture before: the bound
-        shrinks by 1 + rate lag, for the mode grows while they change.
     gravity
         Whether the posture's weight counts.
 
@@ -74,18 +71,16 @@ def modal_bound(linear: LinearBody, inputs, lag_s: float = 0.0, gravity: bool = 
     Raises
     ------
     InputError
-        Inputs that are none, or a lag that is negative.
+        Inputs that are none.
     """
     inputs = Inputs.of(inputs, linear)
-    if number(lag_s, "lag_s") < 0.0:
-        raise InputError(f"must not be negative, got {lag_s}", column="lag_s")
     found = linear.modes()
     fall = found.kinds == "fall"
     shapes, values = found.shapes[:, fall], found.values[fall]
     gains, constant = shapes.T @ inputs.on(linear), shapes.T @ linear.C * gravity
     least, most = (constant + push.sum(axis=1) for push in inputs.pushes(gains))
     share = np.maximum(np.column_stack([-least, most]), 0.0) / values[:, None]
-    return share / found.degree[fall, None] / (1.0 + np.sqrt(values) * lag_s)[:, None]
+    return share / found.degree[fall, None]
 
 
 def catchable(

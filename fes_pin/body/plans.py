@@ -53,8 +53,8 @@ class Plans:
         itself, as the null-controllable region has it.
     gravity
         Whether the posture's weight (C) must be carried; otherwise only deviations count, and no pressure is known.
-    pieces, pulse_s
-        How long each input is held, in pulses, and the time between pulses, s.
+    pieces
+        How long each input is held, in pulses.
     steady
         Whether one input is held for good: it must balance each fall where it is, whose lean is not limited, and
         swings are looked at where they have come to rest.
@@ -67,7 +67,6 @@ class Plans:
     rest_deg: float | None = None
     gravity: bool = True
     pieces: Sequence[int] = PIECES
-    pulse_s: float = PULSE_S
     steady: bool = False
 
     @classmethod
@@ -93,7 +92,7 @@ class Plans:
     @cached_property
     def _edges(self) -> tuple[np.ndarray, np.ndarray]:
         """Beginnings and ends of the pieces, s; the last has no end."""
-        ends = self.pulse_s * np.cumsum(self.pieces)
+        ends = PULSE_S * np.cumsum(self.pieces)
         return np.concatenate([[0.0], ends[:-1]]), np.append(ends[:-1], np.inf)
 
     @cached_property
@@ -104,7 +103,7 @@ class Plans:
         """
         times, which, start = [], [], 0.0
         for j, pulses in enumerate(self.pieces):
-            length = self.pulse_s * pulses
+            length = PULSE_S * pulses
             count = max(1, int(np.ceil(length / LOOK_S - 1e-9)))
             times += [start + length * k / count for k in range(count + 1)]
             which += [j] * (count + 1)

@@ -94,7 +94,7 @@ class Skeleton(ReadOnly):
         return float(sum(segment.mass for segment in self.segments.values()))
 
 
-_TO_WORLD = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+TO_WORLD = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 """OpenSim's axes (x forward, y up, z right) to ours (x forward, y left, z up)."""
 
 
@@ -134,13 +134,13 @@ def skeleton_of_table(table: Mapping) -> Skeleton:
         place = "ten_segments", f"{part}_{side}" if side in SIDES else name
         segments[name] = Segment(
             mass=float(_numbers(table, *place, "mass", ())),
-            com=_TO_WORLD @ _numbers(table, *place, "com_ground_neutral", (3,)),
-            inertia=_TO_WORLD @ _numbers(table, *place, "inertia_com", (3, 3)) @ _TO_WORLD.T,
+            com=TO_WORLD @ _numbers(table, *place, "com_ground_neutral", (3,)),
+            inertia=TO_WORLD @ _numbers(table, *place, "inertia_com", (3, 3)) @ TO_WORLD.T,
         )
     for joint in JOINTS:
         side, _, part = joint.name.partition("_")
         key = f"{part}_{side[0]}" if side in SIDES else "back"
-        centres[joint.name] = _TO_WORLD @ _numbers(table, "joints", key, "centre_neutral_ground", (3,))
+        centres[joint.name] = TO_WORLD @ _numbers(table, "joints", key, "centre_neutral_ground", (3,))
     return Skeleton(segments, centres, _foot_points(segments, centres))
 
 

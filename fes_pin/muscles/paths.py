@@ -252,15 +252,9 @@ class LegPaths(ReadOnly):
         return points
 
 
-@lru_cache(maxsize=4)
-def leg_paths(sizes: tuple[tuple[str, float], ...] = ()) -> LegPaths:
-    """The paths that ship with the package (tables/SOURCE.md).
-
-    Parameters
-    ----------
-    sizes
-        Factors on bodies, as pairs of name and factor; what is not named is the subject's own.
-    """
+@lru_cache(maxsize=1)
+def leg_paths() -> LegPaths:
+    """The paths that ship with the package (tables/SOURCE.md)."""
     rows = read_table("paths.csv")
     names = tuple(dict.fromkeys(row["muscle"] for row in rows))
     owner = [row["muscle"] for row in rows]
@@ -273,7 +267,7 @@ def leg_paths(sizes: tuple[tuple[str, float], ...] = ()) -> LegPaths:
         edges=tuple(_edges(rows)),
         kneecap=tuple(_kneecap(rows)),
         slide=(_slide("forward"), _slide("up")),
-        size={**dict.fromkeys((*BODIES, "talus"), 1.0), **dict(sizes)},
+        size=dict.fromkeys((*BODIES, "talus"), 1.0),
     )
 
 

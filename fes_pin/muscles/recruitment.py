@@ -74,24 +74,25 @@ class LinearRecruitment(ReadOnly):
         if (self.saturation_us <= self.threshold_us).any():
             raise InputError("a recruitment curve needs threshold_us < saturation_us")
 
-    def shape(self, x: np.ndarray) -> np.ndarray:
-        """Recruitment at the fraction x of the way from threshold to saturation."""
+    def shape(self, x: Any) -> Any:
+        """The curve at the fraction x of the way from threshold to saturation, not yet scaled to be 0 and 1 there."""
         return x
 
-    def inverse_shape(self, r: np.ndarray) -> np.ndarray:
-        """Fraction of the way at recruitment r."""
-        return r
+    def inverse_shape(self, y: Any) -> Any:
+        """Fraction of the way at which the curve is y."""
+        return y
 
     def recruitment(self, pulse_width_us) -> np.ndarray:
         """Recruitment, 0 to 1, at pulse widths in us."""
         x = (np.asarray(pulse_width_us, dtype=float) - self.threshold_us) / (self.saturation_us - self.threshold_us)
-        x = np.minimum(np.maximum(x, 0.0), 1.0)
-        return np.where(x <= 0.0, 0.0, np.where(x >= 1.0, 1.0, self.shape(x)))
+        x, low, high = np.minimum(np.maximum(x, 0.0), 1.0), self.shape(0.0), self.shape(1.0)
+        return np.where(x <= 0.0, 0.0, np.where(x >= 1.0, 1.0, (self.shape(x) - low) / (high - low)))
 
     def pulse_width_us(self, recruitment) -> np.ndarray:
         """Pulse width in us for a recruitment: 0 for 0 and below, saturation for 1 and above."""
-        r = np.minimum(np.maximum(recruitment, 0.0), 1.0)
-        width = self.threshold_us + self.inverse_shape(r) * (self.saturation_us - self.threshold_us)
+        r, low, high = np.minimum(np.maximum(recruitment, 0.0), 1.0), self.shape(0.0), self.shape(1.0)
+        way = self.inverse_shape(low + r * (high - low))
+        width = self.threshold_us + way * (self.saturation_us - self.threshold_us)
         width = np.where(r < 1.0, np.maximum(width, self.threshold_us), self.saturation_us)
         return (r > 0.0) * np.minimum(width, self.saturation_us)
 
@@ -109,64 +110,41 @@ class SaturatingRecruitment(LinearRecruitment):
 
     def shape(self, x):
         """See the class."""
-        return np.expm1(-self.curvature * x) / np.expm1(-self.curvature)
+        return np.expm1(-self.curvature * x)
 
-    def inverse_shape(self, r):
+    def inverse_shape(self, y):
         """See the class."""
-        return -np.log1p(r * np.expm1(-self.curvature)) / self.curvature
+        return -np.log1p(y) / self.curvature
 
 
 @dataclass(frozen=True, eq=False)
-class _Scaled(LinearRecruitment):
-    """A curve that rises, scaled to be 0 at threshold and 1 at saturation."""
-
-    def raw(self, x):
-        """The curve at the fraction x of the way."""
-        raise NotImplementedError
-
-    def inverse_raw(self, y):
-        """Fraction of the way at which the curve is y."""
-        raise NotImplementedError
-
-    def shape(self, x):
-        """See the class."""
-        low, high = self.raw(0.0), self.raw(1.0)
-        return (self.raw(x) - low) / (high - low)
-
-    def inverse_shape(self, r):
-        """See the class."""
-        low, high = self.raw(0.0), self.raw(1.0)
-        return self.inverse_raw(low + r * (high - low))
-
-
-@dataclass(frozen=True, eq=False)
-class SigmoidRecruitment(_Scaled):
+class SigmoidRecruitment(LinearRecruitment):
     """Logistic about `middle` (a fraction of the way), scaled to be 0 at threshold and 1 at saturation."""
 
     steepness: Any = 10.0
     middle: Any = 0.5
 
-    def raw(self, x):
+    def shape(self, x):
         """See the class."""
         return 1.0 / (1.0 + np.exp(-self.steepness * (x - self.middle)))
 
-    def inverse_raw(self, y):
+    def inverse_shape(self, y):
         """See the class."""
         return self.middle + np.log(y / (1.0 - y)) / self.steepness
 
 
 @dataclass(frozen=True, eq=False)
-class GompertzRecruitment(_Scaled):
+class GompertzRecruitment(LinearRecruitment):
     """Gompertz: slow start, slower end, `exp(-b exp(-k x))` scaled to be 0 at threshold and 1 at saturation."""
 
     delay: Any = 5.0
     growth: Any = 6.0
 
-    def raw(self, x):
+    def shape(self, x):
         """See the class."""
         return np.exp(-self.delay * np.exp(-self.growth * x))
 
-    def inverse_raw(self, y):
+    def inverse_shape(self, y):
         """See the class."""
         return -np.log(-np.log(y) / self.delay) / self.growth
 
@@ -188,10 +166,10 @@ class HillRecruitment(LinearRecruitment):
         power = x * np.maximum(x, STRAIGHT_BELOW) ** (n - 1.0)
         return bend * power / (1.0 + (bend - 1.0) * power)
 
-    def inverse_shape(self, r):
+    def inverse_shape(self, y):
         """See the class."""
         n, bend = np.exp(self.log_exponent), np.exp(self.log_bend)
-        power = r / (bend - (bend - 1.0) * r)
+        power = y / (bend - (bend - 1.0) * y)
         straight = power * STRAIGHT_BELOW ** (1.0 - n)
         return np.where(straight < STRAIGHT_BELOW, straight, power ** (1.0 / n))
 

@@ -11,12 +11,11 @@ import pinocchio as pin
 from fes_pin.body.build import GRAVITY, Body
 from fes_pin.body.gait import pelvis_turns, postures_of_walk
 from fes_pin.body.joints import JOINT_NAMES
+from fes_pin.body.skeleton import TO_WORLD
 from fes_pin.data.errors import InputError
 from fes_pin.data.motion import OPTIONAL, REQUIRED
 from fes_pin.data.smooth import CUTOFF_HZ, low_pass, rates
 
-TO_WORLD = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
-"""OpenSim's axes (x forward, y up, z right) to ours (x forward, y left, z up)."""
 PELVIS_TO_HIP = np.array([-0.0402431, -0.0376247, 0.0475290])
 """Right hip centre in OpenSim's pelvis, in standing heights: gait2354 scaled to an adult of 1.80 m."""
 _STEP = 1e-4

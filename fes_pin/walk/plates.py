@@ -10,9 +10,9 @@ import numpy as np
 from scipy.ndimage import distance_transform_edt
 
 from fes_pin.body.joints import SIDES
+from fes_pin.body.skeleton import TO_WORLD
 from fes_pin.data.errors import InputError
 from fes_pin.data.smooth import CUTOFF_HZ, low_pass
-from fes_pin.walk.motion import TO_WORLD
 
 LOADED_N = 20.0
 """A foot stands where its vertical force is above this: the usual threshold on instrumented treadmills."""

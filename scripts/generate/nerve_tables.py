@@ -13,6 +13,7 @@ import csv
 import math
 import os
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -80,7 +81,7 @@ def write(name: str, header: list[str], rows: list[list]) -> None:
 def growth() -> dict[str, float]:
     """How much longer each leg muscle is in the subject than in the unscaled model, at the neutral posture."""
     subject, neutral = leg_paths(), np.zeros((1, len(COORDINATES)))
-    unscaled = leg_paths(tuple((body, 1.0 / scale) for body, scale in SCALES.items()))
+    unscaled = replace(subject, size={**subject.size, **{body: 1.0 / scale for body, scale in SCALES.items()}})
     return dict(zip(subject.names, (subject.lengths(neutral) / unscaled.lengths(neutral))[0], strict=True))
 
 

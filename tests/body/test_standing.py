@@ -15,6 +15,7 @@ from fes_pin.body.gait import posture_names
 from fes_pin.body.ground import centre_of_pressure, ground_wrench, support
 from fes_pin.body.inputs import Inputs
 from fes_pin.body.linearize import linearize
+from fes_pin.body.plans import PULSE_S
 from fes_pin.data.errors import InputError
 
 ANKLE = "right_ankle_inversion"
@@ -135,12 +136,10 @@ def test_one_fall_alone_is_caught_up_to_the_modal_bound(pendulum):
     motor = Inputs.torques([ANKLE], limit_nm=30.0)
     found = catchable(pendulum, motor, settle_deg=40.0, balance=False, rest_deg=0.0)
     plans = plans_of(pendulum, motor, 40.0)
-    switch = plans.pulse_s * sum(plans.pieces[:-1])
+    switch = PULSE_S * sum(plans.pieces[:-1])
     share = 1.0 - np.exp(-np.sqrt(pendulum.modes().values[0]) * switch)
     assert found.lean_deg == pytest.approx(share * modal_bound(pendulum, motor), rel=1e-9)
     assert np.all(found.lean_deg < found.bound_deg)
-    rate = pendulum.modes()[0].rate
-    assert modal_bound(pendulum, motor, lag_s=0.05) == pytest.approx(found.bound_deg / (1.0 + 0.05 * rate))
 
 
 def test_beyond_the_modal_bound_a_full_effort_loses_and_below_it_wins(pendulum):
@@ -170,7 +169,7 @@ def test_a_plan_does_to_the_linear_body_what_it_says(two_links):
     torques = answer.x.reshape(len(plans.pieces), 2)
     block = np.zeros((6, 6))
     block[:4, :4], block[:4, 4:] = two_links.F, two_links.R
-    flow = linalg.expm(block * plans.pulse_s)
+    flow = linalg.expm(block * PULSE_S)
     x, inputs = np.r_[plans.modes.shapes @ eta, np.zeros(2)], motors.on(two_links)
     reached = []
     for pulses, u in zip(plans.pieces, torques, strict=True):
@@ -213,7 +212,6 @@ def test_bad_questions(two_links, body):
         (lambda: catchable(two_links, motors, settle_deg=np.inf), "settle_deg"),
         (lambda: catchable(two_links, motors, rest_deg=-1.0), "rest_deg"),
         (lambda: catchable(replace(two_links, E=np.eye(2)), motors), "without damping"),
-        (lambda: modal_bound(two_links, motors, lag_s=-1.0), "lag_s"),
         (lambda: close_the_loop(linearize(body, "standing"), motors, np.zeros(19)), "one foot only"),
         (lambda: close_the_loop(two_links, motors, np.zeros(2), seconds="long"), "seconds"),
         (lambda: close_the_loop(two_links, motors, {"left_knee_flexion": 0.1}), "left_knee_flexion is not among"),

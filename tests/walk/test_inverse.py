@@ -8,6 +8,7 @@ import pytest
 from yardsticks.walking import joint_torques, rooted_motion
 
 from fes_pin.body.build import Body
+from fes_pin.body.skeleton import TO_WORLD
 from fes_pin.data.errors import InputError
 from fes_pin.walk.dynamics import (
     about,
@@ -17,7 +18,7 @@ from fes_pin.walk.dynamics import (
     segment_poses,
     segment_regressors,
 )
-from fes_pin.walk.motion import PELVIS_TO_HIP, TO_WORLD, motion_of
+from fes_pin.walk.motion import PELVIS_TO_HIP, motion_of
 from fes_pin.walk.plates import plates_of, pressure_and_free_moment
 
 pytestmark = pytest.mark.shared
