@@ -107,6 +107,10 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
         """Return the converged fits."""
         return in_parallel(self.maxima.go_on, fits)
 
+    def under_noise_of(self, other: Grouped, fits: Sequence[Grouped]) -> list[Grouped]:
+        """First fits again, under the noise of another fit of the same trials."""
+        return in_parallel(lambda f: self.maxima.weighed_as(f, other), fits)
+
     def near(self, size: int, without: Sequence[Names] = ()) -> list[Names]:
         """Return the sets of a size near the best; after some that were not accepted, those that may be."""
         near = super().near(size, without)[: self.converged_sets]

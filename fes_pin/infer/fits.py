@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Generic, Self, TypeVar
 
 from fes_pin.infer.family import Family
-from fes_pin.infer.levels import CLAIM_LEVEL, SEPARABLE
+from fes_pin.infer.levels import CLAIM_LEVEL
 from fes_pin.infer.search import Fitted, Names
 
 F = TypeVar("F", bound=Fitted)
@@ -174,12 +174,23 @@ class FittedSets(ABC, Generic[F, S]):
         while slow := [n for n in self._hopeful(size, without) if n not in self._converged]:
             self._converge(slow)
 
-    def converge_rivals(self, base: Names, name: str) -> None:
-        """Fit the sets with another candidate of similar score in the place of one until they converge."""
-        gains = {n: c.gain for n, c in self.candidates(self.fits[base]).items()}
-        least = gains.get(name, math.inf) - SEPARABLE
-        rivals = [tuple(sorted((*base, n))) for n, gain in gains.items() if gain > least]
-        self._converge([n for n in rivals if n in self.fits and n not in self._converged])
+    def under_noise_of(self, other: F, fits: Sequence[F]) -> Sequence[F]:
+        """Return fits, with their parameters, under the noise of another fit of the same data."""
+        return fits
+
+    def converge_rivals(self, names: Names, name: str) -> None:
+        """Converge the sets that another candidate in the place of one brings near, by a further step under one noise.
+
+        Near is half of what the candidate itself explains. A first fit of a set is made under the noise of a smaller
+        set, which takes up what a candidate would explain: rivals of a converged set are compared under its noise.
+        """
+        rest, whole = tuple(n for n in names if n != name), self.fits[names]
+        rivals = [k for k in self.fits if len(k) == len(names) and set(rest) < set(k) and k not in self._converged]
+        if not rivals:
+            return
+        less, *fits = self.under_noise_of(whole, [self.fits[rest], *(self.fits[k] for k in rivals)])
+        half = 0.5 * (less.criterion + whole.criterion)
+        self._converge([k for k, f in zip(rivals, fits, strict=True) if f.criterion - self.step_gain(f) < half])
 
     def _converge(self, slow: Sequence[Names]) -> None:
         self.fits.update(zip(slow, self.converged([self.fits[n] for n in slow]), strict=True))

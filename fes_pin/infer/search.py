@@ -73,8 +73,8 @@ class Models(Protocol[F, M_co]):
     def converge(self, size: int, without: Sequence[Names] = ()) -> None:
         """Fit the best sets of a size until they converge, except some."""
 
-    def converge_rivals(self, base: Names, name: str) -> None:
-        """Fit the sets with another candidate of similar score in the place of one until they converge."""
+    def converge_rivals(self, names: Names, name: str) -> None:
+        """Converge the sets that have another candidate in the place of one, and come near under one noise."""
 
     def ranked(self, size: int) -> list[Names]:
         """Return the sets of a size, lowest criterion first; those that are physically impossible last."""
@@ -378,7 +378,7 @@ class Search(Generic[F, M]):
             rest = tuple(n for n in names if n != name)
             self._sets.without(names, name)
             self._sets.extend(rest, None if len(names) == 1 else self.policy.fitted)
-            self._sets.converge_rivals(rest, name)
+            self._sets.converge_rivals(names, name)
         return next(n for n in self._sets.ranked(len(names)) if n == names or self._may_be(n, rejected))
 
     def _may_be(self, names: Names, rejected: Iterable[str]) -> bool:

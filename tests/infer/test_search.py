@@ -53,7 +53,7 @@ class Models:
             names = tuple(sorted({*base, name}))
             self.fits.setdefault(names, self.fit(names))
 
-    def converge_rivals(self, base, name):
+    def converge_rivals(self, names, name):
         """All have converged."""
 
     def without(self, names, name):

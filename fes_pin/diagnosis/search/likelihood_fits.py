@@ -206,6 +206,10 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         """Return the converged fits."""
         return in_parallel(self._maxima.go_on, fits)
 
+    def under_noise_of(self, other: LikelihoodFit, fits: Sequence[LikelihoodFit]) -> list[LikelihoodFit]:
+        """Return fits, with their parameters, under the noise of another fit of the same trials."""
+        return in_parallel(lambda f: self._maxima.under_noise_of(other, f), fits)
+
     def step_gain(self, fitted: LikelihoodFit) -> float:
         """Return the gain of a further step of a fit by its slope and curvature; 0 where it has converged."""
         if fitted.gradient_norm < LITTLE or not math.isfinite(fitted.sse):

@@ -97,6 +97,12 @@ class LikelihoodMaxima:
         found = minimise(problem, start.parameters(), base.unknowns, SCREEN_ITERATIONS)
         return replace(fit_of(problem, found), together=base.together)
 
+    def under_noise_of(self, other: LikelihoodFit, fitted: LikelihoodFit) -> LikelihoodFit:
+        """Return a fit, with its parameters, under the noise of another fit."""
+        problem = LikelihoodProblem(fitted.model, self.trials, other.noise)
+        unknowns = completed(problem.start_unknowns(), fitted.unknowns)
+        return fit_of(problem, minimise(problem, fitted.values, unknowns, 0))
+
     def better(self, starts: Sequence[Model], base: LikelihoodFit, criterion: float) -> LikelihoodFit | None:
         """Return the best fit from some starts; None where none has a criterion below the given one.
 
