@@ -99,7 +99,7 @@ class AttainableTorques:
         return Nearest(self.columns @ r, r * self.upper, float(np.linalg.norm(self.columns @ r - wanted)))
 
     def contains(self, torque: Any) -> bool:
-        """Whether the torque is attainable, to 1e-6 N m."""
+        """Return whether the torque is attainable, to 1e-6 N m."""
         return self.nearest(torque).inside
 
     def share(self, torque: Any) -> float:

@@ -61,7 +61,7 @@ class Budget(Tabulated):
 
     @property
     def respected(self) -> bool:
-        """True if the muscle can do all of it."""
+        """Whether the muscle can do all of it."""
         return self.short_at_s == float("inf")
 
 

@@ -69,7 +69,7 @@ class Status(Enum):
 
     @property
     def is_fault(self) -> bool:
-        """True if pulses ramp down, or are off until `reset()`."""
+        """Whether pulses ramp down, or are off until `reset()`."""
         return self not in {Status.WAITING, Status.RUNNING}
 
     def __str__(self) -> str:

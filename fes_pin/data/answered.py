@@ -1,14 +1,14 @@
-"""A controller's effort predicted from its readings: the residual is the noise that the effort was recorded with.
+"""Prediction of a controller's effort from its readings: the residual is the noise that the effort was recorded with.
 
-A controller asks for an effort by what it reads, now and lately. While it keeps its ways, that is a linear function of
-each reading y, of its last difference, and of its distance from low passes P_i of it, with time constants of 1, 2, 4,
-8 ... samples, of which filtered rates and integrals are made; what is wanted comes in as a constant and a trend:
+A controller computes an effort from its present and past readings. As long as its law does not change, the effort is a
+linear function of each reading y, of its last difference, and of its difference to low passes P_i of it, with time
+constants of 1, 2, 4, 8 ... samples, which represent filtered rates and integrals. The reference enters as a constant
+and a trend:
 
     u_k = a + b k + c y_k + d (y_k - y_(k-1)) + sum e_i (y_k - P_i y_k)
 
-A trial is cut into short stretches, and neighbours are joined while they answer alike (Chow's test). Noise that the
-effort was recorded with is in no reading of the rig, and stays outside: over a long stretch the answer is the effort
-that acted.
+A trial is cut into short stretches, and neighbours are joined while they have the same coefficients (Chow's test). The
+noise of the recorded effort is in no reading of the rig: over a long stretch the prediction is the effort that acted.
 
 Source: Chow, Tests of equality between sets of coefficients in two linear regressions, Econometrica 28 (1960).
 """
@@ -25,14 +25,14 @@ from scipy.special import fdtrc
 LOW_PASSES = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
 """Time constants of the low passes, in samples: between two of them a filter is nearly a mean of both."""
 SHORTEST = 4
-"""Samples of a stretch at least, for each coefficient: enough to estimate the residual's size within a tenth or two."""
+"""Least samples of a stretch for each coefficient: enough to estimate the residual's size within a tenth or two."""
 APART_LEVEL = 0.01
-"""At which two stretches answer differently: one too many costs a few samples, one too few mixes two ways."""
+"""Level at which two stretches differ: one too many costs a few samples, one too few mixes two laws."""
 
 
 @dataclass(frozen=True)
 class ControllerAnswer:
-    """What a controller answers.
+    """The effort that a controller computes from its readings.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class ControllerAnswer:
     left_std
         Shape (n,), standard deviation of the residual of the effort, over the stretch about each sample.
     gains
-        Shape (n, readings, 2), by how much it changes with each reading as it is then, and as it was a sample before.
+        Shape (n, readings, 2), its derivatives by each reading at the same sample and at the sample before.
     """
 
     values: np.ndarray
@@ -49,7 +49,7 @@ class ControllerAnswer:
     gains: np.ndarray
 
     def quieted(self, effort: np.ndarray, noise: float) -> np.ndarray:
-        """The estimate of the effort that acted, shape (n,), from a recorded one with noise of this deviation.
+        """Return the estimate of the effort that acted, shape (n,), from a recorded one with noise of this deviation.
 
         The residual, of variance s^2, is noise and effort that the readings do not predict. The effort is a share
         1 - noise^2 / s^2 of the residual, as in Wiener's filter.
@@ -60,7 +60,7 @@ class ControllerAnswer:
 
 
 def answer_of(effort: np.ndarray, readings: Sequence[np.ndarray]) -> ControllerAnswer:
-    """The answer to some readings that an effort is.
+    """Predict an effort from readings.
 
     Parameters
     ----------
@@ -81,9 +81,10 @@ def answer_of(effort: np.ndarray, readings: Sequence[np.ndarray]) -> ControllerA
 
 
 def _columns(readings: Sequence[np.ndarray], n: int) -> tuple[np.ndarray, np.ndarray]:
-    """What an answer is a linear function of, each scaled to a deviation of 1, shape (n, coefficients).
+    """Return the regressors of an effort, each scaled to a deviation of 1, shape (n, coefficients).
 
-    And by how much each changes with each reading then and a sample before, shape (coefficients, readings, 2).
+    The second array has their derivatives by each reading at the same sample and at the one before, shape
+    (coefficients, readings, 2).
     """
     from scipy.signal import lfilter  # noqa: PLC0415 - half a second, for rigs that a controller drives
 
@@ -107,7 +108,7 @@ def _columns(readings: Sequence[np.ndarray], n: int) -> tuple[np.ndarray, np.nda
 
 
 def _stretches(rows: np.ndarray) -> Iterator[tuple[int, int, np.ndarray]]:
-    """Stretches that answer alike, first and behind the last sample of each, and the triangle R of its rows' QR."""
+    """Yield stretches with the same coefficients: first sample, end, and the triangle R of the QR of its rows."""
     width = rows.shape[1] - 1
     ends = np.linspace(0, len(rows), max(1, len(rows) // (SHORTEST * width)) + 1).astype(int)
     begin, now = 0, _triangle(rows[: ends[1]])
@@ -123,18 +124,18 @@ def _stretches(rows: np.ndarray) -> Iterator[tuple[int, int, np.ndarray]]:
 
 
 def _triangle(rows: np.ndarray) -> np.ndarray:
-    """R of the QR of rows, square: with rows of zeros where they are fewer than columns."""
+    """Return R of the QR of rows, square: with rows of zeros where there are fewer rows than columns."""
     missing = np.zeros((max(0, rows.shape[1] - len(rows)), rows.shape[1]))
     return np.asarray(np.linalg.qr(np.vstack([rows, missing]), mode="r"))
 
 
 def _missed(triangle: np.ndarray) -> float:
-    """Sum of squares that the last column's regression on the others leaves."""
+    """Return the residual sum of squares of the last column's regression on the others."""
     return float(triangle[-1, -1] ** 2)
 
 
 def _differ(apart: float, together: float, width: int, n: int) -> bool:
-    """Chow's test of what two stretches leave apart and together."""
+    """Return the result of Chow's test, from the residual sums of squares apart and together."""
     under = n - 2 * width
     if under < 1 or not together > apart:
         return False

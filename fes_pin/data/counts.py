@@ -5,20 +5,20 @@ from __future__ import annotations
 import numpy as np
 
 SAME = 0.1
-"""Share of the samples that read the same as the one before, from which a count is no less than the noise: below, what
-is read is as good as a number."""
+"""Share of equal neighbours above which a count is at least as large as the noise; below it, rounding to counts does
+not matter."""
 MOST = 2.0**53
-"""Counts that a reading may be away from its first: beyond, doubles hold no whole numbers."""
+"""Most counts between a reading and the first: doubles represent no larger whole numbers."""
 WHOLE = 0.1
 """Share of a count by which a reading may differ from a whole number of counts: files are rounded to some digits."""
 
 
 @np.errstate(all="ignore")
 def count_of(column: np.ndarray) -> float:
-    """What one count of a reading is, in its unit; 0.0 where it is not read in counts, or in counts below its noise.
+    """Return the size of one count of a reading; 0.0 where it is not read in counts, or in counts below its noise.
 
-    The count begins as the least difference of neighbours, and is made exact with ever larger differences: after each
-    the next are known to a whole number.
+    The estimate starts at the least difference of neighbours, and is refined with ever larger differences, each of
+    which determines the number of counts in the next.
 
     Parameters
     ----------
@@ -48,24 +48,24 @@ def count_of(column: np.ndarray) -> float:
 
 
 def begins_of_runs(column: np.ndarray) -> np.ndarray:
-    """Samples that differ from the one before, the first among them; what is missed differs from everything."""
+    """Return the samples that differ from the one before, the first among them; a missing one differs from all."""
     return np.flatnonzero(np.diff(column, prepend=np.nan) != 0.0)
 
 
 def lengths_of_runs(column: np.ndarray) -> np.ndarray:
-    """How many samples in a row have the value of each, shape (n,)."""
+    """Return the number of equal samples in a row at each sample, shape (n,)."""
     lengths = np.diff(np.append(begins_of_runs(column), len(column)))
     return np.repeat(lengths, lengths).astype(float)
 
 
 @np.errstate(all="ignore")
 def hunts(column: np.ndarray) -> np.ndarray:
-    """Samples of a reading that goes to and fro between two neighbouring counts, shape (n,).
+    """Return the samples of a reading that alternates between two neighbouring counts, shape (n,).
 
-    Rounding errs at random where a reading passes counts, and is heard as noise. Where it turns within each of two
-    counts in a row, what is read moves by a whole count and what is measured by less: by how much less no reading says,
-    and the error has the sign of the velocity, as dry friction has. Readings that turn once, as at the end of a swing,
-    or that rest, are not among them.
+    The rounding error is like noise where a reading passes many counts. Where a motion reverses within each of two
+    successive counts, the reading changes by a whole count and the motion by an unknown smaller amount. The error then
+    has the sign of the velocity, as dry friction has. Readings that reverse once, as at the end of a swing, or that
+    rest, do not belong to these.
 
     Source: Widrow, Kollar and Liu, Statistical theory of quantization, IEEE Trans. Instrumentation and Measurement 45
     (1996): errors are noise where what is measured is spread over more than a count.

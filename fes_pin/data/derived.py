@@ -1,4 +1,4 @@
-"""A velocity that was computed from positions, or measured by a sensor of its own."""
+"""Test whether a velocity was computed from positions, or measured by a sensor of its own."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
 
 TAPS = 20
-"""Samples on both sides by which a velocity is sought in positions: as long as filters of drives are."""
+"""Samples on both sides from which a velocity is predicted: as long as the filters of drives."""
 OWN = 0.5
-"""Share of a velocity's noise that is not that of positions, from which it is a reading. Of logged differences of
-positions, filtered or not, it is below 0.05, of a sensor's above 0.8 (`tests/data/test_derived.py`)."""
+"""Share of a velocity's noise that is not that of positions, above which it is a measurement. For logged differences of
+positions, filtered or not, it is below 0.05, for a sensor above 0.8 (`tests/data/test_derived.py`)."""
 
 
 def without_derived(trials: Sequence[Trial], position: str, velocity: str) -> tuple[list[Trial], list[str]]:
-    """Trials without a velocity that positions say all of, and what is to be said of it.
+    """Return trials without a velocity that was computed from positions, and a warning about it.
 
-    Its noise is that of positions: as a reading of its own it would count what they say twice.
+    Its noise is that of the positions: as a reading of its own it would count their information twice.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def without_derived(trials: Sequence[Trial], position: str, velocity: str) -> tu
 
 
 def own_share(position: np.ndarray, velocity: np.ndarray) -> float | None:
-    """Share of the power of a velocity's second differences, mostly noise, that no filter of positions explains.
+    """Return the share of a velocity's second differences, mostly noise, that no filter of positions explains.
 
     v''_t = sum_k b_k q''_(t + k),  k = -TAPS ... TAPS; None for a record that is too short to decide.
 

@@ -225,7 +225,7 @@ def _imposed(study: Study | ToPredict) -> Iterable[str]:
 
 
 def _is_clipped(trial: Trial, name: str) -> bool:
-    """True if a column stays at an extreme far more often than it stays elsewhere."""
+    """Return whether a column stays at an extreme far more often than it stays elsewhere."""
     values = trial[name]
     still = np.diff(values) == 0.0
     for extreme in (values.max(), values.min()):
@@ -239,7 +239,7 @@ def _is_clipped(trial: Trial, name: str) -> bool:
 
 
 def _is_counted(trial: Trial, name: str) -> bool:
-    """True if a column takes many values, all of them whole."""
+    """Return whether a column takes many values, all of them whole."""
     values = trial[name]
     return bool((values == np.rint(values)).all()) and len(np.unique(values)) > COUNTS
 

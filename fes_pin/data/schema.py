@@ -347,7 +347,7 @@ def unread(name: str, known: Iterable[str]) -> str:
 
 
 def is_like(name: str, known: Iterable[str], cutoff: float = 0.8) -> bool:
-    """Whether an unknown name is another unit or a likely typo of a known one."""
+    """Return whether an unknown name is another unit or a likely typo of a known one."""
     known = list(known)
     same = any(without_unit(name) == without_unit(each) for each in known)
     return same or bool(get_close_matches(name.lower(), known, n=1, cutoff=cutoff))

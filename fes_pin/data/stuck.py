@@ -55,7 +55,7 @@ def _usual(values: np.ndarray, moving: Sequence[slice], order: int) -> float:
 
 
 def _at_once(values: np.ndarray, stretch: slice, steps: float, turns: float) -> bool:
-    """True if a reading stops in full motion, or goes on with a leap."""
+    """Return whether a reading stops in full motion, or goes on with a leap."""
     into = abs(values[stretch.start] - values[stretch.start - 1]) if stretch.start else 0.0
     leap = abs(values[stretch.stop] - values[stretch.stop - 1]) if stretch.stop < len(values) else 0.0
     return bool(into > AT_ONCE * turns or leap > AT_ONCE * steps)
@@ -69,13 +69,13 @@ def _stretches(count: int, without: Sequence[slice]) -> list[slice]:
 
 
 def _come_by_chance(runs: np.ndarray) -> bool:
-    """True if the longest of some runs is as long as noise makes one, by the share of equal neighbours."""
+    """Return whether the longest of some runs is as long as noise makes one, by the share of equal neighbours."""
     equal = 1.0 - len(runs) / runs.sum()
     return bool(runs.sum() * equal ** (runs.max() - 1) > BY_CHANCE)
 
 
 def _is_noisy(values: np.ndarray, moving: Sequence[slice]) -> bool:
-    """True if white noise above the step of its digits is in a reading wherever it moves."""
+    """Return whether white noise above the step of its digits is in a reading wherever it moves."""
     fourth = [np.convolve(values[s], FOURTH, "valid") for s in moving if s.stop - s.start > FEW]
     if not fourth:
         return False

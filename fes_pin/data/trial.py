@@ -144,7 +144,7 @@ class Trial(ReadOnly):
 
     @property
     def is_edited(self) -> bool:
-        """True if its numbers are not those of the files that it was read from."""
+        """Whether its numbers are not those of the files that it was read from."""
         return self.as_read is not None and self.as_read.digest != self.digest()
 
     def digest(self) -> bytes:

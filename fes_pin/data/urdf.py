@@ -59,7 +59,7 @@ def moving_joints(path: str | Path) -> list[tuple[str, str]]:
 
 
 def is_revolute(path: str | Path | None) -> bool | None:
-    """Whether the joints that move turn (True) or slide (False); None where some do either, or there is no file.
+    """Return whether the joints that move turn (True) or slide (False); None where some do either, or there is no file.
 
     Raises
     ------
@@ -129,7 +129,7 @@ def inertia_matrix(moments: Iterable[float]) -> np.ndarray:
 
 
 def is_possible(principal: np.ndarray) -> bool:
-    """Whether a body can have these principal moments, in ascending order, but for rounding."""
+    """Return whether a body can have these principal moments, in ascending order, but for rounding."""
     return bool(principal[0] >= -1e-9 * abs(principal).max())
 
 

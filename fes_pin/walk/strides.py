@@ -102,7 +102,7 @@ def strides_of(trials: Sequence[WalkTrial], cutoff_hz: float) -> Strides:
 
 
 def _steps(time: np.ndarray, plates: Plates) -> bool:
-    """Whether contacts determine a stride's length: two of a foot, or one of each."""
+    """Return whether contacts determine a stride's length: two of a foot, or one of each."""
     counts = [len(_contacts(time, plates.loaded[side])) for side in SIDES]
     return max(counts) > 1 or min(counts) > 0
 

@@ -40,7 +40,7 @@ UNREADABLE = {
 
 
 def is_text(path: Path) -> bool:
-    """Whether a file is read as text, by its suffix."""
+    """Return whether a file is read as text, by its suffix."""
     return path.suffix.lower() not in {*_READERS, *UNREADABLE}
 
 
