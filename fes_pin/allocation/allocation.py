@@ -1,4 +1,4 @@
-"""What an allocation says: pulse widths, what torque they make, what is short, why, and the proof."""
+"""The result of an allocation: pulse widths, their torque, what is short and why, and the proof."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ WORTH_NAMING = 0.1
 
 
 class ByName(OfProblem):
-    """What results say by name; they hold a `problem`, pulse widths (..., n) us and torques (..., joints) N m."""
+    """Results by name; they hold a `problem`, pulse widths (..., n) us and torques (..., joints) N m."""
 
     pulse_width_us: np.ndarray
     achieved: np.ndarray
@@ -117,11 +117,11 @@ class Allocation(ByName, ReadOnly):
 
     @property
     def active(self) -> dict[str, str]:
-        """What holds each channel at a limit: `off`, `saturated`, `rising`, `falling`, `least`, `dead`, `limited`."""
+        """The limit of each channel: `off`, `saturated`, `rising`, `falling`, `least`, `dead`, `limited`."""
         return {name: word for i, name in enumerate(self.names) if (word := self.limit(i))}
 
     def limit(self, i: int) -> str:
-        """What holds channel i, empty if nothing does."""
+        """Return the limit that holds channel i; empty if none does."""
         r, problem = self.recruitment[i], self.problem
         if problem.upper[i] == 0.0 or not problem.matrix[:, i].any():
             return "dead"
@@ -147,7 +147,7 @@ class Allocation(ByName, ReadOnly):
         return f"{joint} {abs(short):.1f} N m {word}: {self.cause(j, np.sign(short))}"
 
     def cause(self, j: int, direction: float) -> str:
-        """What keeps joint j from more torque in a direction."""
+        """Return the reasons why joint j has no more torque in a direction."""
         problem = self.problem
         help_ = problem.nominal[j] * direction
         by_name = [name.replace("_", " ") for name in self.names]
@@ -167,7 +167,7 @@ class Allocation(ByName, ReadOnly):
         return self.conflict(j, int(np.argmax(help_)), by_name)
 
     def conflict(self, j: int, i: int, by_name: list[str]) -> str:
-        """What a little more of channel i, which would help joint j, would spoil."""
+        """Return what more of channel i, which would help joint j, makes worse."""
         problem = self.problem
         if problem.least is not None and self.recruitment[i] == 0.0:
             return f"{by_name[i]} off: its least recruitment would be too much"
@@ -222,7 +222,7 @@ class Allocation(ByName, ReadOnly):
         }
 
     def band_lines(self) -> list[str]:
-        """What these pulse widths make of the wanted torques if the muscles are weaker or stronger than assumed."""
+        """Return the torques of these pulse widths if the muscles are weaker or stronger than assumed."""
         low, high = self.achieved_band
         shown = [j for j in range(len(self.joints)) if self.wanted[j] and abs(self.achieved[j]) >= REPORTED_NM]
         weak, strong = self.problem.band

@@ -25,13 +25,13 @@ PRECISE = 1e-14
 """Residual, of `lone_steps`, up to which an answer is taken as it is: 50 units of rounding."""
 
 UPPER, LOWER = 1, 3
-"""What DAQP calls a limit that holds."""
+"""Flag of DAQP for an active limit."""
 
 
 def lone_steps(
     slope: np.ndarray, r: np.ndarray, lower: np.ndarray, upper: np.ndarray, curvature: np.ndarray
 ) -> np.ndarray:
-    """How far each channel alone would move within its limits, (...) the farthest: 0 exactly at the optimum."""
+    """Return the largest move of any channel alone within its limits, (...): 0 exactly at the optimum."""
     far = np.minimum(np.maximum(slope / -curvature, lower - r), upper - r)
     return np.maximum.reduce(np.abs(far), -1)
 

@@ -17,7 +17,7 @@ NOTHING = 1e-12
 
 @dataclass(frozen=True, slots=True)
 class Certificate:
-    """How far an allocation is from optimal, in the program divided by its `scale` (N m)^2.
+    """Distance of an allocation from the optimum, in the program divided by its `scale` (N m)^2.
 
     Attributes
     ----------

@@ -14,11 +14,11 @@ import numpy as np
 from fes_pin.allocation.bounded import solve_once
 
 BINARY = 16
-"""What DAQP calls a constraint that holds at one of its two limits."""
+"""Flag of DAQP for a constraint that is active at one of its two limits."""
 CURVATURE = 1e-3
 """Of the strongest channel's: less makes the factorization lose digits, more makes the relaxation less tight."""
 FEASIBLE = 1e-9
-"""How far DAQP lets a binary variable be from 0 or 1."""
+"""Tolerance of DAQP on a binary variable."""
 ENDED, STOPPED = 1, 5
 WITHOUT_LIMIT = 1e30
 

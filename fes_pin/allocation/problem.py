@@ -1,4 +1,4 @@
-"""What an allocation is asked: channels and their moment arms, what torque and effort are worth, limits."""
+"""The problem of an allocation: channels and their moment arms, weights of torque and effort, limits."""
 
 from __future__ import annotations
 
@@ -167,7 +167,7 @@ class AllocationProblem(ReadOnly):
 
     @property
     def pull(self) -> np.ndarray:
-        """What a wanted torque adds to the slope over recruitment, (joints, n): `torque @ pull`."""
+        """Derivative of the slope over recruitment by a wanted torque, (joints, n): `torque @ pull`."""
         return -self.weights[:, None] * self.matrix / self.scale
 
     @property

@@ -1,4 +1,4 @@
-"""What constant stimulation within its bounds can hold: the posture itself, and a lean in each falling mode.
+"""Postures that constant stimulation within its bounds can hold: the posture itself, and a lean in each falling mode.
 
 A constant input holds a lean where it balances gravity in every falling mode. Inputs that change in time catch more
 (see `fes_pin.body.catchable`); what is here says what can be held for as long as the muscles last.
@@ -60,7 +60,7 @@ class Leans(Tabulated):
 
 @dataclass(frozen=True, eq=False)
 class HeldLeans(Leans):
-    """What inputs within their bounds can hold; see `Leans`.
+    """Return the leans that inputs within their bounds can hold; see `Leans`.
 
     Each lean is the greatest, with every other fall balanced, that inputs can still hold against gravity. No constant
     input holds a greater one; inputs that change in time may catch it (`fes_pin.body.catchable`).
@@ -100,7 +100,7 @@ def attainable(
     settle_deg: float = SETTLE_DEG,
     balance: bool = True,
 ) -> HeldLeans:
-    """What constant inputs can hold, by linear programs.
+    """Return the leans that constant inputs can hold, by linear programs.
 
     Parameters
     ----------

@@ -94,7 +94,7 @@ def balance(linear: LinearBody, found: ModeSet) -> GroundRows:
 
 
 def place_of_weight(linear: LinearBody) -> tuple[float, str]:
-    """How far the weight of the posture at rest lies outside the soles, m (negative inside), and a line that says it.
+    """Return the distance of the weight at rest from the soles, m (negative inside), and a line that states it.
 
     An instant of a walk is not a posture to stand in: there the weight may lie outside, and the next step catches it.
     """

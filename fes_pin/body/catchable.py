@@ -1,4 +1,4 @@
-"""What inputs that change in time can catch: the null-controllable region of the linear body under bounded inputs.
+"""Null-controllable region of the linear body under bounded inputs that change in time.
 
 The starts that bounded inputs can catch are a convex set: the growing parts of the falling modes that an integral of
 bounded inputs meets (T. Hu, Z. Lin, L. Qiu, "Stabilization of exponentially unstable linear systems with saturating

@@ -29,7 +29,7 @@ SAME_POLE = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class ModalControllability(Tabulated):
-    """What a set of inputs can do with the modes of a body.
+    """Controllability of the modes of a body by a set of inputs.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""How two feet share the ground's wrench: each foot's own centre of pressure lies on its own sole.
+"""Sharing of the ground's wrench by two feet, each with its centre of pressure on its own sole.
 
 The whole wrench follows from the motion; what the second foot takes of it are the multipliers of the loop that the two
 feet close, J g'' = 0 in A g'' - B g - C = D + J' l, linear in deviations and torques:

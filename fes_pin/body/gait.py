@@ -86,7 +86,7 @@ def ankle_angles(rotation: np.ndarray, side: str) -> tuple[np.ndarray, np.ndarra
 
 
 def _sign(side: str) -> float:
-    """What turns about forward and upright axes are multiplied by: they are mirrored on the left."""
+    """Return the sign of rotations about forward and upright axes: they are mirrored on the left."""
     return 1.0 if side == "right" else -1.0
 
 

@@ -1,4 +1,4 @@
-"""What the feet stand on: the area that carries the body, the centre of pressure in it, and a second foot.
+"""Ground contact: the area that carries the body, the centre of pressure in it, and a second foot.
 
 The ground can push, not pull: the centre of pressure lies within the convex hull of the soles, and each foot's own
 within its own sole (see `fes_pin.body.each_foot`). The total wrench of the
@@ -55,7 +55,7 @@ class SupportPolygon(ReadOnly):
         return rows
 
     def outside(self, point: np.ndarray) -> float:
-        """How far a point (2,) m lies outside the area; negative inside: m."""
+        """Return the distance of a point (2,) m from the area, m; negative inside."""
         a, edges = self.corners, np.roll(self.corners, -1, axis=0) - self.corners
         along = np.clip(((point - a) * edges).sum(axis=1) / (edges**2).sum(axis=1), 0.0, 1.0)
         distance = float(np.linalg.norm(point - a - along[:, None] * edges, axis=1).min())
@@ -90,7 +90,7 @@ class Wrench(ReadOnly):
         )
 
     def __sub__(self, other: Wrench) -> Wrench:
-        """What another wrench leaves of this one."""
+        """Return this wrench minus another one."""
         return Wrench(*(getattr(self, each.name) - getattr(other, each.name) for each in fields(self)))
 
 
@@ -122,13 +122,13 @@ def ground_wrench(body: Body, model: pin.Model, q: np.ndarray) -> Wrench:
 
 
 def centre_of_pressure(wrench: np.ndarray) -> np.ndarray:
-    """Where a wrench (6,) acts in the plane of the foot: (2,) m."""
+    """Return the point at which a wrench (6,) acts in the plane of the foot: (2,) m."""
     return np.array([-wrench[4], wrench[3]]) / wrench[2]
 
 
 @dataclass(frozen=True)
 class _Foot:
-    """Where a foot is: rotation from the upright, its point under the MTP joint (3,) m, its length, m."""
+    """The pose of a foot: rotation from the upright, its point under the MTP joint (3,) m, its length, m."""
 
     turn: np.ndarray
     place: np.ndarray
@@ -193,7 +193,7 @@ def support(body: Body, q: np.ndarray, heels: dict[str, bool], sides: Sequence[s
 
 @dataclass(frozen=True)
 class SecondFoot:
-    """What a second foot on the ground does to a linearized body.
+    """Effect of a second foot on the ground on a linearized body.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What may act on the joints: torques, muscles or nerves, each a column of joint torques with bounds."""
+"""Inputs on the joints: torques, muscles or nerves, each a column of joint torques with bounds."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ class Inputs(ReadOnly):
         return matrix
 
     def pushes(self, gains: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """How far each input within its bounds pushes downwards and upwards, by gains (rows, n_inputs): same shape."""
+        """Return least and largest effect of each input within its bounds, by gains (rows, n_inputs): same shape."""
         with np.errstate(invalid="ignore"):  # a gain of 0 times no bound
             ends = np.nan_to_num([gains * self.lower, gains * self.upper], nan=0.0, posinf=np.inf, neginf=-np.inf)
         return ends.min(axis=0), ends.max(axis=0)

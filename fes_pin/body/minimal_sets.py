@@ -41,7 +41,7 @@ MOST_SETS = 64
 """Sets of the smallest size that are compared by price; where there are more, the answer says so (ours: a search of
 minutes)."""
 STIMULATIONS = ("over_time", "constant")
-"""How a set may be stimulated: in any course within the bounds, or constantly."""
+"""Kinds of stimulation of a set: any course within the bounds, or constant."""
 
 
 @dataclass(frozen=True)
@@ -184,7 +184,7 @@ def minimal_sets(
 
 
 def pareto(sets: Iterable[MinimalSet]) -> list[MinimalSet]:
-    """Of many sets those that no other beats in nerves and braces both; the cheapest of equals."""
+    """Return the sets that no other beats in both nerves and braces; of equal ones the cheapest."""
     best: dict[int, MinimalSet] = {}
     for found in sorted(sets, key=lambda s: (len(s.braces), len(s.inputs), s.energy)):
         best.setdefault(len(found.braces), found)
@@ -205,7 +205,7 @@ def _orthoses(braces: Iterable[str] | Mapping[str, Sequence[str]]) -> dict[str, 
 
 @dataclass(frozen=True)
 class _Question:
-    """What is asked of a set."""
+    """Requirements on a set."""
 
     lean_deg: float
     together: bool

@@ -27,14 +27,14 @@ from fes_pin.data.tabulated import Tabulated
 NOISE_DEG, RATE_HZ, LOOK_S = 0.5, 200.0, 0.3
 """Noise of a good flexible goniometer, degrees; its sampling, Hz; the time that a fall leaves for a look, s (ours)."""
 PRIOR_DEG = 10.0
-"""What is known without sensors: within the linear model's reach, degrees (`fes_pin.body.plans.SETTLE_DEG`)."""
+"""Prior knowledge without sensors, degrees: within the linear model's reach (`fes_pin.body.plans.SETTLE_DEG`)."""
 
 _SETS_AT_ONCE = 20000
 
 
 @dataclass(frozen=True, eq=False)
 class ModalObservability(Tabulated):
-    """What goniometers at some joints see.
+    """Observability of a body by goniometers at some joints.
 
     Parameters
     ----------

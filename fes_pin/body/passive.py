@@ -18,7 +18,7 @@ from fes_pin.data.read_only import ReadOnly
 
 
 class Passive(Protocol):
-    """What the linearization asks of passive joints."""
+    """The interface of passive joints to the linearization."""
 
     def torque(self, q: np.ndarray, names: Sequence[str]) -> np.ndarray:
         """Passive torque at rest: (19,) N m."""
@@ -89,7 +89,7 @@ _TERMS = (
 _OFFSETS = {"hip_flexion": 8.072, "knee_flexion": -4.820, "ankle_dorsiflexion": 1.792}
 _DEGREE = 180.0 / np.pi
 MOST_PASSIVE = 100.0
-"""No leg is so much stiffer than a healthy one (ours): contractures are some times as stiff."""
+"""Limit of stiffness, in multiples of a healthy leg's (ours): contractures are a few times as stiff."""
 
 
 @dataclass(frozen=True, eq=False)

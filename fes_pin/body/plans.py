@@ -41,7 +41,7 @@ millimetre outside the soles as much as the whole of it."""
 
 @dataclass(frozen=True)
 class Plans:
-    """What a plan of inputs does to the modes: rows over the inputs of all pieces, one after the other.
+    """Effect of a plan of inputs on the modes: rows over the inputs of all pieces, one after the other.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ class Plans:
 
     @cached_property
     def _responses(self) -> np.ndarray:
-        """Of each mode's coordinate at each look to a unit of force in each piece: (r, looks, pieces)."""
+        """Return the response of each mode at each look to a unit force in each piece: (r, looks, pieces)."""
         times, _ = self._looks
         begin, end = self._edges
         since, until = times[:, None] - begin, times[:, None] - end
@@ -147,7 +147,7 @@ class Plans:
 
     @cached_property
     def _courses(self) -> np.ndarray:
-        """Of each mode's coordinate at each look, when nothing acts, per unit of its start and rate: (r, looks, 2).
+        """Return each mode's coordinate at each look without inputs, per unit of its start and rate: (r, looks, 2).
 
         Of a falling mode only the decaying part: the growing one is what the plan must meet. Of a drift nothing.
         """
@@ -211,7 +211,7 @@ class Plans:
 
     @cached_property
     def _musts(self) -> np.ndarray:
-        """Where each falling mode's growing part may start, over all inputs, in degrees: (k, m pieces)."""
+        """Return the start of each falling mode's growing part, over all inputs, in degrees: (k, m pieces)."""
         fall = np.flatnonzero(self.modes.kinds == "fall")
         spread = [self._spread(i, row[None]) / self.modes.degree[i] for i, row in zip(fall, self._starts, strict=True)]
         return np.vstack([np.zeros((0, self.inputs.n * len(self.pieces))), *spread])

@@ -15,7 +15,7 @@ import numpy as np
 from scipy import optimize, sparse
 
 FEASIBLE = 1e-7
-"""By how much HiGHS lets an answer miss its constraints."""
+"""Tolerance of HiGHS on constraints."""
 _UNIT = float(np.finfo(float).eps)
 
 
@@ -100,7 +100,7 @@ class LinearProgram:
 
 @dataclass(frozen=True)
 class ProgramAnswer:
-    """What a linear program gave: x, or None where there is none, and the error of its cost."""
+    """Result of a linear program: x, or None where there is none, and the error of its cost."""
 
     x: np.ndarray | None
     error: float

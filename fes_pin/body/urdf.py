@@ -65,7 +65,7 @@ def tree(stance: str) -> Iterator[tuple[BodyJoint, str, str]]:
 
 
 def origin_of(segment: str, skeleton: Skeleton, stance: str) -> np.ndarray:
-    """Where a segment's link frame lies in the neutral posture: at the joint towards the ground, (3,) m."""
+    """Return the origin of a segment's link frame in the neutral posture: at the joint towards the ground, (3,) m."""
     if segment == f"{stance}_forefoot":
         return skeleton.centres[f"{stance}_mtp"] * [1.0, 1.0, 0.0]
     return next(skeleton.centres[joint.name] for joint, _, child in tree(stance) if child == segment)
@@ -137,7 +137,7 @@ def _bone(a: np.ndarray, b: np.ndarray, radius: float, colour: str) -> list[tupl
 
 
 def shapes_of(name: str, skeleton: Skeleton) -> list[tuple]:
-    """What a segment looks like: (kind, size m, centre m, roll-pitch-yaw rad, colour) in neutral world axes."""
+    """Return the shape of a segment: (kind, size m, centre m, roll-pitch-yaw rad, colour) in neutral world axes."""
     c, p = skeleton.centres, skeleton.points
     side, _, part = name.partition("_")
     leg = float(np.linalg.norm(c["left_hip"] - c["left_knee"]))

@@ -78,7 +78,7 @@ def modes(
     goniometers: Annotated[bool, typer.Option("--goniometers", help="also the fewest that see every fall")] = False,
     doubt: Annotated[float, typer.Option(help="with --goniometers: greatest uncertainty of a fall, degrees")] = 1.0,
 ) -> None:
-    """How the body falls and swings at a posture: the eigenpairs of A^-1 B."""
+    """Show how the body falls and swings at a posture: the eigenpairs of A^-1 B."""
     from fes_pin.body.balance import place_of_weight
 
     lines = [f"{linear}\n{place_of_weight(linear)[1]}\n\n{linear.modes()}"]

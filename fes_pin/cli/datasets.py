@@ -34,7 +34,7 @@ def datasets(
 
 
 def _where(name: str) -> str:
-    """Where a data set lies on this machine; "" where it does not."""
+    """Return the folder of a data set on this machine; "" without one."""
     from fes_pin.body.measured_walk import data_folder
     from fes_pin.data.datasets import WALKING_NAME, fetch
     from fes_pin.data.errors import InputError

@@ -1,4 +1,4 @@
-"""What all commands share: help, what options need, and bad input as one line on standard error and exit code 2."""
+"""Parts of all commands: help, needs of options, and bad input as one line on standard error and exit code 2."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from fes_pin.data.errors import InputError
 from fes_pin.data.read_files import one_command
 
 USAGE_ERROR: Any = next(kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "ClickException")
-"""What typer raises for a command line that it cannot read; it exports only classes below this one."""
+"""Error of typer for a command line that it cannot read; it exports only subclasses of this one."""
 
 VOICE: ContextVar[int] = ContextVar("VOICE", default=0)
-"""How much is said besides the answer: -1 with --quiet, 1 with --verbose."""
+"""Level of messages in addition to the answer: -1 with --quiet, 1 with --verbose."""
 F = TypeVar("F", bound=Callable[..., Any])
 
 
@@ -192,7 +192,7 @@ def _check_needs(ctx: typer.Context, words: Mapping[str, str], rules: Mapping[st
 
 
 def _word(one: Any) -> str:
-    """What a person writes for a parameter: its option, or the name of an argument in capitals."""
+    """Return the name of a parameter on the command line: its option, or an argument in capitals."""
     return max(one.opts, key=len) if one.param_type_name == "option" else one.name.upper()
 
 

@@ -182,7 +182,7 @@ def _folder(files: list[Path], out: Path | None, force: bool) -> Path:
 
 
 def _schema(rig: str | None, catalogue: Catalogue, urdf: Path | None, of_rigs: Sequence[object]) -> RigSchema:
-    """What is known of the rig, whose URDF is there where it needs one; walking takes no options `of_rigs`."""
+    """Return the numbers of the rig, with its URDF where it needs one; walking takes no options `of_rigs`."""
     from fes_pin.data.schema import known_rigs, one_of
 
     rigs = known_rigs(catalogue.schemas())

@@ -1,4 +1,4 @@
-"""What several commands share: the library that is asked for, whose code runs, a progress bar."""
+"""Parts of several commands: the library that is asked for, whose code runs, a progress bar."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def catalogue_with(library: list[str] | None) -> Catalogue:
-    """What is known, with the causes and rigs of `--library`."""
+    """Return the catalogue with the causes and rigs of `--library`."""
     from fes_pin.models.catalogue import load_library
 
     return load_library(*(library or []))

@@ -1,4 +1,4 @@
-"""What a caller hands in as an angle: checked once, with one line that says what was expected."""
+"""Checks of angles from a caller, with one line that says what was expected."""
 
 from __future__ import annotations
 

@@ -317,7 +317,7 @@ class PositionController:
             self.risen = 0
 
     def _coming(self, reference_rad: object) -> tuple[list[float], bool]:
-        """What is wanted in this pulse and the next ones, and whether those are known."""
+        """Return the reference of this pulse and the next ones, and whether those are known."""
         if reference_rad is not None:
             return coming(reference_rad, self.limits.range_of_motion_rad)
         if not self.trajectory:
@@ -394,7 +394,7 @@ class PositionController:
         return "; ".join(lines)
 
     def _reach(self) -> None:
-        """How far the muscle can move the joint now."""
+        """Set the range of angles to which the muscle can move the joint now."""
         angles, needed = self.reachable
         force = self.share * self.pulse.most + self.observer.x[3] / self.dynamics.pull_nm
         full = float(np.interp(force, needed, angles))

@@ -1,4 +1,4 @@
-"""How long a muscle can do it: a fatigue budget for schedules, and a warning while it is spent.
+"""Endurance of a muscle: a fatigue budget for schedules, and a warning while it is spent.
 
 With c the share of the fresh force that is left (the effect `fatigue`),
 
@@ -34,7 +34,7 @@ FORECAST_STEP_S = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Budget(Tabulated):
-    """What a schedule costs.
+    """The fatigue that a schedule costs.
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ def fatigue_of(model: Model) -> Fatigue | None:
 
 
 def muscle_budget(model: Model, load_kg: float, reference_rad: np.ndarray, capacity: float = 1.0) -> Budget:
-    """What a schedule costs a muscle, from the fatigue that was identified.
+    """Return the cost of a schedule for a muscle, from the identified fatigue.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a caller allows of the stimulation: pulse width, how fast it changes, charge, and the angles of the joint."""
+"""Limits of a caller on stimulation: pulse width and its rate, charge, and the angles of the joint."""
 
 from __future__ import annotations
 

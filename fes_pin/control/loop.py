@@ -15,7 +15,7 @@ from fes_pin.data.tabulated import Tabulated
 
 
 class StimulatedJoint(Protocol):
-    """Something that is stimulated and moves: a rig, or a twin."""
+    """A stimulated system that moves: a rig, or a twin."""
 
     @property
     def angle_rad(self) -> float:

@@ -1,4 +1,4 @@
-"""How far the loop of a position control is from instability: one loop's margins, and the worst over what is not known.
+"""Stability margins of a position control: those of one loop, and the worst over uncertain parameters.
 
 A margin at one angle of the believed ankle is not what a person gets: near rest, where the joint is softest, and with a
 stronger and quicker muscle the loop bears far less dead time.
@@ -23,7 +23,7 @@ FREQUENCIES = 4000
 
 @dataclass(frozen=True, eq=False)
 class StabilityMargins(Tabulated):
-    """How far a stable loop is from instability.
+    """Stability margins of a loop.
 
     Attributes
     ----------

@@ -23,7 +23,7 @@ readings come here at all: `fes_pin.control.faults`."""
 LEAST_SHARE, MOST_SHARE = 0.1, 2.0
 """Bounds of the gain's share."""
 MOST_SHARE_STD = 0.3
-"""What is never used is never seen: the share's standard deviation grows no farther than this."""
+"""Limit of the standard deviation of a share: a muscle that is not used is not observed."""
 RECRUITMENT_STD = 0.025
 """What a pulse recruits is known to this share of the muscle: a third of what a play of 60 us hides. With a tenth of
 it the filter believes its activation so firmly that it answers a swinging frame with a torque, and takes the readings
@@ -125,7 +125,7 @@ class JointObserver:
             self.reset()
 
     def steady_gain(self, transition: np.ndarray) -> np.ndarray:
-        """What of an innovation goes to activation, angle, rate and torque in the long run, shape (4,).
+        """Return the stationary gains of an innovation to activation, angle, rate and torque, shape (4,).
 
         Parameters
         ----------

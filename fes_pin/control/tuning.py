@@ -37,7 +37,7 @@ SLOWER = (1.0, 0.35, 0.12, 0.04)
 AS_GOOD = 0.002
 """Difference of two moduli, per pulse, that does not count."""
 UNCERTAINTY = 0.3
-"""Of gain, time constant and stiffness."""
+"""Factors on gain, time constant and stiffness."""
 ANGLES = 9
 """Angles that gains are computed for."""
 
@@ -95,7 +95,7 @@ def plant(dynamics: AnkleDynamics, q: float) -> tuple[np.ndarray, np.ndarray, fl
 
 
 def moved(dynamics: AnkleDynamics, q: float) -> Sampled:
-    """What truly moves: (activation, angle, rate), and the frame where there is one."""
+    """Return the sampled plant of the true states: (activation, angle, rate), and the frame where there is one."""
     a, b = swinging(dynamics, q) if dynamics.frame_coupling else plant(dynamics, q)[:2]
     n = 5 if dynamics.frame_coupling else 3
     return a[:n, :n], b[:n], np.eye(n)[1]
@@ -178,7 +178,7 @@ class Loop(Tabulated):
         return float(np.abs(np.linalg.eigvals(loop)).max()) if np.isfinite(loop).all() else math.inf
 
     def opened(self, frequencies_hz: np.ndarray) -> np.ndarray:
-        """What comes back of a recruitment at the nerve, the loop cut there, shape (n,), complex; at -1 it is unstable.
+        """Return the loop gain at the nerve, shape (n,), complex; at -1 the loop is unstable.
 
         Where the observer has an integrator (its unknown torque), frequencies must be above 0.
         """
@@ -239,7 +239,7 @@ def tune(dynamics: AnkleDynamics, observer: JointObserver, given: GivenAnkle | N
 
 
 def _truths(dynamics: AnkleDynamics, q: float, given: GivenAnkle | None) -> list[Sampled]:
-    """What may move at an angle: the ankle and its corners."""
+    """Return the plants at an angle: the ankle and its corners."""
     if given is None:
         return [moved(other, q) for other in (dynamics, *corners(dynamics))]
     return [m for factors in ((1.0, 1.0, 1.0), *CORNERS) for m in given.moved(q, factors)]

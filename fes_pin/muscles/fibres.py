@@ -16,7 +16,7 @@ HILL_SHAPE = 0.25
 """Curvature a/F0 of Hill's hyperbola (Thelen 2003); lengthening reaches 1.4 times the isometric force."""
 LENGTHENING_FORCE = 1.4
 HALVINGS = 36
-"""Of the interval in which the tendon's length lies, which leaves less than 1e-11 m of it."""
+"""Bisections of the interval of the tendon's length, which reduce it to less than 1e-11 m."""
 LEAST_ALONG = 1e-4
 """Shortest extent of fibres along the tendon, m."""
 

@@ -25,7 +25,7 @@ would hold it off. Iliacus and psoas lose the pelvic rim in front of them beyond
 extend the hip beyond 102; the long biceps would cross in front of the knee beyond 115 degrees of flexion.
 """
 BEYOND_DEG = 10.0
-"""So far beyond them the arms of the edge are used, and it is said; farther there is no answer."""
+"""Distance beyond them at which the arms of the edge are used, with a warning; farther there is no answer."""
 ROUNDING = 1e-9
 """Angles no farther outside than this are on the edge, rad."""
 
@@ -113,7 +113,7 @@ class MuscleTable(ReadOnly):
         return inside
 
     def held(self, q=None) -> tuple[str, ...]:
-        """What is held at the edge of what is known, one sentence per joint (see `Nerves.held`)."""
+        """Return the joints held at the edge of the known range, one sentence each (see `Nerves.held`)."""
         angles, inside = (a.reshape(-1, len(JOINT_NAMES)) for a in (angles_of(q), self.within(q)))
         farthest = np.argmax(np.abs(angles - inside), axis=0)
         sentences = []
@@ -129,7 +129,7 @@ class MuscleTable(ReadOnly):
         return angles.reshape(-1, len(JOINT_NAMES)), angles.shape[:-1]
 
     def _legs(self, flat: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray, slice]]:
-        """Of each leg its angles (n, 8), their places among the 19, and those of its muscles."""
+        """Yield for each leg its angles (n, 8), their places among the 19, and those of its muscles."""
         for start, places in zip((0, len(self.names) // 2), LEG_OF.values(), strict=True):
             yield flat[:, places], places, slice(start, start + len(self.legs.names))
 
@@ -160,7 +160,7 @@ class MuscleTable(ReadOnly):
 
 
 LEG_OF = {side: np.array([JOINT_NAMES.index(f"{side}_{joint}") for joint in COORDINATES]) for side in SIDES}
-"""Where the angles of a leg's paths stand among the 19."""
+"""Places of the angles of a leg's paths among the 19."""
 
 
 @lru_cache(maxsize=1)

@@ -24,7 +24,7 @@ PARALYSED_BAND = 0.3, 0.7
 2010, doi 10.1111/j.1525-1403.2009.00245.x); cross-sections of leg muscles are 0.45 to 0.8 of other people's half a year
 after the injury (Castro et al. 1999, Eur. J. Appl. Physiol. 80:373-378), less later."""
 STRONGEST, SHORTEST, LONGEST = 10.0, 0.1, 3.0
-"""No body's muscles are stronger, and no body is shorter or longer, than this many times the table's."""
+"""Limits of strength and height, in multiples of the table's."""
 SUBJECT_MASS, SUBJECT_HEIGHT = 72.6, 1.80
 """The adult whose legs the table describes, kg and m."""
 

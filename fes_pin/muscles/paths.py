@@ -28,7 +28,7 @@ BODIES = ("pelvis", "femur", "tibia", "calcaneus", "toes")
 HIP = (-0.07244, -0.06772, 0.08555)
 ANKLE = (0.0, -0.425065, 0.0)
 HEEL_BONE = (-0.0543287, -0.0467314, 0.00882271)
-"""Where the calcaneus's frame begins, from the ankle."""
+"""Origin of the calcaneus's frame, from the ankle."""
 MTP = (0.183643, -0.00205417, 0.00110925)
 
 

@@ -1,4 +1,4 @@
-"""How strong others are than a healthy young man, as their joint torques have been measured."""
+"""Strength of other people relative to a healthy young man, from measured joint torques."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ ROWS = 800
 
 @dataclass(frozen=True)
 class Drawing:
-    """What a page needs of a figure.
+    """The parts of a figure that a page needs.
 
     Attributes
     ----------
@@ -31,7 +31,7 @@ class Drawing:
 
     @classmethod
     def of(cls, svg: str, columns: Mapping[str, np.ndarray], rows: int = ROWS) -> Drawing:
-        """Of columns of numbers, of which at most about so many rows stand in the data."""
+        """Return a drawing whose data are columns of numbers, thinned to about so many rows."""
         step = max(1, -(-len(next(iter(columns.values()))) // rows))
         arrays = [np.asarray(v, dtype=float)[::step].tolist() for v in columns.values()]
         csv = rows_csv(tuple(columns), list(zip(*arrays, strict=True)))

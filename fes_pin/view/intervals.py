@@ -15,7 +15,7 @@ from fes_pin.view.drawing import Drawing, rows_csv
 from fes_pin.view.style import COLOURS
 
 LEAST = 0.3
-"""Where the logarithmic axis of losses begins."""
+"""Start of the logarithmic axis of losses."""
 NAMES, ROW = 176.0, 24.0
 """Room for names, height of a row."""
 

@@ -44,7 +44,7 @@ BINDING: dict[type, int] = {
     **{ast.Tuple: 0, ast.Compare: 1, ast.RShift: 1, ast.Add: 2, ast.Sub: 2, ast.UAdd: 3, ast.USub: 3, ast.Mult: 3},
     **{ast.MatMult: 3, ast.Div: 3, ast.Pow: 4},
 }
-"""How strongly operators bind; anything else is one thing."""
+"""Precedence of operators; any other expression is a unit."""
 
 
 def equations_mathml(text: str) -> Markup:

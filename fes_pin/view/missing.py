@@ -41,7 +41,7 @@ BINS, FEW = 16, 6
 
 @dataclass(frozen=True)
 class Missing:
-    """What one model lacks in one trial.
+    """The effort that one model lacks in one trial.
 
     Attributes
     ----------

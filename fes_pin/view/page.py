@@ -98,7 +98,7 @@ def figure(drawing: Drawing, caption: Content = "", class_: str = "", file: str 
 
 
 def folded(summary: Content, *contents: Markup) -> Markup:
-    """What is behind a line that opens it; printed whole."""
+    """Return a section that a line opens; it is printed in full."""
     return element("details", element("summary", summary), joined(contents))
 
 

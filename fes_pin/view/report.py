@@ -45,7 +45,7 @@ def answer_files(result: Result) -> dict[str, str | bytes]:
 
 
 def _own(result: Result) -> Parts:
-    """What its front end adds."""
+    """Sections of its front end."""
     own: Parts = import_module(f"fes_pin.view.{OWN[type(result).__name__]}").PARTS
     return own
 
@@ -85,7 +85,7 @@ def _heading(one: Named) -> Markup:
 
 
 def _answer(result: Result, one: Named) -> Content:
-    """What it is, how large, how sure."""
+    """Return a sentence on a cause or change: what it is, its size and its significance."""
     kind = result.effect(one.name)
     what = one.words or (sentence(kind) if kind else one.name)
     where = f" At {one.site}." if one.site else ""
@@ -122,7 +122,7 @@ def _errors(result: Result) -> list[Markup]:
 
 
 def _named(result: Result) -> list[Markup]:
-    """What is named: a table, their gains, and a card for each."""
+    """Return the named causes or changes: a table, their gains, and a card for each."""
     if not result.causes:
         open_ = "; the search ended before it had tried all" if result.is_stopped else ""
         return [element("p", f"None is named{open_}.")]
@@ -138,7 +138,7 @@ def _named(result: Result) -> list[Markup]:
 
 
 def _card(result: Result, one: Named) -> Markup:
-    """What is said of a cause or a change, in a frame in the colour of its stage."""
+    """Return the card of a cause or a change, in a frame in the colour of its stage."""
     kind, stage = result.effect(one.name), getattr(one, "stage", "")
     rows: list[list[Content]] = [
         [*(element("code", n) for n in cell), *value_and_interval(estimate)] for cell, estimate in one.estimates()

@@ -1,4 +1,4 @@
-"""What the report of a contrast shows besides what every report does: what did not change."""
+"""Sections of the report of a contrast: parameters and causes that did not change."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from fes_pin.view.sections import Parts
 
 
 def _counts(found: Contrast) -> str:
-    """How many trials each group has."""
+    """Return the number of trials of each group, in words."""
     return ", ".join(f"{g}: {sum(t.group == g for t in found.study.trials)} trials" for g in found.groups)
 
 

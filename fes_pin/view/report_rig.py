@@ -1,4 +1,4 @@
-"""What the report of a rig shows besides what every report does: missing torque, trials, parameters, the model."""
+"""Sections of the report of a rig: missing torque, trials, parameters, the model."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from fes_pin.view.style import unit_of
 
 
 def _counts(diagnosis: Diagnosis) -> str:
-    """How many trials there are, and how long they are."""
+    """Return the number of trials and their length, in words."""
     trials = diagnosis.study.trials
     kinds = " and ".join(f"{n} {kind}" for kind, n in Counter(t.kind for t in trials).items())
     return f"{kinds} trial{'s' * (len(trials) > 1)}, {sum(t.duration for t in trials):.4g} s"
@@ -92,7 +92,7 @@ def _use(diagnosis: Diagnosis) -> list[Markup]:
 
 
 def _in_python(library: str, *, logged: bool) -> str:
-    """How a trial is predicted; `logged` says that its log must be undone before."""
+    """Return the code that predicts a trial; with `logged` its log is corrected before."""
     given = 'load_log("model.toml").applied(trial)' if logged else "trial"
     lines = ["import fes_pin as fp", *["from fes_pin.identify.stored import load_log"] * logged, ""]
     return "\n".join(

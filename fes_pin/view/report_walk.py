@@ -1,4 +1,4 @@
-"""What the report of a walk shows besides what every report does: the ground reaction, the body to be used."""
+"""Sections of the report of a walk: the ground reaction, and the extended body."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from fes_pin.walk.judge import CHANNELS
 from fes_pin.walk.result import BODY_FILE, WalkDiagnosis
 
 SHOWN_S = 4.0
-"""Of each trial, s."""
+"""Longest part of each trial that is shown, s."""
 ROW = 144.0
 """Height of a channel."""
 PYTHON = f'import fes_pin as fp\n\nbody = fp.Body.from_urdf("{BODY_FILE}")\nlinear = fp.linearize(body, "mid_stance")'
 
 
 def _counts(diagnosis: WalkDiagnosis) -> str:
-    """How many strides there are."""
+    """Return the number of strides, in words."""
     return f"{diagnosis.models.designs.strides.count} strides"
 
 

@@ -16,12 +16,12 @@ from fes_pin.models.describe import sentence
 from fes_pin.view.page import Content, Markup, element, folded, html_table, joined, section, unit_text
 
 UNIT_IN_NAME = re.compile(r"(?<=.)(_(nms|nm|us|s|hz|n|kg|rad))?(_per_(rad[23]?|s))?$")
-"""What a parameter's name says of its unit, which stands next to the value: of a slide it is another."""
+"""Unit in a parameter's name, which is printed next to the value: for a slide it is another."""
 
 
 @dataclass(frozen=True)
 class Parts:
-    """What a front end adds to the page of its results.
+    """Sections that a front end adds to the page of its results.
 
     Attributes
     ----------

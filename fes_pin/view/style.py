@@ -1,4 +1,4 @@
-"""How figures look: colours by stage and by role, units of columns.
+"""Style of figures: colours by stage and by role, units of columns.
 
 The colours are Okabe and Ito's, which colour-blind readers can distinguish (Color Universal Design, 2008). Each has a
 name, under which a page may give it another shade on a dark ground.

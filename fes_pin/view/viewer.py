@@ -31,7 +31,7 @@ from fes_pin.view.arrows import Arrow, draw_arrow
 
 FRAMES_A_SECOND = 30
 MODE_SWING_DEG, MODE_PERIOD_S = 12.0, 2.0
-"""How far the joint that moves most is shown to move, and how fast: to be seen, not to scale."""
+"""Range and speed of the joint that moves most in an animation: to be visible, not to scale."""
 
 
 @dataclass
@@ -250,7 +250,7 @@ def show_walk(
 
 
 def _put_down(body: Body, shapes: pin.GeometryModel, q: np.ndarray, turn: np.ndarray) -> pin.SE3:
-    """Where the stance foot's ground must go: the pelvis is turned as given, the lowest sole touches the floor."""
+    """Return the pose of the stance foot: the pelvis is oriented as given, the lowest sole touches the floor."""
     data = body.model.createData()
     pin.framesForwardKinematics(body.model, data, q)
     pelvis = data.oMf[body.model.getFrameId("pelvis")]
@@ -269,7 +269,7 @@ def _put_down(body: Body, shapes: pin.GeometryModel, q: np.ndarray, turn: np.nda
 
 
 def show_influence(linear: LinearBody, inputs, names: str | Sequence[str]) -> BodyScene:
-    """What nerves turn: a ball at each joint, larger and redder the more of the nerves' torque acts there.
+    """Show the torques of nerves: a ball at each joint, larger and redder with the nerves' torque there.
 
     Raises
     ------
@@ -296,7 +296,7 @@ def show_influence(linear: LinearBody, inputs, names: str | Sequence[str]) -> Bo
 
 
 def _centre(body: Body, joint: str, posture: Mapping[str, float]) -> np.ndarray:
-    """Where a joint is in the world, (3,) m; its ball lies outside the limb, on the limb's own side."""
+    """Return the place of a joint in the world, (3,) m; its ball is outside the limb, on the limb's own side."""
     first = next(j.revolutes[0] for j in JOINTS if j.name == joint)
     data = body.model.createData()
     pin.forwardKinematics(body.model, data, body.angles(posture, check=False))

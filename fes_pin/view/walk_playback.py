@@ -56,7 +56,7 @@ def show_reactions(motion: Motion, plates: Plates, caption: str = "") -> BodySce
 
 
 def _way(motion: Motion) -> np.ndarray:
-    """Where the walk is on average, (n, 3) m: a straight line at steady speed, on the ground."""
+    """Return the mean path of the walk, (n, 3) m: a straight line at steady speed, on the ground."""
     centre = centre_of_mass(motion)
     line = np.stack([np.ones_like(motion.time), motion.time - motion.time[0]], axis=1)
     way = line @ np.linalg.lstsq(line, centre, rcond=None)[0]
