@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -18,7 +17,7 @@ from fes_pin.identify.likelihood import LikelihoodProblem, is_simulated
 from fes_pin.infer.family import Family
 from fes_pin.infer.levels import PARAMETER_PENALTY
 from fes_pin.infer.problem import Linearized, Unknowns, completed
-from fes_pin.infer.projection import Projection
+from fes_pin.infer.projection import Projection, slices
 from fes_pin.infer.spread import ByUnit, Spread, usual_spread
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
@@ -142,8 +141,7 @@ class Screen:
         projection, made = Projection(base.fit.parts), list(self._columns(base))
         left = np.concatenate([projection(np.nan_to_num(c.columns)) for c in made], axis=1)
         gram, along = left.T @ left, left.T @ projection.residual
-        ends = np.cumsum([0, *(c.columns.shape[1] for c in made)])
-        blocks = [slice(a, b) for a, b in itertools.pairwise(ends)]
+        blocks = slices(c.columns.shape[1] for c in made)
         scored = []
         for c, b in zip(made, blocks, strict=True):
             spread = ByUnit.of(left[:, b.start], projection.residual, base.fit.parts).spread(FITTED)
@@ -215,9 +213,8 @@ class Screen:
 
 def _rows(parts: Sequence[Linearized], trials: Mapping[str, Sequence[Trial]]) -> dict[str, slice]:
     """Return the rows of each group, all trials end to end."""
-    sizes = [sum(len(p.residual) for p in own) for own in by_group(parts, trials).values()]
-    ends = itertools.pairwise(itertools.accumulate(sizes, initial=0))
-    return {g: slice(a, b) for g, (a, b) in zip(trials, ends, strict=True)}
+    rows = slices(sum(len(p.residual) for p in own) for own in by_group(parts, trials).values())
+    return dict(zip(trials, rows, strict=True))
 
 
 def _at_null(model: Model, kind: type[Effect]) -> Effect:

@@ -6,7 +6,7 @@ C. R. Rao, Math. Proc. Camb. Phil. Soc. 44:50 (1948).
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -62,8 +62,7 @@ class Projection:
     """
 
     def __init__(self, parts: Sequence[Linearized]) -> None:
-        ends = np.cumsum([0, *(len(p.residual) for p in parts)])
-        self.trials = [slice(a, b) for a, b in itertools.pairwise(ends)]
+        self.trials = slices(len(p.residual) for p in parts)
         self._own = [local_basis(p) for p in parts]
         self.shared = _basis(self._without_locals(np.concatenate([p.jacobian for p in parts])))
         self.residual = self(np.concatenate([p.residual for p in parts])[:, None])[:, 0]
@@ -110,6 +109,11 @@ class Projection:
         """Return one trial's part of the Gram matrix of projected columns, and of their products with the residual."""
         left = partly - self.shared[self.trials[k]] @ shared
         return left.T @ left, left.T @ self.residual[self.trials[k]]
+
+
+def slices(lengths: Iterable[int]) -> list[slice]:
+    """Return where pieces of these lengths lie, end to end."""
+    return [slice(a, b) for a, b in itertools.pairwise(itertools.accumulate(lengths, initial=0))]
 
 
 def local_basis(part: Linearized) -> np.ndarray:

@@ -25,6 +25,7 @@ from scipy import optimize, special
 from fes_pin.infer.distributions import f_tail
 from fes_pin.infer.levels import UNFELT, UNUSUAL_LEVEL
 from fes_pin.infer.problem import Linearized
+from fes_pin.infer.projection import slices
 
 FEWEST_TRIALS = 6
 """Number of trials that estimate the differences between repeats by themselves; fewer trials are cut into pieces."""
@@ -101,8 +102,8 @@ class ByUnit:
 def units(parts: Sequence[Linearized]) -> list[slice]:
     """Return the rows of each unit of evidence: a trial, or a piece of one where trials are few."""
     pieces = 1 if len(parts) >= FEWEST_TRIALS else -(-MIN_UNITS // len(parts))
-    ends = itertools.accumulate((len(p.residual) for p in parts), initial=0)
-    cuts = [np.linspace(a, b, pieces + 1).round().astype(int) for a, b in itertools.pairwise(ends)]
+    rows = slices(len(p.residual) for p in parts)
+    cuts = [np.linspace(own.start, own.stop, pieces + 1).round().astype(int) for own in rows]
     return [slice(int(a), int(b)) for cut in cuts for a, b in itertools.pairwise(cut)]
 
 

@@ -7,7 +7,6 @@ fitted parameters are free in these tests. Estimated process noise is part of th
 
 from __future__ import annotations
 
-import itertools
 import math
 from dataclasses import replace
 from typing import Any
@@ -70,7 +69,7 @@ def _features_left(fitted: LikelihoodFit, seed: int) -> Remainder:
     if not len(good):
         return Remainder(False, 1.0, None)
     left = left[:, good] / after[good]
-    by_trial = _trial_shares(left, projection.residual, fitted)
+    by_trial = np.array([left[rows].T @ projection.residual[rows] for rows in projection.trials])
     values, vectors = np.linalg.eigh(left.T @ left)
     kept = values > UNFELT * values.max()
     shares = by_trial @ vectors[:, kept] / np.sqrt(values[kept])
@@ -90,12 +89,6 @@ def _features_left(fitted: LikelihoodFit, seed: int) -> Remainder:
         together[good] = vectors[:, kept] @ (shares.sum(axis=0) / np.sqrt(values[kept])) / after[good]
         p = max(p, p_value(featured.gained(together), featured.gained(alone)))
     return Remainder(p < level_of(fitted), p, featured.names[good[best]].split(":")[0])
-
-
-def _trial_shares(columns: np.ndarray, residual: np.ndarray, fitted: LikelihoodFit) -> np.ndarray:
-    """Return each trial's part of the inner products of columns and residual, shape (trials, columns)."""
-    ends = np.cumsum([0, *(len(p.residual) for p in fitted.parts)])
-    return np.array([columns[a:b].T @ residual[a:b] for a, b in itertools.pairwise(ends)])
 
 
 def _inflation_by_signs(shares: np.ndarray, rank: int, seed: int) -> float:

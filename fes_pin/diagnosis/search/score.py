@@ -5,7 +5,6 @@ C. R. Rao, Math. Proc. Camb. Phil. Soc. 44:50 (1948).
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -16,7 +15,7 @@ from fes_pin.infer.covariance import least_squares_step
 from fes_pin.infer.family import Family
 from fes_pin.infer.levels import PARAMETER_PENALTY
 from fes_pin.infer.problem import Linearized
-from fes_pin.infer.projection import Projection
+from fes_pin.infer.projection import Projection, slices
 
 RIDGE = 1e-8
 """Ridge of the scaled Gram matrix of two probes, which may be parallel."""
@@ -52,8 +51,7 @@ def score_test(parts: Sequence[Linearized], probes: Sequence[Probe]) -> Scores:
         return Scores([], np.zeros((0, 0)), np.zeros(0), [])
     projection = Projection(parts)
     made = projection.products([p.columns for p in probes])
-    ends = np.cumsum([0, *(p.columns.shape[1] for p in probes)])
-    blocks = [slice(a, b) for a, b in itertools.pairwise(ends)]
+    blocks = slices(p.columns.shape[1] for p in probes)
     out = [
         _score(replace(p, columns=p.columns[:0]), made.gram[b, b], made.along[b], float(made.before[b].sum()))
         for p, b in zip(probes, blocks, strict=True)
