@@ -77,8 +77,8 @@ def contrast(
     Raises
     ------
     InputError
-        For fewer than two groups, groups that do not exist, trials that belong to none, studies of different rigs, and
-        as `diagnose`.
+        For fewer than two groups, groups that do not exist, trials that belong to none, studies of different rigs, a
+        nominal model that predicts nothing finite, and as `diagnose`.
     """
     began = time.perf_counter()
     tell = asked(study, seed, limit, progress)
@@ -189,7 +189,7 @@ class _Work:
             untestable=untestable,
             remainder=left,
             fit=best.fit,
-            driven=models.driven,
+            driven=best.is_driven,
             repeats=best.repeats,
             warnings=tuple(said),
             catalogue=self.catalogue,

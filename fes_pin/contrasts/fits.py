@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping, Sequence
 from functools import partial
 
 from fes_pin.contrasts.grouped import Grouped, GroupedModel, GroupedProblem, Item, by_group
 from fes_pin.contrasts.repeats import Repeats
+from fes_pin.data.errors import InputError
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.search.likelihood_fits import FIRST_NOISE_SCALES, MEASUREMENT, LikelihoodFits
 from fes_pin.diagnosis.search.likelihood_maxima import LikelihoodMaxima
@@ -47,8 +49,16 @@ class GroupedFits:
         self._begun: list[Weights] = []
 
     def first(self) -> Grouped:
-        """Fit the nominal model to all groups; the search starts from the noise of each group fitted alone."""
+        """Fit the nominal model to all groups; the search starts from the noise of each group fitted alone.
+
+        Raises
+        ------
+        InputError
+            If the nominal model predicts nothing finite.
+        """
         alone = self._alone() if self.driven else in_parallel(self._simulated, self.trials)
+        if not all(math.isfinite(f.sse) for f in alone):
+            raise InputError("the nominal model predicts nothing finite from its start values on")
         noises = dict(zip(self.trials, (Repeats(f.noise) for f in alone), strict=True))
         model = GroupedModel(dict.fromkeys(self.trials, self.nominal)).with_parameters(alone[0].values)
         if self.driven:
@@ -135,5 +145,8 @@ class GroupedFits:
         if not all(begun.values()):
             return None
         weights = {g: Repeats(LikelihoodMaxima(f.trials).likeliest(f, begun[g])) for g, f in parts.items()}
-        found, self._begun = self.converged(one.model, one.items, weights, one.fit.unknowns), [weights]
-        return found if found.criterion < one.criterion else None
+        found = self.converged(one.model, one.items, weights, one.fit.unknowns)
+        if not found.criterion < one.criterion:
+            return None
+        self._begun = [weights]
+        return found

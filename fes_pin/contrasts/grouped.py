@@ -14,6 +14,7 @@ import numpy as np
 from fes_pin.contrasts.repeats import RepeatedProblem, Repeats, Shrink, scatter
 from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit
+from fes_pin.identify.likelihood import is_simulated
 from fes_pin.identify.problem import products_of
 from fes_pin.infer.levels import PARAMETER_PENALTY, SEPARABLE
 from fes_pin.infer.noise import Noise
@@ -363,8 +364,8 @@ class Grouped:
 
     @property
     def is_driven(self) -> bool:
-        """Whether there is process noise, so that predictions are one step ahead."""
-        return any(w.noise.processes for w in self.weights.values())
+        """Whether predictions are one step ahead: there is process noise, or a motion is imposed."""
+        return not all(is_simulated(w.noise, self.fit.trials) for w in self.weights.values())
 
     @property
     def deviations(self) -> Mapping[str, float]:

@@ -23,6 +23,7 @@ from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.infer.levels import PARAMETER_PENALTY
 from fes_pin.infer.problem import Linearized, Unknowns
 from fes_pin.infer.projection import without_locals
+from fes_pin.models.least_squares import least_squares
 from fes_pin.models.model import Model
 from fes_pin.models.predictions import PredictedTrial
 from fes_pin.models.predictor import StateSpaceNoise
@@ -55,16 +56,14 @@ class RepeatedProblem(LikelihoodProblem):
 
     Parameters
     ----------
-    model, trials, free
+    model, trials
         As in `LikelihoodProblem`.
     weight
         Noise, and the scatter of parameters.
     """
 
-    def __init__(
-        self, model: Model, trials: Sequence[Trial], weight: Repeats, free: tuple[str, ...] | None = None
-    ) -> None:
-        super().__init__(model, trials, weight.noise, free)
+    def __init__(self, model: Model, trials: Sequence[Trial], weight: Repeats) -> None:
+        super().__init__(model, trials, weight.noise)
         self.deviations = weight.deviations
 
     @property
@@ -112,7 +111,7 @@ class RepeatedProblem(LikelihoodProblem):
         part = self.whitened(one)
         v = self.columns(part, list(self.deviations)) * self._sizes
         own = np.linalg.solve(np.eye(len(at)) + v.T @ v, v.T @ part.residual) * self._sizes
-        own_step = np.linalg.lstsq(part.local, part.jacobian[:, at] @ own, rcond=1e-10)[0]
+        own_step = least_squares(part.local, part.jacobian[:, at] @ own, rcond=1e-10)
         moved = one.sensitivities[..., at] @ own - one.sensitivities[..., len(self.free) :] @ own_step
         return replace(one, values=np.where(one.seen, one.values + moved, 0.0))
 

@@ -216,6 +216,12 @@ def test_groups_that_cannot_be_contrasted(change, asked, words, tmp_path):
         fp.contrast(change(_labelled(tmp_path)), **asked)
 
 
+def test_a_model_that_runs_away_in_every_group(tmp_path):
+    study = free_pair("joint", (), 80.0, 5, tmp_path)
+    with pytest.raises(InputError, match="predicts nothing finite"):
+        fp.contrast(replace(study, start={**study.start, "damping": 1e9}))
+
+
 def test_studies_of_different_rigs(tmp_path):
     study = _labelled(tmp_path)
     constants = {**study.constants, "moment_arm_m": 2.0 * study.constants["moment_arm_m"]}
