@@ -168,9 +168,7 @@ class RigSchema(ReadOnly):
     @property
     def columns(self) -> tuple[str, ...]:
         """Every column that has a meaning for this rig, time first."""
-        outputs = (n for one, n in self.outputs.items() if one != IMPOSED)
-        named = ("time_s", *self.inputs, *outputs, *self.optional, *self.imposed, *self.outputs.values())
-        return tuple(dict.fromkeys(named))
+        return tuple(dict.fromkeys(n for kind in self.outputs for n in self.columns_of(kind)))
 
     def columns_of(self, kind: str) -> tuple[str, ...]:
         """Every column that has a meaning in a kind of trial, time first."""

@@ -44,13 +44,11 @@ import casadi as ca
 
 from fes_pin.models.compile.equations import Equations, Tangents, column, equations_of, nonzeros
 from fes_pin.models.compile.layout import Layout
-from fes_pin.models.compile.slack import Gaussian, Slack, read_across
+from fes_pin.models.compile.slack import LEAST, Gaussian, Slack, read_across
 from fes_pin.models.model import Model
 
 REACH = 3.0**0.5
 """Half length of the differences, in standard deviations: right for a Gaussian's fourth moment (Norgaard et al.)."""
-LEAST = 1e-20
-"""Variance that a carried memory and what it follows have at least, in their unit squared: nothing is divided by 0."""
 
 
 class _Uncertainty:
@@ -237,12 +235,9 @@ def _linear(
     expressions = (reading, ca.jacobian(reading, d.x), d.through(reading, *inner[1:]))
     predicted, row, direct = (ca.substitute(one, d.x, now) for one in expressions)
     innovation = measured - (predicted + ca.mtimes(row, known.mean - now))
-    toward = ca.mtimes(known.covariance, row.T)
-    variance = ca.mtimes(row, toward) + noise
-    gain = seen * toward / variance
+    left, gain, variance = known.seen(row, innovation, noise, seen)
     slope = ca.densify(-(direct + ca.mtimes(row, moved)))
-    left = known.covariance - ca.mtimes(gain, toward.T)
-    return (innovation, variance, slope), known.mean + gain * innovation, left, moved + ca.mtimes(gain, slope)
+    return (innovation, variance, slope), left.mean, left.covariance, moved + ca.mtimes(gain, slope)
 
 
 def _read_with_slack(d: Carried) -> int | None:

@@ -27,7 +27,7 @@ import numpy as np
 import scipy.special
 
 LEAST = 1e-20
-"""Variance that a slack has at least, in its unit squared: nothing is divided by 0."""
+"""Variance that a slack, and a memory that is carried, has at least, in its unit squared: nothing is divided by 0."""
 MIDDLE, DEGREE = 4.0, 16
 """Degree of the polynomial of Mills' ratio in 4 / (4 + z), of relative error 4e-12 (`tests/models/test_slack.py`)."""
 NARROW, TINY = 1e-9, 1e-100
@@ -41,14 +41,13 @@ class Gaussian:
     mean: Any
     covariance: Any
 
-    def seen(self, row: Any, innovation: Any, noise: Any, share: Any) -> tuple[Gaussian, Any]:
-        """The Gaussian given a linear reading, and the log density of that reading; a share of 0 changes nothing."""
+    def seen(self, row: Any, innovation: Any, noise: Any, share: Any) -> tuple[Gaussian, Any, Any]:
+        """The Gaussian given a linear reading, the gain, and the reading's variance; a share of 0 changes nothing."""
         toward = ca.mtimes(self.covariance, row.T)
         variance = ca.mtimes(row, toward) + noise
         gain = share * toward / variance
-        log_density = -0.5 * share * (innovation * innovation / variance + ca.log(variance))
         left = Gaussian(self.mean + gain * innovation, self.covariance - ca.mtimes(gain, toward.T))
-        return left, log_density
+        return left, gain, variance
 
     def cut(self, slack: Any, mean: Any, low: Any, high: Any) -> tuple[Any, Gaussian]:
         """Logarithm of the share in which a linear slack is between two ends, and the mean and covariance of that.
@@ -162,7 +161,9 @@ class _Piece:
         value, row = (ca.substitute(e, x, middle) for e in (reading, ca.jacobian(reading, x)))
         row = ca.mtimes(row, self.turned)
         uncut = value + ca.mtimes(row, known.mean - part.mean)
-        updated, density = known.seen(row, measured - uncut, noise, seen)
+        missed = measured - uncut
+        updated, _, variance = known.seen(row, missed, noise, seen)
+        density = -0.5 * seen * (missed * missed / variance + ca.log(variance))
         away = self.away + ca.mtimes(self.across, updated.mean - known.mean)
         left, cut = updated.cut(self.across, away, self.low, self.high)
         predicted = Gaussian(value, ca.mtimes([row, part.covariance, row.T]))
