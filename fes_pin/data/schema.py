@@ -165,6 +165,10 @@ class RigSchema(ReadOnly):
         """The columns that a kind of trial holds its imposed motion in; none of a kind that imposes none."""
         return self.imposed if kind == IMPOSED else ()
 
+    def driving(self, kind: str, columns: Collection[str]) -> tuple[str, ...]:
+        """Those of a trial's columns that drive the rig: a stimulus, and an imposed motion."""
+        return tuple(n for n in (*self.stimuli(kind), *self.motion(kind)) if n in columns)
+
     @property
     def columns(self) -> tuple[str, ...]:
         """Every column that has a meaning for this rig, time first."""

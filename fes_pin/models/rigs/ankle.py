@@ -116,9 +116,6 @@ class Ankle(Rig):
     def memories(self, kind: str) -> tuple[str, ...]:
         return ("r", "r_before", "rest") if kind == "motion" else ("r", "r_before")
 
-    def input_columns(self, trial: Trial) -> tuple[str, ...]:
-        return ("pulse_width_us", *self.schema.motion(trial.kind))
-
     def constant_names(self, kind: str) -> tuple[str, ...]:
         own = {"motion": ("load_kg",), "isometric": ("angle_rad",), IMPOSED: ("load_kg", "torque_sign")}
         return (*self.needed, "gravity_cos", "gravity_sin", *own[kind])

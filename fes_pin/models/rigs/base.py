@@ -201,8 +201,9 @@ class Rig(ReadOnly):
         return (self.schema.outputs[kind],)
 
     def input_columns(self, trial: Trial) -> tuple[str, ...]:
-        """Columns of a trial that drive the model, an imposed motion among them."""
-        raise NotImplementedError
+        """Columns of a trial that drive the model, an imposed motion among them: those of the schema, by default."""
+        wanted = (*self.schema.stimuli(trial.kind), *self.schema.motion(trial.kind))
+        return tuple(n for n in wanted if n in trial.columns)
 
     def driven_by(self, trial: Trial) -> tuple[str, ...]:
         """Names of what drives the model in a trial: an imposed motion with its rates replaces its columns."""

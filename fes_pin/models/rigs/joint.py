@@ -130,10 +130,6 @@ class Joint(Rig):
     def outputs(self, kind: str) -> tuple[str, ...]:
         return ("effort",) if kind == IMPOSED else ("position", "velocity")
 
-    def input_columns(self, trial: Trial) -> tuple[str, ...]:
-        wanted = self.schema.imposed if trial.kind == IMPOSED else ("effort",)
-        return tuple(n for n in wanted if n in trial.columns)
-
     def constant_names(self, kind: str) -> tuple[str, ...]:
         return (*self.needed, "idle")
 

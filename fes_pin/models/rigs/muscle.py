@@ -86,10 +86,6 @@ class Muscle(Rig):
     def memories(self, kind: str) -> tuple[str, ...]:
         return ("r", "r_before")
 
-    def input_columns(self, trial: Trial) -> tuple[str, ...]:
-        stimulus = "stim" if "stim" in trial.columns else "pulse_width_us"
-        return (stimulus, *self.schema.motion(trial.kind))
-
     def constant_names(self, kind: str) -> tuple[str, ...]:
         return ("threshold_us", "saturation_us", "pulse_period_s", "length_m")
 
