@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 import pinocchio as pin
 
 from fes_pin.body.build import GRAVITY, Body
 from fes_pin.body.gait import pelvis_turns, postures_of_walk
-from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.body.skeleton import TO_WORLD
 from fes_pin.data.errors import InputError
 from fes_pin.data.motion import OPTIONAL, REQUIRED
@@ -18,8 +18,8 @@ from fes_pin.data.smooth import CUTOFF_HZ, low_pass, rates
 
 PELVIS_TO_HIP = np.array([-0.0402431, -0.0376247, 0.0475290])
 """Right hip centre in OpenSim's pelvis, in standing heights: gait2354 scaled to an adult of 1.80 m."""
-_STEP = 1e-4
-"""s; how far a sample's path is followed for its rates: truncation 1e-8, rounding 1e-8 of the acceleration."""
+_STEP = 1e-3
+"""s; how far a sample's path is followed for its rates, by differences of fourth order: 1e-8 of the acceleration."""
 
 
 def free_model(body: Body) -> pin.Model:
@@ -124,60 +124,17 @@ def motion_of(
     InputError
         A coordinate is missing or not finite.
     """
-    model = free_model(body)
-    at, bandwidth = _followed(body, time, columns, hip, cutoff_hz)
-    belt = np.zeros((len(time), 3))
-    belt[:, 0] = belt_speed_mps * (time - time[0])
-    q, v, a = _joints(model, [angles for angles, _, _ in at])
-    speed = (at[1][2] - at[2][2]) / (2.0 * _STEP) + [belt_speed_mps, 0.0, 0.0]
-    gain = (at[1][2] - 2.0 * at[0][2] + at[2][2]) / _STEP**2
-    data, pelvis = model.createData(), model.getFrameId("pelvis")
-    rest = q[:, :7] * 0.0 + [0, 0, 0, 0, 0, 0, 1.0]
-    for k in range(len(time)):
-        turn = at[0][1][k]
-        plus, minus = pin.log3(turn.T @ at[1][1][k]), pin.log3(turn.T @ at[2][1][k])
-        omega, alpha = (plus - minus) / (2.0 * _STEP), (plus + minus) / _STEP**2
-        linear = turn.T @ speed[k]
-        place = pin.SE3(turn, at[0][2][k] + belt[k])
-        twist = pin.Motion(linear, omega)
-        change = pin.Motion(turn.T @ gain[k] - np.cross(omega, linear), alpha)
-        pin.forwardKinematics(
-            model, data, np.concatenate([rest[k], q[k, 7:]]), np.r_[np.zeros(6), v[k, 6:]], np.r_[np.zeros(6), a[k, 6:]]
-        )
-        pin.updateFramePlacement(model, data, pelvis)
-        within = data.oMf[pelvis]
-        own = pin.getFrameVelocity(model, data, pelvis, pin.LOCAL)
-        grown = pin.getFrameAcceleration(model, data, pelvis, pin.LOCAL)
-        q[k, :7] = pin.SE3ToXYZQUAT(place * within.inverse())
-        v[k, :6] = within.act(twist - own).vector
-        a[k, :6] = within.act(change - grown - twist.cross(own)).vector
-    return Motion(body, model, np.asarray(time, dtype=float), q, v, a, bandwidth)
-
-
-def _followed(
-    body: Body,
-    time: np.ndarray,
-    columns: Mapping[str, np.ndarray],
-    hip: np.ndarray,
-    cutoff_hz: float,
-) -> tuple[list[tuple[np.ndarray, np.ndarray, np.ndarray]], tuple[float, float] | None]:
-    """Poses now, a small step later and a small step before, in every sample; the coordinates' bandwidth."""
-    names = [n.removeprefix("q_") for n in columns if n.startswith("q_")]
+    model, names = free_model(body), [n.removeprefix("q_") for n in columns if n.startswith("q_")]
     (place, rate, change), bandwidth = _paths(names, time, columns, cutoff_hz)
-    moved = [place + step * rate + 0.5 * step**2 * change for step in (0.0, _STEP, -_STEP)]
-    labels = [f"q_{n}" for n in names]
-    return [_pose(body, dict(zip(labels, m.T, strict=True)), hip) for m in moved], bandwidth
-
-
-def _joints(model: pin.Model, angles: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """q, v, a with the joints' columns filled from three poses (n, 19) in the order of `JOINT_NAMES`."""
-    order = [JOINT_NAMES.index(n) for n in model.names[2:]]
-    now, later, before = (each[:, order] for each in angles)
-    q, v, a = (np.zeros((len(now), size)) for size in (model.nq, model.nv, model.nv))
-    q[:, 7:] = now
-    v[:, 6:] = (later - before) / (2.0 * _STEP)
-    a[:, 6:] = (later - 2.0 * now + before) / _STEP**2
-    return q, v, a
+    ahead = names.index("pelvis_tx")
+    place[:, ahead] += belt_speed_mps * (time - time[0])
+    rate[:, ahead] += belt_speed_mps
+    moved = (place + step * rate + 0.5 * step**2 * change for step in (0.0, _STEP, -_STEP, 2.0 * _STEP, -2.0 * _STEP))
+    q, *near = (_placed(body, model, dict(zip(names, m.T, strict=True)), hip) for m in moved)
+    apart = np.array([list(map(partial(pin.difference, model), q, other)) for other in near])
+    v = np.tensordot([8.0, -8.0, -1.0, 1.0], apart, 1) / (12.0 * _STEP)
+    a = np.tensordot([16.0, 16.0, -1.0, -1.0], apart, 1) / (12.0 * _STEP**2)
+    return Motion(body, model, np.array(time, dtype=float), q, v, a, bandwidth)
 
 
 def _paths(
@@ -196,12 +153,19 @@ def _paths(
     return (smooth, *rates(smooth, time)), (cutoff_hz, cutoff_hz)
 
 
-def _pose(body: Body, coordinates: dict[str, np.ndarray], hip: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Joint angles (n, 19), the pelvis's orientation (n, 3, 3) and where its link's origin is, (n, 3) m."""
+def _placed(body: Body, model: pin.Model, coordinates: dict[str, np.ndarray], hip: np.ndarray) -> np.ndarray:
+    """The body where its pelvis is measured: (n, 26) as Pinocchio's q."""
+    named = {f"q_{n}": values for n, values in coordinates.items()}
     for name in OPTIONAL:
-        coordinates.setdefault(f"q_{name}", np.zeros_like(coordinates["q_pelvis_tx"]))
-    angles = np.asarray(postures_of_walk(coordinates, body.stance, flat_foot=False))
-    turn = pelvis_turns(coordinates)
-    origin = np.stack([coordinates[f"q_pelvis_t{c}"] for c in "xyz"], axis=1) @ TO_WORLD.T
+        named.setdefault(f"q_{name}", np.zeros_like(named["q_pelvis_tx"]))
+    angles = postures_of_walk(named, body.stance, flat_foot=False)
     side = np.array([1.0, 1.0, 1.0 if body.stance == "right" else -1.0])
-    return angles, turn, origin + turn @ (TO_WORLD @ (hip * side))
+    turns, origin = pelvis_turns(named), np.stack([named[f"q_pelvis_t{c}"] for c in "xyz"], axis=1) @ TO_WORLD.T
+    origin = origin + turns @ (TO_WORLD @ (hip * side))
+    q = np.tile(pin.neutral(model), (len(angles), 1))
+    q[:, 7:] = angles[list(model.names[2:])]
+    data, pelvis = model.createData(), model.getFrameId("pelvis")
+    for row, turn, place in zip(q, turns, origin, strict=True):
+        pin.framesForwardKinematics(model, data, row)
+        row[:7] = pin.SE3ToXYZQUAT(pin.SE3(turn, place) * data.oMf[pelvis].inverse())
+    return q
