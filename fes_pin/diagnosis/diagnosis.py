@@ -26,12 +26,11 @@ from fes_pin.diagnosis.long_records import searched_part, thinned
 from fes_pin.diagnosis.misread import NAME as MISREAD
 from fes_pin.diagnosis.parts import in_parts
 from fes_pin.diagnosis.plausibility import check_study
-from fes_pin.diagnosis.reported import diagnosis_of
+from fes_pin.diagnosis.reported import diagnosis_of, unfitted
 from fes_pin.diagnosis.restate import Run, StudyConditions, restated_study, with_misread
 from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.diagnosis.search.likelihood_fits import MEASUREMENT, PROCESS
 from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodModels, LikelihoodSearch, NominalFitError
-from fes_pin.diagnosis.stopped import unfitted
 from fes_pin.diagnosis.testable import given_away
 from fes_pin.identify.feedback import is_fed_back, is_stimulus_fed_back
 from fes_pin.identify.recording import improves, low_pass_of

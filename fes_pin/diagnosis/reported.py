@@ -1,7 +1,8 @@
-"""The diagnosis that reports a verdict on a rig."""
+"""The diagnosis that reports a verdict on a rig, or that its fits did not converge."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -17,11 +18,13 @@ from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodSearch
 from fes_pin.diagnosis.verdict import RigState, RigVerdict, alike_in
 from fes_pin.identify.correlation_time import words_of_reading
+from fes_pin.identify.fit import rough_noise
 from fes_pin.identify.likelihood import is_simulated
 from fes_pin.identify.likelihood_fit import LikelihoodFit
-from fes_pin.infer.result import CROSS_VALIDATED, FITTED, HELD_OUT, Cause
+from fes_pin.infer.result import CROSS_VALIDATED, FITTED, HELD_OUT, STOPPED, Cause, Remainder
 from fes_pin.infer.scatter import as_wide_as_estimates_differ, as_wide_as_trials_differ, with_honest_intervals
 from fes_pin.infer.verdict import share_in, word_of
+from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
 
 
@@ -64,13 +67,32 @@ def diagnosis_of(
         next_experiment=experiment(best, found.rivals, causes, study),
         ranking=ranking(best, found.rivals),
         held_out_by=on,
-        left_out={},
-        wall_s=0.0,
         warnings=_words(best, trials[0]),
         random=state.weighed.random,
         is_driven=search.models.judged_s is not None,
         reason=reason,
         ahead=AheadErrors(search.models.horizon_s, *fitted, *(held or (None, None))),
+    )
+
+
+def unfitted(study: Study, nominal: LikelihoodFit, reason: str, test: Sequence[Trial]) -> Diagnosis:
+    """Return the diagnosis where fits did not converge: the verdict is "stopped", with the reason."""
+    floor = rough_noise(Model(nominal.model.rig), nominal.trials)
+    inside = free_errors(nominal.model, nominal.trials, floor)
+    outside = free_errors(nominal.model, test, floor).error_percent() if test else None
+    return Diagnosis(
+        study=study,
+        verdict=STOPPED,
+        causes=(),
+        remainder=Remainder(True, math.nan, None),
+        absorbed=(),
+        nominal=nominal,
+        extended=nominal,
+        nominal_error=(inside.error_percent(), outside),
+        extended_error=(inside.error_percent(), outside),
+        ceiling_percent=inside.ceiling_percent(),
+        held_out_by=HELD_OUT if test else FITTED,
+        reason=reason,
     )
 
 

@@ -68,9 +68,9 @@ class Diagnosis(Result):
     extended_error: tuple[float | None, float | None]
     ceiling_percent: float
     next_experiment: NextExperiment | None = None
-    ranking: Mapping[str, tuple[Ranked, ...]]
+    ranking: Mapping[str, tuple[Ranked, ...]] = field(default_factory=dict)
     held_out_by: str
-    left_out: Mapping[str, Mapping[str, tuple[int, ...]]]
+    left_out: Mapping[str, Mapping[str, tuple[int, ...]]] = field(default_factory=dict)
     catalogue: Catalogue = field(default_factory=installed)
     random: tuple[RandomPart, ...] = ()
     ahead: AheadErrors | None = None
