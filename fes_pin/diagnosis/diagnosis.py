@@ -19,13 +19,13 @@ from fes_pin.data.spikes import without_spikes
 from fes_pin.data.stuck import without_stuck
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.decide.few_trials import few_trials
 from fes_pin.diagnosis.estimators import searched
 from fes_pin.diagnosis.logged import LogFaults, likelier, with_timing_of, with_words
 from fes_pin.diagnosis.long_records import searched_part, thinned
 from fes_pin.diagnosis.misread import NAME as MISREAD
 from fes_pin.diagnosis.parts import in_parts
 from fes_pin.diagnosis.plausibility import check_study
+from fes_pin.diagnosis.recorded import few_trials
 from fes_pin.diagnosis.reported import diagnosis_of, unfitted
 from fes_pin.diagnosis.restate import Run, StudyConditions, restated_study, with_misread
 from fes_pin.diagnosis.result import Diagnosis

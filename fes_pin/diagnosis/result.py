@@ -13,7 +13,6 @@ from fes_pin.data.trial import trial_csv
 from fes_pin.diagnosis import recorded
 from fes_pin.diagnosis.errors_ahead import AheadErrors, RandomPart
 from fes_pin.diagnosis.experiment import NEXT_FILE, NextExperiment
-from fes_pin.diagnosis.text import in_words, left_out_text
 from fes_pin.identify.error_measures import FREE, ONE_STEP
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.stored import log_table, stored_tables
@@ -125,9 +124,9 @@ class Diagnosis(Result):
         topics = [
             ("noise of the readings alone", f"E {percent(self.ceiling_percent)}"),
             ("falls", "by itself: free errors are meaningless" if self.is_falling else ""),
-            *((f"random {r.name}", in_words(r, unit)) for r in self.random),
+            *((f"random {r.name}", recorded.in_words(r, unit)) for r in self.random),
             ("lack of fit", self.reason or f"{state} ({probability(left.p_value)}{where})"),
-            ("left out as spikes", left_out_text(self.left_out, self.study.trials) if self.left_out else ""),
+            ("left out as spikes", recorded.left_out_text(self.left_out, self.study.trials) if self.left_out else ""),
             *(
                 (f"{c.name} chosen again", f"in {k[0]} of {k[1]} folds, each without its trials")
                 for c in self.causes

@@ -7,7 +7,7 @@ import pytest
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.errors_ahead import RandomPart
-from fes_pin.diagnosis.text import in_words, left_out_text
+from fes_pin.diagnosis.recorded import in_words, left_out_text
 from fes_pin.infer.text import quantity
 
 
