@@ -97,11 +97,6 @@ class Problem(infer.Problem):
                 out[i] = part
         return [p for p in out if p is not None]
 
-    def rows(self, trial: Trial) -> int:
-        """Return the number of whitened residuals of a trial, all channels end to end."""
-        weighed = [self.noise[n] for n in self.model.rig.outputs(trial.kind) if n in trial.columns and n in self.noise]
-        return sum(one.innovations(len(trial), trial.dt) for one in weighed)
-
     def _whitened(self, block: SimulatedBatch) -> Iterator[Linearized]:
         """Yield the trials of a simulated batch, whitened as a batch."""
         trials = [self.trials[i] for i in block.trials]
