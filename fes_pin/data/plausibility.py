@@ -91,7 +91,9 @@ def implausible(study: Study | ToPredict) -> list[str]:
     done = [(t, remark) for t in study.trials for remark in t.remarks]  # to samples, when they were read
     warnings = [*_each("", done), *_inputs(study), *_units(study), *_imposed(study)]
     outputs = tuple(dict.fromkeys((*study.schema.outputs.values(), "velocity")))
-    measured = [(t, n) for t in study.trials for n in outputs if n in t and n not in _driving(study, t)]
+    measured = [
+        (t, n) for t in study.trials for n in outputs if n in t and n not in study.schema.driving(t.kind, t.columns)
+    ]
     constant = [(t, n) for t, n in measured if not np.ptp(t[n]) > 0.0]
     _check_counts(study, [one for one in measured if one not in constant])
     if len(constant) == len(measured) and not isinstance(study, ToPredict):
@@ -119,14 +121,8 @@ def _check_counts(study: Study | ToPredict, moving: Sequence[tuple[Trial, str]])
         raise InputError(message, file=study.folder)
 
 
-def _driving(study: Study | ToPredict, trial: Trial) -> tuple[str, ...]:
-    """Columns that a trial has as inputs."""
-    schema = study.schema
-    return tuple(n for n in (*schema.stimuli(trial.kind), *schema.motion(trial.kind)) if n in trial)
-
-
 def _stimuli(study: Study | ToPredict, trial: Trial) -> tuple[str, ...]:
-    """Those of them that are not a motion."""
+    """Columns that a trial has as stimuli."""
     return tuple(n for n in study.schema.stimuli(trial.kind) if n in trial)
 
 

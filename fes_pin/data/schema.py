@@ -166,7 +166,7 @@ class RigSchema(ReadOnly):
         return self.imposed if kind == IMPOSED else ()
 
     def driving(self, kind: str, columns: Collection[str]) -> tuple[str, ...]:
-        """Those of a trial's columns that drive the rig: a stimulus, and an imposed motion."""
+        """Return those of a trial's columns that drive the rig: a stimulus, and an imposed motion."""
         return tuple(n for n in (*self.stimuli(kind), *self.motion(kind)) if n in columns)
 
     @property

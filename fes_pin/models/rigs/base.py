@@ -201,9 +201,8 @@ class Rig(ReadOnly):
         return (self.schema.outputs[kind],)
 
     def input_columns(self, trial: Trial) -> tuple[str, ...]:
-        """Columns of a trial that drive the model, an imposed motion among them: those of the schema, by default."""
-        wanted = (*self.schema.stimuli(trial.kind), *self.schema.motion(trial.kind))
-        return tuple(n for n in wanted if n in trial.columns)
+        """Return the columns of a trial that drive the model, an imposed motion among them: by default the schema's."""
+        return self.schema.driving(trial.kind, trial.columns)
 
     def driven_by(self, trial: Trial) -> tuple[str, ...]:
         """Names of what drives the model in a trial: an imposed motion with its rates replaces its columns."""
@@ -289,8 +288,8 @@ class Rig(ReadOnly):
         raise NotImplementedError
 
     def rest_residual(self, s: Signals, z: Any) -> Any:
-        """Return the expressions that are zero at the static equilibrium; called after `rates` at rest."""
-        raise NotImplementedError
+        """Return what is zero at the static equilibrium; called after `rates` at rest. By default z is 0 there."""
+        return z
 
     def sample(self, s: Signals) -> dict[str, Any]:
         """Next memories, once per sample, from the inputs."""

@@ -190,9 +190,6 @@ class Joint(Rig):
         s.q = s.sensed = s.x.q
         s.sensed_rate = s.x.v
 
-    def rest_residual(self, s: Signals, z: Any) -> Any:
-        return z
-
     def sample(self, s: Signals) -> dict[str, Any]:
         s.inertia = self.inertia_scale * s.c.inertia
         if s.kind == IMPOSED:

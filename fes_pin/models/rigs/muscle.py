@@ -104,9 +104,6 @@ class Muscle(Rig):
         s.x.act = s.m.r = s.m.r_before = 0.0
         s.q = s.sensed = 0.0
 
-    def rest_residual(self, s: Signals, z: Any) -> Any:
-        return z
-
     def sample(self, s: Signals) -> dict[str, Any]:
         r = s.u.stim * s.c.pulse_period_s / s.c.dt if hasattr(s.u, "stim") else recruited_now(s)
         return {"r": s.through("recruitment", r), "r_before": s.m.r}
