@@ -130,7 +130,7 @@ class Plans:
 
     @cached_property
     def _responses(self) -> np.ndarray:
-        """Return the response of each mode at each look to a unit force in each piece: (r, looks, pieces)."""
+        """The response of each mode at each look to a unit force in each piece: (r, looks, pieces)."""
         times, _ = self._looks
         begin, end = self._edges
         since, until = times[:, None] - begin, times[:, None] - end
@@ -147,7 +147,7 @@ class Plans:
 
     @cached_property
     def _courses(self) -> np.ndarray:
-        """Return each mode's coordinate at each look without inputs, per unit of its start and rate: (r, looks, 2).
+        """Each mode's coordinate at each look without inputs, per unit of its start and rate: (r, looks, 2).
 
         Of a falling mode only the decaying part: the growing one is what the plan must meet. Of a drift nothing.
         """
@@ -211,7 +211,7 @@ class Plans:
 
     @cached_property
     def _musts(self) -> np.ndarray:
-        """Return the start of each falling mode's growing part, over all inputs, in degrees: (k, m pieces)."""
+        """The start of each falling mode's growing part, over all inputs, in degrees: (k, m pieces)."""
         fall = np.flatnonzero(self.modes.kinds == "fall")
         spread = [self._spread(i, row[None]) / self.modes.degree[i] for i, row in zip(fall, self._starts, strict=True)]
         return np.vstack([np.zeros((0, self.inputs.n * len(self.pieces))), *spread])

@@ -40,7 +40,7 @@ CLIP = 4.1
 """Standard deviations beyond which an innovation counts no more: three in five must be as large, so that one reading
 that is off, with what it does to the estimates, is no stop."""
 IGNORANCE = 0.3
-"""Factors on gain, time constant and stiffness, as in the tuning."""
+"""Relative uncertainty of gain, time constant and stiffness, as in the tuning."""
 MEMORY = 8
 """Pulses whose activations count as motion of the muscle: 0.18 s, more than three of its time constants."""
 LEAST_SHARE = 0.15

@@ -37,7 +37,7 @@ SLOWER = (1.0, 0.35, 0.12, 0.04)
 AS_GOOD = 0.002
 """Difference of two moduli, per pulse, that does not count."""
 UNCERTAINTY = 0.3
-"""Factors on gain, time constant and stiffness."""
+"""Relative uncertainty of gain, time constant and stiffness."""
 ANGLES = 9
 """Angles that gains are computed for."""
 
