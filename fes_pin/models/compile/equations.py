@@ -7,12 +7,12 @@ With states x, memories m, parameters p and their sensitivities S = dx/dp, R = d
     rates    x' = f(x, m, u, p),                 S' = f_x S + f_m R + f_p      per time of the integration, see below
     output   y = h(x, m, p),                     dy/dp = h_x S + h_m R + h_p
 
-Only the entries of S and R that can be other than zero are carried.
+Only the entries of S and R that can differ from zero are stored.
 
-Delay: whole samples of it shift the input (`shift`). A remainder f < dt makes the input jump within each sample, at f.
+A delay of whole samples shifts the input (`shift`). A remainder f < dt makes the input jump within each sample, at f.
 The J steps of a sample are stretched so that a step ends there: k of them fill [0, f] and J - k fill [f, dt], none
-longer than dt / (J - 1). The stretch is part of the equations, so the sensitivity to the delay is that of the exact
-jump.
+longer than dt / (J - 1). The stretch is part of the equations, so that the sensitivity to the delay is that of the
+exact jump.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class _Symbols:
         return ca.vertcat(*which.values()) if which else ca.SX(0, 1)
 
     def signals(self, states: dict[str, Any], memories: dict[str, Any]) -> Signals:
-        """Signals and effects with symbols in place of numbers."""
+        """Return signals and effects with symbols in place of numbers."""
         layout, p = self.layout, {**self.p, **dict(self.layout.fixed)}
         effects = []
         for e in self.model.effects:
@@ -102,7 +102,7 @@ class _Symbols:
         return s
 
     def within_a_sample(self, s: Signals) -> Signals:
-        """The signals at `into` after the start of the step that begins `since` after the sample."""
+        """Return the signals at `into` after the start of the step that begins `since` after the sample."""
         if not self.is_late:
             s.elapsed = self.since + self.into
             s.time = s.time + s.elapsed
@@ -121,7 +121,7 @@ class _Symbols:
         return s
 
     def std_of(self, f: Any) -> Any:
-        """A symbol for the standard deviation of an expression in what is estimated."""
+        """Return a symbol for the standard deviation of an expression in estimated states."""
         self.unsure.append((ca.SX.sym(f"std{len(self.unsure)}"), f))
         return self.unsure[-1][0]
 
@@ -130,7 +130,7 @@ class _Symbols:
         return dataclasses.replace(self.model.rig, **nominal)
 
     def at_rest(self) -> tuple[dict[str, Any], dict[str, Any], Any]:
-        """States, memories and residual of the static equilibrium as expressions in z; nothing drives the rig there."""
+        """Return states, memories and residual of the static equilibrium as expressions in z, without inputs."""
         rig, still = self.rig(), SimpleNamespace(**dict.fromkeys(self.u, 0.0))
         s = self.signals(dict.fromkeys(self.states, 0.0), dict.fromkeys(self.memories, 0.0))
         s.u = still
@@ -146,7 +146,7 @@ class _Symbols:
         return states, memories, rig.rest_residual(s, self.z)
 
     def running(self) -> tuple[list[Any], list[Any], list[Any]]:
-        """Next memories, rates of the states, readings."""
+        """Return next memories, rates of the states, and readings."""
         rig = self.rig()
         s = self.signals(self.x, self.m)
         after = rig.sample(s)
@@ -167,14 +167,14 @@ class _Symbols:
 
 
 class Tangents:
-    """A model's expressions, and how sensitivities go through them.
+    """A model's expressions, and the propagation of sensitivities through them.
 
     Attributes
     ----------
     x, m, p, c, u, t, since, into, z
         Symbols of states, memories, parameters, constants, inputs, times and the unknown of the static equilibrium.
     x0, m0, after, rates, readings, g
-        Where a trial begins, next memories, rates, readings, and what is zero at rest.
+        Initial states and memories, next memories, rates, readings, and the expression that is zero at rest.
     """
 
     def __init__(self, model: Model, layout: Layout, estimated: bool = False) -> None:
@@ -189,30 +189,30 @@ class Tangents:
         self.g_z = ca.jacobian(self.g, self.z)
 
     def chosen(self, names: tuple[str, ...]) -> Any:
-        """The directions of some values in the space of all, shape (values, names)."""
+        """Return the directions of some values in the space of all, shape (values, names)."""
         out = ca.DM(len(self.layout.values), len(names))
         for k, name in enumerate(names):
             out[self.layout.values.index(name), k] = 1.0
         return ca.sparsify(out)
 
     def through(self, f: Any, *inner: tuple[Any, Any], along: Any = None) -> Any:
-        """Sensitivities of an expression, from those of the variables inside it."""
+        """Return sensitivities of an expression, from those of its variables."""
         total = ca.mtimes(ca.jacobian(f, self.p), self._wanted if along is None else along)
         for variable, sensitivity in inner:
             total = total + ca.mtimes(ca.jacobian(f, variable), sensitivity)
         return ca.sparsify(total)
 
     def at_start(self, f: Any, along: Any = None) -> Any:
-        """Sensitivities of what a trial begins with, the static equilibrium moving along."""
+        """Return sensitivities of initial values, with the change of the static equilibrium included."""
         return self.through(f, (self.z, -self.through(self.g, along=along) / self.g_z), along=along)
 
     def patterns(self, states: Any = None) -> tuple[Any, Any]:
-        """Entries of the sensitivities of states and memories that can be other than zero.
+        """Return the entries of the sensitivities of states and memories that can differ from zero.
 
         Parameters
         ----------
         states
-            Those of the states, if that is known.
+            Those of the states, if known.
         """
         s_pattern = self.at_start(self.x0).sparsity() if states is None else states
         r_pattern = self.at_start(self.m0).sparsity()
@@ -226,7 +226,7 @@ class Tangents:
 
 
 def derive(model: Model, layout: Layout) -> Equations:
-    """Write out a model's equations and sensitivities."""
+    """Return a model's equations and sensitivities."""
     d = Tangents(model, layout)
     s_pattern, r_pattern = d.patterns()
     s, r = ca.SX.sym("S", s_pattern), ca.SX.sym("R", r_pattern)
@@ -250,9 +250,9 @@ def derive(model: Model, layout: Layout) -> Equations:
 
 
 def equations_of(d: Tangents, **written: tuple[list[Any], list[Any]]) -> Equations:
-    """Inputs and outputs of each function as functions, whose outputs are dense and share their common terms.
+    """Return functions of inputs and outputs, whose outputs are dense and share their common terms.
 
-    That of the static equilibrium is added; functions without inputs are of what is known there.
+    The function of the static equilibrium is added; functions without inputs depend on its variables.
     """
     made = {}
     for name, (ins, outs) in {"rest": ([], [d.g, d.g_z]), **written}.items():
@@ -265,12 +265,12 @@ def _symbols(prefix: str, names: Any) -> dict[str, ca.SX]:
 
 
 def column(values: list[Any]) -> ca.SX:
-    """Expressions as a column."""
+    """Return expressions as a column."""
     return ca.vertcat(*[ca.SX(v) for v in values]) if values else ca.SX(0, 1)
 
 
 def nonzeros(matrix: Any, pattern: ca.Sparsity) -> ca.SX:
-    """The entries of `matrix` at `pattern`, as a column."""
+    """Return the entries of `matrix` at `pattern`, as a column."""
     dense = ca.densify(matrix)
     rows, columns = pattern.get_triplet()
     entries = [dense[i, j] for i, j in zip(rows, columns, strict=True)]

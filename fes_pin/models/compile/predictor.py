@@ -1,35 +1,34 @@
-"""A model's one-step-ahead predictor, an extended Kalman filter, and the sensitivities of its innovations.
+"""One-step predictor of a model, an extended Kalman filter, and the sensitivities of its innovations.
 
-Between samples x' = f(x, m, u, p) goes on by Runge-Kutta steps of order four and length h. What is tangent to it
-follows with A = f_x and B = f_m R + f_p as they are in the middle of each step, as if both were constant over it:
+Between samples x' = f(x, m, u, p) is integrated by Runge-Kutta steps of order four and length h. Sensitivities and
+covariance are propagated with A = f_x and B = f_m R + f_p at the middle of each step, taken as constant over it:
 
     F = 1 + (h A / 2) (1 + (h A / 3) (1 + h A / 4)),   M = 1 + h F A
     S <- S + h F (A S + B)
-    P <- M P M' + h (M G M' + G) / 2,                 G the intensities of what drives states at random
+    P <- M P M' + h (M G M' + G) / 2,                 G the intensities of the process noise
 
-which is exact to the order of h^4 where f is linear and to that of h^2 where it bends.
+which is exact to the order of h^4 where f is linear and to that of h^2 where it is not.
 
-f may depend on the deviation of what is estimated, as dry friction does: sqrt(g_x N P N' g_x') of g(x), with P as a
-step begins and N = 1 + t A, t into the step, of the rows of A in which no such deviation is.
+f may depend on the standard deviation of an estimate, as dry friction does: sqrt(g_x N P N' g_x') of g(x), with P at
+the beginning of a step and N = 1 + t A at the time t into the step, from the rows of A without such a deviation.
 
 At a sample, for each measured output y_k in turn, with H = dh_k/dx at its prediction:
 
     r = y_k - h_k,   V = H P H' + n white_k^2,   K = P H' / V
     x <- x + K r,    P <- P - K V K',    dr/dp = -(H S + h_m R + h_p),   S <- S + K dr/dp
 
-The gains K are taken as they are when sensitivities are formed: what a parameter does to them acts through past
-innovations alone, which are white and independent of the predictions where the model is right (Ljung, System
-Identification, 2nd ed., section 7.4). A sample that was not measured corrects nothing. The same count n times in a
-row, as of an encoder that stands, is one reading and not n: its error is the same each time. So are n samples that
-hunt between two counts, which say no more than that what is read is near the edge of both. What a trial begins with
-is known as its unknowns are, and these as their readings are: P = X diag(prior / g)^2 X', X the sensitivities of the
-first states to them and g the slope of the reading: a scale of the reading must not be distinguished from the inertia
-that undoes it.
+Sensitivities are computed at constant gains K: a parameter changes the gains' effect through past innovations alone,
+which are white and independent of the predictions where the model is right (Ljung, System Identification, 2nd ed.,
+section 7.4). A sample that was not measured corrects nothing. The same count n times in a row, as of an encoder at
+rest, is one reading and not n, as its error is the same each time. So are n samples that hunt between two counts, which
+only state that the position is near the edge of both. The initial covariance follows from the prior of a trial's
+unknowns, which is that of their readings: P = X diag(prior / g)^2 X', with X the sensitivities of the first states to
+them and g the slope of the reading. A scale of the reading is then not distinguished from an inertia that undoes it.
 
-A memory that states go into, as the play of a gear does, is as uncertain as they are: it is carried as a state that
-changes at samples alone, m+ = D(x, m). Where D bends within that uncertainty its tangent says little of it: mean, slope
-and what no slope explains are those of differences as long as the uncertainty is, see `_spread`. One that follows with
-slack, and is read, takes part in a sample's first reading of it: see `compile.slack`.
+A memory that depends on states, as the play of a gear does, is as uncertain as they are. It is treated as a state that
+changes at samples only, m+ = D(x, m). Where D is nonlinear within that uncertainty its derivative is not enough: mean,
+slope and residual variance are those of finite differences as long as the uncertainty, see `_spread`. A memory that
+follows with slack and is read is updated together with the first reading of a sample: see `compile.slack`.
 
 Source: Jazwinski, Stochastic Processes and Filtering Theory, 1970, section 8.3; Kristensen, Madsen and Jorgensen,
 Parameter estimation in stochastic grey-box models, Automatica 40 (2004).
@@ -70,7 +69,7 @@ class _Uncertainty:
         return ca.diag(out)
 
     def widened(self, f: Any) -> Any:
-        """Rates with standard deviations in place of their symbols; the states move at the rates that need none."""
+        """Return rates with standard deviations in place of their symbols; states move at the rates without these."""
         d, unsure = self.d, self.d.sym.unsure
         if not unsure:
             return f
@@ -84,7 +83,7 @@ class _Uncertainty:
         return f
 
     def at_start(self, model: Model) -> Any:
-        """Covariance of the first states."""
+        """Return the covariance of the initial states."""
         d, layout, c = self.d, self.d.layout, self.d.sym.c
         unknowns = model.rig.unknowns(layout.kind)
         moved = ca.densify(d.at_start(d.x0, d.chosen(unknowns)))
@@ -105,7 +104,7 @@ class _Uncertainty:
         return next((self.d.sym.c[f"prior.{n}"] for n in unknowns if ("velocity" in n) == fast), 0.0)
 
     def _read_slopes(self, moved: Any) -> list[Any]:
-        """Slope of what is read of each unknown of the start: of its own reading, or the first one's if it has none."""
+        """Return the slope of the reading of each initial unknown: of its own reading, or else of the first output."""
         d, layout = self.d, self.d.layout
         none = [(v, ca.SX.zeros(v.numel())) for v in (d.u, d.t, d.since)]
         out = []
@@ -120,16 +119,16 @@ class _Uncertainty:
 
 
 class Carried(Tangents):
-    """A model's expressions with the memories that states go into carried as states.
+    """A model's expressions with the memories that depend on states treated as states.
 
     Attributes
     ----------
     carried
         Places of those memories among the states.
     followed
-        What each is after a sample.
+        Expression of each after a sample.
     slacks
-        Places of those that follow with slack, with what they follow and half the slack.
+        Places of those that follow with slack, with their targets and half the slack.
     """
 
     def __init__(self, model: Model, layout: Layout) -> None:
@@ -149,7 +148,7 @@ class Carried(Tangents):
         self.m, self.m0, self.after = (column([v[k] for k in others]) for v in (self.m, self.m0, self.after))
 
     def start_variances(self, reach: Any, speed: Any) -> list[tuple[int, Any]]:
-        """Places among the states, and how uncertain a state or a carried memory is there when a trial begins."""
+        """Return places among the states, and the initial variance of the state or memory there."""
         effects = self.sym.signals(self.sym.x, self.sym.m).effects
         known = {f"{e.name}.{n}": variance for e in effects for n, variance in e.start_variances(reach, speed).items()}
         places = [*enumerate(self.sym.states), *zip(self.carried, self._names, strict=True)]
@@ -157,7 +156,7 @@ class Carried(Tangents):
 
 
 def derive_predictor(model: Model, layout: Layout) -> Equations:
-    """Write out a model's predictor; see the module."""
+    """Return the equations of a model's predictor; see the module."""
     d = Carried(model, layout)
     uncertain = _Uncertainty(d, model)
     count, width = uncertain.count, len(layout.columns)
@@ -192,7 +191,7 @@ def derive_predictor(model: Model, layout: Layout) -> Equations:
 
 
 def _followed(d: Carried, uncertain: _Uncertainty, s: Any, r: Any, reached: Any) -> tuple[Any, Any]:
-    """Sensitivities and covariance after an integration step; see the module."""
+    """Return sensitivities and covariance after an integration step; see the module."""
     middle = 0.5 * (d.x + reached)
     slope, direct = (ca.substitute(e, d.x, middle) for e in (ca.jacobian(d.rates, d.x), d.through(d.rates, (d.m, r))))
     h, one = d.sym.c["step"], ca.SX.eye(uncertain.count)
@@ -206,7 +205,7 @@ def _followed(d: Carried, uncertain: _Uncertainty, s: Any, r: Any, reached: Any)
 
 
 def _corrected(d: Carried, uncertain: _Uncertainty, s: Any, inner: tuple[Any, ...], packed: Any) -> list[Any]:
-    """State after the measurements of a sample; innovations, their variances, sensitivities of the innovations."""
+    """Return the state after the measurements of a sample; innovations, their variances and their sensitivities."""
     slack = _read_with_slack(d)
     now, covariance, moved = _remembered(d, uncertain.covariance, s, inner, slack)
     x, u, c = now, d.sym.u, d.sym.c
@@ -230,7 +229,7 @@ def _corrected(d: Carried, uncertain: _Uncertainty, s: Any, inner: tuple[Any, ..
 def _linear(
     d: Carried, now: Any, reading: Any, given: tuple[Any, Any, Any], known: Gaussian, moved: Any, inner: tuple[Any, ...]
 ) -> tuple[tuple[Any, Any, Any], Any, Any, Any]:
-    """Innovation, its variance and sensitivities; state, covariance and sensitivities, linear about `now`."""
+    """Return innovation, its variance and sensitivities; state, covariance and sensitivities, linear about `now`."""
     measured, noise, seen = given
     expressions = (reading, ca.jacobian(reading, d.x), d.through(reading, *inner[1:]))
     predicted, row, direct = (ca.substitute(one, d.x, now) for one in expressions)
@@ -241,7 +240,7 @@ def _linear(
 
 
 def _read_with_slack(d: Carried) -> int | None:
-    """Place of the first memory that follows with slack and is read; None if there is none."""
+    """Return the place of the first memory that follows with slack and is read; None if there is none."""
     read = [d.readings[d.layout.outputs.index(n)] for n in d.layout.measured]
     return next((k for k in d.slacks if any(ca.depends_on(one, d.x[k]) for one in read)), None)
 
@@ -249,7 +248,7 @@ def _read_with_slack(d: Carried) -> int | None:
 def _across_slack(
     d: Carried, k: int, reading: Any, given: tuple[Any, Any, Any], known: Gaussian, moved: Any, inner: tuple[Any, ...]
 ) -> tuple[tuple[Any, Any, Any], Any, Any, Any]:
-    """Innovation, its variance and sensitivities; state, covariance and sensitivities; see `compile.slack`."""
+    """Return innovation, its variance and sensitivities; state, covariance and sensitivities; see `compile.slack`."""
     mean, (measured, noise, _) = ca.SX.sym("mean", d.x.numel()), given
     predicted, left = read_across(Slack(k, *d.slacks[k]), d.x, reading, given, Gaussian(mean, known.covariance))
 
@@ -264,7 +263,7 @@ def _across_slack(
 
 
 def _remembered(d: Carried, covariance: Any, s: Any, inner: tuple[Any, ...], but: int | None) -> tuple[Any, Any, Any]:
-    """States, their covariance and sensitivities once the memories among them, but for one, have followed."""
+    """Return states, covariance and sensitivities after the memories among them, except one, are updated."""
     x, moved = d.x, s
     for k, after in zip(d.carried, d.followed, strict=True):
         if k == but:
@@ -284,7 +283,7 @@ def _with_row(matrix: Any, k: int, row: Any) -> Any:
 
 
 def _spread(f: Any, x: Any, covariance: Any) -> tuple[Any, Any, Any]:
-    """Mean, slope and residual variance of f(x) for a Gaussian x, by differences of its length.
+    """Return mean, slope and residual variance of f(x) for a Gaussian x, by finite differences of its width.
 
     With L L' = P of the variables that f depends on, h = REACH and f+-, the values at x +- h L_j,
 
@@ -312,7 +311,7 @@ def _spread(f: Any, x: Any, covariance: Any) -> tuple[Any, Any, Any]:
 
 
 def _root(p: list[list[Any]]) -> list[list[Any]]:
-    """The lower Cholesky factor of a small matrix of expressions, of its variances and LEAST."""
+    """Return the lower Cholesky factor of a small matrix of expressions, with `LEAST` added to its variances."""
     size = len(p)
     out = [[ca.SX(0)] * size for _ in range(size)]
     for i in range(size):
@@ -323,7 +322,7 @@ def _root(p: list[list[Any]]) -> list[list[Any]]:
 
 
 def _moved(f: Any, x: Any, at: list[int], steps: list[Any]) -> Any:
-    """f with some of its variables moved."""
+    """Return f with some of its variables moved."""
     there = ca.SX(x)
     for i, step in zip(at, steps, strict=True):
         there[i] = there[i] + step

@@ -34,7 +34,7 @@ class Program(Protocol):
     def run(
         self, inputs: np.ndarray, values: np.ndarray, constants: np.ndarray, guess: np.ndarray, substeps: int
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Simulate as many lanes as the layout has.
+        """Simulate the lanes of the layout.
 
         Parameters
         ----------
@@ -43,7 +43,7 @@ class Program(Protocol):
         values, constants
             Shape (number, width), in the layout's order.
         guess
-            Shape (width,): where the search for the static equilibrium starts.
+            Shape (width,): start of the search for the static equilibrium.
         substeps
             Integration steps per sample.
 
@@ -52,7 +52,7 @@ class Program(Protocol):
         readings
             Shape (n, outputs, width); of a predictor (n, 2 measured, width): innovations, then their variances.
         sensitivities
-            Shape (n, outputs, columns, width); of a predictor those of the innovations, for gains as they are.
+            Shape (n, outputs, columns, width); of a predictor those of the innovations at constant gains.
         """
 
 
@@ -61,7 +61,7 @@ _PROGRAMS: dict[tuple[str, str, tuple[type, ...], Layout], Program] = {}
 
 
 def compiled_program(model: Model, layout: Layout) -> Program:
-    """The program of a model, compiled if it was not before; see `make_layout`.
+    """Return the program of a model, compiled if it is not in a cache; see `make_layout`.
 
     Raises
     ------
@@ -79,12 +79,12 @@ def compiled_program(model: Model, layout: Layout) -> Program:
 
 
 def derived(model: Model, layout: Layout) -> Equations:
-    """The equations of a simulation, or of a predictor where the layout has measured outputs.
+    """Return the equations of a simulation, or of a predictor where the layout has measured outputs.
 
     Raises
     ------
     InputError
-        With file and row, if the equations of somebody's own cause or rig cannot be run.
+        With file and row, if the equations of an own cause or rig cannot be run.
     """
     try:
         return derive_predictor(model, layout) if layout.measured else derive(model, layout)
@@ -101,7 +101,7 @@ def _classes(model: Model) -> tuple[type, ...]:
 
 
 def _native(model: Model, layout: Layout) -> Program | None:
-    """Machine code from the cache or compiled; None if it cannot be made here."""
+    """Return machine code from the cache, or compiled; None if it cannot be compiled here."""
     try:
         from fes_pin.models.compile import machine, native  # noqa: PLC0415 - llvmlite may be missing
 
@@ -121,7 +121,7 @@ def _native(model: Model, layout: Layout) -> Program | None:
 
 @cache
 def source_signature() -> str:
-    """Changes whenever an equation, the compiler or CasADi changes."""
+    """Return a signature that changes whenever an equation, the compiler or CasADi changes."""
     return f"{version('casadi')} {code_hash(Path(__file__).parents[1])}"
 
 

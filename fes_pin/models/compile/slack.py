@@ -1,18 +1,17 @@
-"""Filter step for a memory that follows with slack: its distribution, and that of the states, after a reading of it.
+"""Filter update for a memory that follows with slack: its distribution, and that of the states, after a reading of it.
 
-A memory m follows a position p(x) within w: m+ = p - w where the slack s = p - m is beyond w, p + w where it is below
--w, and m between. For a Gaussian x each of the three pieces is a Gaussian cut off where s leaves it, and the reading is
-linear in it. With N_j the density of the reading in piece j, uncut, and P_j the share of the updated x that lies inside
-the piece,
+A memory m follows a position p(x) within w: m+ = p - w where the slack s = p - m is above w, p + w where it is below
+-w, and m between. For a Gaussian x each of the three pieces is a truncated Gaussian, in which the reading is linear.
+With N_j the density of the reading in piece j without truncation, and P_j the share of the updated x inside the piece,
 
     weight_j = P_j N_j / sum P N,   x = sum weight_j E_j[x],   P = sum weight_j (cov_j[x] + (E_j[x] - x)(E_j[x] - x)'),
 
 which is exact in mean and covariance; higher moments of the mixture are dropped. While the slack is crossed, a reading
-that stands still excludes the states that would have moved it, and says nothing of the others: in a linear update its
-noise would move x by many deviations.
+that does not move excludes the states that would have moved it, and carries no information on the others: in a linear
+update its noise would move x by many standard deviations.
 
-Source: assumed-density filtering, Maybeck, Stochastic Models, Estimation and Control 2, 1982, section 12.7; cut
-Gaussians: Johnson, Kotz and Balakrishnan, Continuous Univariate Distributions 1, 2nd ed., section 13.10.1.
+Source: assumed-density filtering, Maybeck, Stochastic Models, Estimation and Control 2, 1982, section 12.7;
+truncated Gaussians: Johnson, Kotz and Balakrishnan, Continuous Univariate Distributions 1, 2nd ed., section 13.10.1.
 """
 
 from __future__ import annotations
@@ -27,11 +26,11 @@ import numpy as np
 import scipy.special
 
 LEAST = 1e-20
-"""Variance that a slack, and a memory that is carried, has at least, in its unit squared: nothing is divided by 0."""
+"""Least variance of a slack, and of a memory that is treated as a state, in its unit squared: it avoids 0 / 0."""
 MIDDLE, DEGREE = 4.0, 16
 """Degree of the polynomial of Mills' ratio in 4 / (4 + z), of relative error 4e-12 (`tests/models/test_slack.py`)."""
 NARROW, TINY = 1e-9, 1e-100
-"""Share between two ends, in those beyond them and by itself, below which it is as if only the nearer end cut."""
+"""Share between two ends, relative to the shares beyond them and absolute, below which only the nearer end is used."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +41,7 @@ class Gaussian:
     covariance: Any
 
     def seen(self, row: Any, innovation: Any, noise: Any, share: Any) -> tuple[Gaussian, Any, Any]:
-        """The Gaussian given a linear reading, the gain, and the reading's variance; a share of 0 changes nothing."""
+        """Return the Gaussian given a linear reading, the gain and its variance; a share of 0 changes nothing."""
         toward = ca.mtimes(self.covariance, row.T)
         variance = ca.mtimes(row, toward) + noise
         gain = share * toward / variance
@@ -50,14 +49,14 @@ class Gaussian:
         return left, gain, variance
 
     def cut(self, slack: Any, mean: Any, low: Any, high: Any) -> tuple[Any, Gaussian]:
-        """Logarithm of the share in which a linear slack is between two ends, and the mean and covariance of that.
+        """Return the logarithm of the share in which a linear slack is between two ends, with its mean and covariance.
 
         Parameters
         ----------
         slack
-            Slope of it, shape (1, n).
+            Slope of the slack, shape (1, n).
         mean
-            Of it.
+            Mean of the slack.
         low, high
             The ends; None where there is none.
         """
@@ -69,14 +68,14 @@ class Gaussian:
 
 
 def mixed(shares: list[Any], parts: list[Gaussian]) -> Gaussian:
-    """Mean and covariance of a mixture."""
+    """Return mean and covariance of a mixture."""
     mean = _sum([share * one.mean for share, one in zip(shares, parts, strict=True)])
     spread = [one.covariance + ca.mtimes(one.mean - mean, (one.mean - mean).T) for one in parts]
     return Gaussian(mean, _sum([share * one for share, one in zip(shares, spread, strict=True)]))
 
 
 def normalized(logs: list[Any]) -> list[Any]:
-    """Shares whose logarithms are known but for what all have in common."""
+    """Return shares from their logarithms up to a common constant."""
     most = logs[0]
     for one in logs[1:]:
         most = ca.fmax(most, one)
@@ -90,7 +89,7 @@ def _sum(many: list[Any]) -> Any:
 
 @dataclass(frozen=True)
 class Slack:
-    """A memory that follows with slack: its place among the states, what it follows, and half the slack."""
+    """A memory that follows with slack: its place among the states, its target, and half the slack."""
 
     place: int
     position: Any
@@ -100,16 +99,16 @@ class Slack:
 def read_across(
     slack: Slack, x: Any, reading: Any, given: tuple[Any, Any, Any], known: Gaussian
 ) -> tuple[Gaussian, Gaussian]:
-    """One-step prediction of a reading without its noise, and the states given the reading; see the module.
+    """Return the one-step prediction of a reading without its noise, and the states given the reading; see the module.
 
     Parameters
     ----------
     x
-        Symbols of the states, which the slack and the reading are expressions in.
+        Symbols of the states, in which slack and reading are expressed.
     given
-        What was measured, the variance of its noise, and 1 where it was seen, 0 else.
+        The measured value, the variance of its noise, and 1 where it was measured, else 0.
     known
-        The states before the memory has followed.
+        The states before the memory is updated.
     """
     position, along = (ca.substitute(e, x, known.mean) for e in (slack.position, ca.jacobian(slack.position, x)))
     across, away = along - ca.SX.eye(x.numel())[slack.place, :], position - known.mean[slack.place]
@@ -130,7 +129,7 @@ def read_across(
 
 @dataclass(frozen=True)
 class _Read:
-    """A piece given a reading: logarithms of its share before and of its weight after, prediction, and states after."""
+    """A piece given a reading: logarithms of its prior share and of its weight, prediction, and posterior states."""
 
     share: Any
     weight: Any
@@ -140,7 +139,7 @@ class _Read:
 
 @dataclass(frozen=True)
 class _Piece:
-    """Where a slack, linear in the states with such slopes and mean, is between two ends; the memory's map there."""
+    """The piece in which a linear slack is between two ends, with the update of the memory there."""
 
     across: Any
     away: Any
@@ -154,7 +153,7 @@ class _Piece:
         return Gaussian(mean, ca.mtimes([self.turned, one.covariance, self.turned.T]))
 
     def read(self, x: Any, reading: Any, given: tuple[Any, Any, Any], known: Gaussian) -> _Read:
-        """The piece across a reading, which is linear about the middle of it."""
+        """Return the piece after a reading, which is linear about the piece's middle."""
         measured, noise, seen = given
         share, part = known.cut(self.across, self.away, self.low, self.high)
         middle = self._followed(part).mean
@@ -171,14 +170,14 @@ class _Piece:
 
 
 class _End:
-    """An end that cuts a standard Gaussian: logarithms of the shares beyond and below it, and means of these."""
+    """An end that truncates a standard Gaussian: logarithms of the shares above and below it, and their means."""
 
     def __init__(self, z: Any) -> None:
         self.density = ca.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi)
         size = ca.fabs(z)
         mills = _mills(size)
         self.tail = self.density * mills
-        """Share on the side where the Gaussian's middle is not."""
+        """Share on the side without the Gaussian's middle."""
         far = ca.log(mills) - 0.5 * z * z - 0.5 * math.log(2.0 * math.pi), 1.0 / mills
         near = ca.log(1.0 - self.tail), self.density / (1.0 - self.tail)
         self.z, is_above = z, z > 0.0
@@ -186,16 +185,16 @@ class _End:
         self.below, self.other = (ca.if_else(is_above, b, a) for a, b in zip(far, near, strict=True))
 
     def as_low(self) -> tuple[Any, Any, Any]:
-        """Logarithm of the share beyond it, mean and variance there."""
+        """Return the logarithm of the share above it, with mean and variance there."""
         return self.beyond, self.hazard, ca.fmax(1.0 + self.z * self.hazard - self.hazard * self.hazard, 0.0)
 
     def as_high(self) -> tuple[Any, Any, Any]:
-        """The same below it."""
+        """Return the same below it."""
         return self.below, -self.other, ca.fmax(1.0 - self.z * self.other - self.other * self.other, 0.0)
 
 
 def _between(low: Any, high: Any) -> tuple[Any, Any, Any]:
-    """Logarithm of the share of a standard Gaussian between two ends, mean and variance there; an end may be None."""
+    """Return the logarithm of a standard Gaussian's share between two ends, mean and variance; an end may be None."""
     if high is None:
         return _End(low).as_low()
     if low is None:
@@ -215,13 +214,13 @@ def _between(low: Any, high: Any) -> tuple[Any, Any, Any]:
 
 
 def _without(inside: tuple[Any, Any, Any], beyond: Any) -> tuple[Any, Any, Any]:
-    """What the nearer of two ends leaves: its share alone feels what is beyond the other."""
+    """Return the share by the nearer of two ends alone, minus the share beyond the other."""
     share = ca.log(ca.fmax(1.0 - ca.exp(beyond - inside[0]), TINY))
     return inside[0] + share, *inside[1:]
 
 
 def _mills(z: Any) -> Any:
-    """Share of a standard Gaussian beyond z > 0 over its density there, to eleven digits."""
+    """Return the share of a standard Gaussian above z > 0 over its density there, to eleven digits."""
     t = MIDDLE / (MIDDLE + z)
     terms, power = list(_coefficients()), 2.0 * t - 1.0
     while len(terms) > 1:  # in pairs of pairs: a short chain
