@@ -165,13 +165,9 @@ def independent(values: np.ndarray, gains: np.ndarray) -> np.ndarray:
     found = np.zeros(len(values), dtype=bool)
     apart = np.abs(np.diff(values)) > SAME_POLE * np.maximum(1.0, np.abs(values[1:]))
     for group in np.split(np.arange(len(values)), np.flatnonzero(apart) + 1):
-        found[group] = gains[group].any() if len(group) == 1 else _full_rank(gains[group])
+        rank = np.linalg.matrix_rank(gains[group], rtol=RELATIVE_TOLERANCE) if gains.size else 0
+        found[group] = rank == len(group)
     return found
-
-
-def _full_rank(rows: np.ndarray) -> bool:
-    singular = np.linalg.svd(rows, compute_uv=False)
-    return len(singular) >= len(rows) and bool(singular[len(rows) - 1] > RELATIVE_TOLERANCE * max(singular[0], 1e-300))
 
 
 def mode_price(values: np.ndarray, horizon: float) -> np.ndarray:

@@ -71,13 +71,12 @@ def without_free(rows: np.ndarray) -> np.ndarray:
     count, scale = len(rows), np.abs(rows).max(initial=0.0)
     if scale == 0.0:
         return np.eye(count)
-    rank = np.linalg.matrix_rank(rows, tol=_RANK * scale)
+    rows = np.where(np.abs(rows) > _RANK * scale, rows / scale, 0.0)
+    rank = np.linalg.matrix_rank(rows, tol=_RANK)
     rays: list[np.ndarray] = []
     for size in range(1, rank + 2):
         for support in itertools.combinations(range(count), size):
-            weights = (
-                null_space(rows[list(support)].T / scale, rcond=_RANK) if size > 1 else _alone(rows[support[0]], scale)
-            )
+            weights = null_space(rows[list(support)].T, rcond=_RANK)
             if weights.shape[1] != 1:
                 continue
             weight = weights[:, 0] * np.sign(weights[np.abs(weights).argmax(), 0])
@@ -86,8 +85,3 @@ def without_free(rows: np.ndarray) -> np.ndarray:
                 ray[list(support)] = weight / weight.max()
                 rays.append(ray)
     return np.array(rays).reshape(-1, count)
-
-
-def _alone(row: np.ndarray, scale: float) -> np.ndarray:
-    """The null space of one row: (1, 1) where nothing free acts on it, else (1, 0)."""
-    return np.ones((1, int(np.abs(row).max() <= _RANK * scale)))
