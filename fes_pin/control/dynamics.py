@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import scipy.linalg
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import between, number, positive_number, shortened
@@ -26,8 +27,6 @@ ANGLES_RAD = (0.3, 2.8)
 own lie well within."""
 LONGEST_STRETCH = 3.0
 """Angle in rad beyond theta_r from which eq. (1) is as there, so that no state overflows: far beyond any ankle."""
-
-_ONE = np.eye(5)
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,14 +159,5 @@ class AnkleDynamics(Tabulated):
         return act, q, v
 
     def transition(self, q: float, activation: float, share: float) -> np.ndarray:
-        """The transition of `linear` over a pulse about a state, shape (5, 5).
-
-        exp(f t) by its series to the third power and by squaring; to 1e-4.
-        """
-        # the variation's pieces are finer than those of the motion, by halving: a quarter of them, in powers of two
-        halvings = max(2, math.ceil(math.log2(4 * self.pieces)))
-        f = self.linear(q, activation, share) * (PULSE_S / (1 << halvings))
-        a = _ONE + f @ (_ONE + f @ (_ONE + f / 3.0) / 2.0)
-        for _ in range(halvings):
-            a = a @ a
-        return a
+        """The transition of `linear` over a pulse about a state, shape (5, 5)."""
+        return scipy.linalg.expm(PULSE_S * self.linear(q, activation, share))
