@@ -7,7 +7,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import read_json, write_text
@@ -84,19 +84,28 @@ class Saveable(Recorded):
         return table_html(*self.as_table())
 
 
-class Plan(Protocol):
-    """An experiment that would distinguish two causes, or the reason why none does."""
+@dataclass(frozen=True)
+class Plan:
+    """An experiment that would distinguish two causes, or the reason why none does: base of those of rigs and walks.
 
-    @property
-    def why(self) -> str:
-        """In words."""
+    Attributes
+    ----------
+    why
+        The reason, in words.
+    separates
+        The two causes; of several rivals the one that the experiment separates least.
+    """
 
-    @property
-    def separates(self) -> tuple[str, str]:
-        """The two."""
+    why: str
+    separates: tuple[str, str]
+
+    def trial_record(self) -> dict[str, Any] | None:
+        """Return the trial as JSON files have it; None where no trial separates the two."""
+        raise NotImplementedError
 
     def record(self) -> dict[str, Any]:
-        """As JSON files have it."""
+        """Return the experiment as JSON files have it."""
+        return {"why": self.why, "separates": list(self.separates), "trial": self.trial_record()}
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)

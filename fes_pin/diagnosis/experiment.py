@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from fes_pin.data.results import Plan
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.identify.ahead import falls
@@ -38,15 +39,13 @@ ROUNDS, CHILDREN = 24, 4
 
 
 @dataclass(frozen=True)
-class NextExperiment:
+class NextExperiment(Plan):
     """A trial that distinguishes two causes, or the reason why no trial does.
 
     Attributes
     ----------
-    why
-        The reason, in words.
-    separates
-        The pair of causes; of several rivals the one that the trial separates least.
+    why, separates
+        As of `Plan`.
     trial
         Its inputs and conditions, without outputs; None where no input of the rig separates the pair.
     expected
@@ -54,8 +53,6 @@ class NextExperiment:
         second if that is, in twice the log-likelihood.
     """
 
-    why: str
-    separates: tuple[str, str]
     trial: Trial | None
     expected: tuple[float, float] = (0.0, 0.0)
 
@@ -66,12 +63,11 @@ class NextExperiment:
         warnings.warn(said, DeprecationWarning, stacklevel=2)
         return self.expected
 
-    def record(self) -> dict[str, Any]:
-        """Return the experiment as JSON files have it; the inputs are in `NEXT_FILE`."""
-        trial, one = None, self.trial
-        if one is not None:
-            trial = {"file": NEXT_FILE, "kind": one.kind, **{n: shown(v) for n, v in one.conditions.items()}}
-        return {"why": self.why, "separates": list(self.separates), "trial": trial}
+    def trial_record(self) -> dict[str, Any] | None:
+        """Return the trial as JSON files have it; its inputs are in `NEXT_FILE`."""
+        if (one := self.trial) is None:
+            return None
+        return {"file": NEXT_FILE, "kind": one.kind, **{n: shown(v) for n, v in one.conditions.items()}}
 
 
 @dataclass(frozen=True)

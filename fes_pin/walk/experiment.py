@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from fes_pin.data.read_only import ReadOnly
+from fes_pin.data.results import Plan
 from fes_pin.infer.levels import STRONG_EVIDENCE
 from fes_pin.infer.search import SearchResult
 from fes_pin.walk.designs import Designs
@@ -26,32 +27,27 @@ SLOWER = 0.6
 
 
 @dataclass(frozen=True)
-class NextWalk(ReadOnly):
+class NextWalk(Plan, ReadOnly):
     """A trial to do next.
 
     Attributes
     ----------
-    why
-        The reason, in words.
-    separates
-        The two causes.
+    why, separates
+        As of `Plan`.
     conditions
         Conditions of the trial, as a `[[trial]]` table; None where no simple trial separates them.
     coordinates
         Columns of the motion to make: `time_s`, `q_<coordinate>`.
     """
 
-    why: str
-    separates: tuple[str, str]
     conditions: dict[str, float] | None
     coordinates: dict[str, np.ndarray] | None
 
-    def record(self) -> dict[str, Any]:
-        """Return the experiment as JSON files have it; the motion is in `NEXT_FILE`."""
-        trial = None
-        if self.conditions is not None:
-            trial = {"coordinates": NEXT_FILE, "file": NEXT_FILE, "kind": "motion", **self.conditions}
-        return {"why": self.why, "separates": list(self.separates), "trial": trial}
+    def trial_record(self) -> dict[str, Any] | None:
+        """Return the trial as JSON files have it; its motion is in `NEXT_FILE`."""
+        if self.conditions is None:
+            return None
+        return {"coordinates": NEXT_FILE, "file": NEXT_FILE, "kind": "motion", **self.conditions}
 
 
 def next_walk(models: WalkModels, found: SearchResult[WalkFit], cause: str) -> NextWalk | None:
