@@ -17,7 +17,6 @@ from fes_pin.models.compile.layout import Layout, make_layout, widest, width_of
 from fes_pin.models.compile.program import Program, compiled_program
 from fes_pin.models.least_squares import least_squares
 from fes_pin.models.model import Model
-from fes_pin.models.rigs.base import Rig
 from fes_pin.models.storage import pass_as_stored
 
 EachTrial = Sequence[Mapping[str, float]]
@@ -246,8 +245,17 @@ class Block:
         self._latest = lru_cache(maxsize=1)(self._inputs)  # other threads ask for other ones
 
     def _inputs(self, shift: tuple[int, ...]) -> np.ndarray:
-        """Return inputs of all lanes, delayed by whole samples; before the trial begins they are zero."""
-        return lane_inputs(self.rig, self.trials, self.inputs, (self.count, self.width), shift)
+        """Return inputs of all lanes, shape (count, inputs, width), each delayed by whole samples; zero before.
+
+        An imposed motion is never delayed: a delay is that of the response to a stimulus.
+        """
+        u = np.zeros((self.count, len(self.inputs), self.width))
+        for lane, trial in enumerate(self.trials):
+            for j, name in enumerate(self.inputs):
+                late = 0 if name in MOTION else min(shift[lane], len(trial))
+                values = driving_values(trial, name, self.rig.schema.imposed)
+                u[late : len(trial), j, lane] = values[: len(trial) - late]
+        return u
 
     def _set(self, constants: np.ndarray, name: str, values: Sequence[float]) -> None:
         """Write a constant of each lane; unused lanes equal the last trial."""
@@ -301,21 +309,6 @@ def max_step(model: Model) -> float:
 def substeps(model: Model, dt: float, max_step_s: float) -> int:
     """Return integration steps per sample; a delay needs one more, which ends where the input jumps."""
     return max(1, math.ceil(dt / max_step_s - 1e-6)) + is_delayed(model)
-
-
-def lane_inputs(
-    rig: Rig, trials: Sequence[Trial], inputs: Sequence[str], size: tuple[int, int], shift: Sequence[int]
-) -> np.ndarray:
-    """Return inputs of a batch, shape (count, inputs, width), each delayed by whole samples; zero before.
-
-    `size` is (count, width). An imposed motion is never delayed: a delay is that of the response to a stimulus.
-    """
-    u = np.zeros((size[0], len(inputs), size[1]))
-    for lane, trial in enumerate(trials):
-        for j, name in enumerate(inputs):
-            late = 0 if name in MOTION else min(shift[lane], len(trial))
-            u[late : len(trial), j, lane] = driving_values(trial, name, rig.schema.imposed)[: len(trial) - late]
-    return u
 
 
 def lane_values(layout: Layout, values: EachTrial, unknowns: EachTrial) -> np.ndarray:
