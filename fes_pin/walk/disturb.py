@@ -91,8 +91,7 @@ def _responses(
             recording.motion.body, clock, own, recording.hip, cutoff_hz=recording.cutoff_hz,
             belt_speed_mps=recording.belt_speed_mps,
         ).part(inside)  # fmt: skip
-        way = np.zeros((len(motion.time), 3))
-        way[:, 0] = recording.belt_speed_mps * (clock[0] - recording.start_s)
+        way = [recording.belt_speed_mps * (clock[0] - recording.start_s), 0.0, 0.0]
         centre = centre_of_mass(motion)
         return about(total, centre + way) - about(required(motion), centre)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -112,15 +112,13 @@ def _shares(old: WalkTrial) -> dict[str, np.ndarray]:
 
 def _stand(old: WalkTrial) -> WalkTrial:
     motion = old.motion
-    still = Motion(motion.body, motion.model, motion.time, motion.q[:1].repeat(len(motion.time), axis=0),
-                   0.0 * motion.v, 0.0 * motion.a)  # fmt: skip
+    still = replace(motion, q=motion.q[:1].repeat(len(motion.time), axis=0), v=0.0 * motion.v, a=0.0 * motion.a)
     one = np.ones(len(motion.time))
     return _trial(old, still, {"left": 0.0 * one, "right": one})
 
 
 def _slower(old: WalkTrial) -> WalkTrial:
-    motion = old.motion
-    slow = Motion(motion.body, motion.model, motion.time, motion.q, SLOWER * motion.v, SLOWER**2 * motion.a)
+    slow = replace(old.motion, v=SLOWER * old.motion.v, a=SLOWER**2 * old.motion.a)
     return _trial(old, slow, _shares(old))
 
 

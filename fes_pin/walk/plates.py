@@ -100,8 +100,7 @@ def plates_of(
     if at[0] < time[0] - 1e-9 or at[-1] > time[-1] + 1e-9:
         raise InputError(f"ground reaction is known from {time[0]:g} to {time[-1]:g} s, motion from {at[0]:g}")
     dt = float(time[-1] - time[0]) / (len(time) - 1)
-    way = np.zeros((len(time), 3))
-    way[:, 0] = belt_speed_mps * (time - (at[0] if start_s is None else start_s))
+    way = np.outer(belt_speed_mps * (time - (at[0] if start_s is None else start_s)), [1.0, 0.0, 0.0])
     feet, pressure, loaded = {}, {}, {}
     for side in SIDES:
         force, point, free = (

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+from scipy.interpolate import make_interp_spline
 
 from fes_pin.body.joints import SIDES
 from fes_pin.walk.plates import Plates
@@ -124,11 +125,7 @@ def _phase(time: np.ndarray, plates: Plates) -> np.ndarray:
             half = abs(both[0][0] - both[1][0])
             return (time - both[1][0]) / (2.0 * half)
         return (time - time[0]) / min(STILL_S, time[-1] - time[0] + (time[1] - time[0]))
-    count = np.arange(len(best), dtype=float)
-    ahead = (time - best[-1]) / (best[-1] - best[-2]) + count[-1]
-    behind = (time - best[0]) / (best[1] - best[0])
-    within = np.interp(time, best, count)
-    return np.where(time > best[-1], ahead, np.where(time < best[0], behind, within)) + shift
+    return make_interp_spline(best, np.arange(len(best)), k=1)(time) + shift
 
 
 def _contacts(time: np.ndarray, loaded: np.ndarray) -> np.ndarray:

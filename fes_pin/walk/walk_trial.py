@@ -116,6 +116,5 @@ def walk_trial_of(recording: WalkRecording, cutoff_hz: float, later_s: float = 0
             time, recording.raw_plates, held, cutoff_hz=cutoff_hz, belt_speed_mps=recording.belt_speed_mps,
             start_s=recording.start_s,
         )  # fmt: skip
-    way = np.zeros((len(recording.motion.time), 3))
-    way[:, 0] = recording.belt_speed_mps * (recording.motion.time - recording.start_s)
+    way = np.outer(recording.belt_speed_mps * (recording.motion.time - recording.start_s), [1.0, 0.0, 0.0])
     return WalkTrial(recording.name, recording.motion, plates, centre_of_mass(recording.motion), way)
