@@ -137,7 +137,7 @@ class FittedSets(ABC, Generic[F, S]):
         return None
 
     def begin_again(self, names: Names) -> bool:
-        """Fit a set and the nominal model under the noise of the set; return False where every fit has its own."""
+        """Fit a set and the nominal model with another kind of noise; return False where none lowers the criterion."""
         return False
 
     def extend(self, base: Names, most: int | None = None) -> None:

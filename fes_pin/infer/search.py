@@ -116,7 +116,7 @@ class Models(Protocol[F, M_co]):
         """Return the same set in a form that another order of refinements reaches, where that is better; else None."""
 
     def begin_again(self, names: Names) -> bool:
-        """Fit a set and the nominal model under the noise of the set; return False where every fit has its own."""
+        """Fit a set and the nominal model with another kind of noise; return False where none lowers the criterion."""
 
 
 @dataclass(frozen=True)
@@ -214,7 +214,7 @@ class Search(Generic[F, M]):
         return self.settle(self._backward(self._found_forward() if given is None else given))
 
     def _found_forward(self) -> Names:
-        """Return the best set of a forward search, repeated under the noise of that set where it changes."""
+        """Return the best set of a forward search, repeated with another kind of noise where that is likelier."""
         self._forward()
         if self._sets.begin_again(self._kept):
             self._rejected.clear()
