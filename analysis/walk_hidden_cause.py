@@ -52,11 +52,11 @@ believed, found = fp.Body.from_subject(subject.mass_kg, subject.height_m), diagn
 print(f"believed body {believed.mass_kg:.1f} kg, extended body {found.mass_kg:.1f} kg")
 
 # %% The same walk, by the believed body and by the extended one
-_, (recording,) = recordings_of(study)
+(recording,) = recordings_of(study)
 motion, plates = recording.motion, recording.plates
 centre = centre_of_mass(motion)
 read, needed = about(plates.total, centre), about(required(motion), centre)
-_, (again,) = recordings_of(study, body=found)
+(again,) = recordings_of(study, body=found)
 extended = about(required(again.motion), centre)
 
 

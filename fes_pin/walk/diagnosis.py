@@ -60,7 +60,7 @@ def diagnose_walk(
         raise InputError("expected at least one trial to fit; all have role = held_out", file=study.folder)
     with one_thread_each(), noting_stops() as stops:
         tell(0.02, "inverse dynamics")
-        _, recordings = recordings_of(replace(study, trials=trials), cutoff_hz=cutoff_hz)
+        recordings = recordings_of(replace(study, trials=trials), cutoff_hz=cutoff_hz)
         models = WalkModels(Designs(recordings, cutoff_hz, seed), seed)
         with time_limit(math.inf if limit is None else limit - (time.perf_counter() - began)):
             search, found = _searched(models, tell)

@@ -59,7 +59,7 @@ class WalkRecording:
     start_s: float = 0.0
 
 
-def body_of(study: Study, stance: str = "right") -> tuple[Body, np.ndarray]:
+def body_of(study: Study) -> tuple[Body, np.ndarray]:
     """The body that a study believes in, and its right hip centre in OpenSim's pelvis, (3,) m.
 
     Raises
@@ -77,12 +77,12 @@ def body_of(study: Study, stance: str = "right") -> tuple[Body, np.ndarray]:
         return body, pelvis_to_hip(body)
     if "segments" in study.files:
         path = study.files["segments"]
-        body = Body.from_segments(path, stance)
+        body = Body.from_segments(path)
         try:
             return _as_heavy(body, study), pelvis_to_hip(body, json.loads(path.read_text()))
         except InputError as error:
             raise InputError(error.message, file=path, column=error.column) from None
-    body = Body.from_subject(study.constants["mass_kg"], study.constants["height_m"], stance=stance)
+    body = Body.from_subject(study.constants["mass_kg"], study.constants["height_m"])
     return body, pelvis_to_hip(body)
 
 
@@ -100,9 +100,7 @@ def _as_heavy(body: Body, study: Study) -> Body:
     return body
 
 
-def recordings_of(
-    study: Study, *, cutoff_hz: float = CUTOFF_HZ, stance: str = "right", body: Body | None = None
-) -> tuple[Body, list[WalkRecording]]:
+def recordings_of(study: Study, *, cutoff_hz: float = CUTOFF_HZ, body: Body | None = None) -> list[WalkRecording]:
     """Every trial of a walking study, each file at its own sample rate; by the body that is given, else the study's.
 
     Raises
@@ -110,9 +108,8 @@ def recordings_of(
     InputError
         As `body_of`, and for a trial too short to filter.
     """
-    believed, hip = body_of(study, stance)
-    body = believed if body is None else body
-    return body, [_recording(trial, body, hip, cutoff_hz) for trial in study.trials]
+    believed, hip = body_of(study)
+    return [_recording(trial, body or believed, hip, cutoff_hz) for trial in study.trials]
 
 
 def _recording(trial: Trial, body: Body, hip: np.ndarray, cutoff_hz: float) -> WalkRecording:
@@ -142,16 +139,5 @@ def _recording(trial: Trial, body: Body, hip: np.ndarray, cutoff_hz: float) -> W
     except InputError as error:
         raise InputError(error.message, file=reaction, column=error.column) from None
     motion, plates = motion.part(rows), plates.part(rows)
-    return WalkRecording(
-        trial.name,
-        motion,
-        plates,
-        raw_time,
-        dict(raw),
-        time,
-        dict(columns),
-        hip,
-        cutoff_hz,
-        belt,
-        float(time[0]),
-    )
+    as_read = raw_time, dict(raw), time, dict(columns)
+    return WalkRecording(trial.name, motion, plates, *as_read, hip, cutoff_hz, belt, float(time[0]))

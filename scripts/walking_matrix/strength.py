@@ -40,4 +40,4 @@ def strength(gait: Gait, wrong: Wrong, seed: int, study: Study) -> float:
 
 
 def _designs(study: Study) -> Designs:
-    return Designs(recordings_of(study, cutoff_hz=CUTOFF_HZ)[1], CUTOFF_HZ)
+    return Designs(recordings_of(study, cutoff_hz=CUTOFF_HZ), CUTOFF_HZ)

@@ -145,10 +145,10 @@ def test_a_walk_is_the_trials_that_it_is_given(measured):
     study = measured
     (trial,) = study.trials
     doubled = trial.with_columns(**{n: 2.0 * trial[n] for n in trial.columns if n[1:3] in ("_F", "_T")})
-    _, (whole,) = recordings_of(study)
-    _, (again,) = recordings_of(replace(study, trials=(trial.with_columns(r_Fx=trial["r_Fx"]),)))
-    _, (heavy,) = recordings_of(replace(study, trials=(doubled,)))
-    _, (short,) = recordings_of(replace(study, trials=(trial.first(len(trial) // 2),)))
+    (whole,) = recordings_of(study)
+    (again,) = recordings_of(replace(study, trials=(trial.with_columns(r_Fx=trial["r_Fx"]),)))
+    (heavy,) = recordings_of(replace(study, trials=(doubled,)))
+    (short,) = recordings_of(replace(study, trials=(trial.first(len(trial) // 2),)))
     assert np.array_equal(whole.raw_time, again.raw_time) and len(whole.raw_time) > len(trial)
     up = [plates.plates.feet["right"][:, 2].max() for plates in (whole, heavy)]
     assert up[1] == pytest.approx(2.0 * up[0], rel=0.05)

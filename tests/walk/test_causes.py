@@ -29,7 +29,7 @@ def trial(gait, folder, wrong, seed=3):
     from walking_matrix.synthetic import make
 
     make(gait, folder, wrong, seed)
-    (recording,) = recordings_of(read_study(folder))[1]
+    (recording,) = recordings_of(read_study(folder))
     return walk_trial_of(recording, recording.cutoff_hz)
 
 

@@ -20,7 +20,7 @@ def models_of(gait, folder, seed, *args, **more):
     from walking_matrix.synthetic import Wrong, make
 
     make(gait, folder, Wrong(*args, **{"strides": 2, "tissue": 0.4, **more}), seed)
-    _, recordings = recordings_of(read_study(folder))
+    recordings = recordings_of(read_study(folder))
     return WalkModels(Designs(recordings, recordings[0].cutoff_hz), seed=0)
 
 

@@ -42,7 +42,7 @@ def folder(walk, tmp_path):
 
 
 def read(folder):
-    return recordings_of(read_study(folder))[1][0]
+    return recordings_of(read_study(folder))[0]
 
 
 def scaled(path, chosen, factor):
