@@ -12,6 +12,7 @@ from defusedxml.ElementTree import fromstring
 from fes_pin.body.build import Body
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import in_full
+from fes_pin.data.urdf import MOMENTS
 from fes_pin.walk.models import WalkFit, WalkModels
 
 ROUNDED = 1e-3
@@ -61,11 +62,10 @@ def with_segments(body: Body, parameters: dict[str, np.ndarray]) -> Body:
         inertial = link.find("inertial")
         if inertial is None:
             raise InputError("the link has no inertial element", column=name)
-        six = pin.Inertia(0.0, np.zeros(3), one.inertia).toDynamicParameters()[4:]
         written = {
             "origin": {"xyz": in_full(*one.lever)},
             "mass": {"value": in_full(mass)},
-            "inertia": dict(zip(("ixx", "ixy", "iyy", "ixz", "iyz", "izz"), map(in_full, six), strict=True)),
+            "inertia": dict(zip(MOMENTS, map(in_full, one.inertia[np.triu_indices(3)]), strict=True)),
         }
         for child in inertial:
             child.attrib.update(written.get(child.tag, {}))
