@@ -70,7 +70,7 @@ class Contrast(Result):
 
     def head(self) -> tuple[str, ...]:
         """Titles of the table of changes."""
-        return "change", "what happened", "values", "p", "cannot be told from"
+        return "change", "what happened", "values", "p", "equivalents"
 
     def own_record(self) -> dict[str, Any]:
         """Return the part of `contrast.json` about its groups."""

@@ -1,4 +1,4 @@
-"""What every result can do: it is read-only, compared, copied, shown as a table, saved as JSON and loaded again."""
+"""Base of results: read-only, comparable, copied, shown as a table, saved as JSON and loaded again."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ UNCOMPARED = ("wall_s", "provenance")
 
 
 class Recorded(ReadOnly):
-    """Base of what has a record. Two are equal if they say the same: the same record, to the digits that are printed,
-    whatever time they took and however they were made."""
+    """Base of objects with a record. Two are equal if their records are, to the printed digits, whatever their
+    computing time and provenance."""
 
     def _kind(self) -> str:
         return type(self).__name__
 
     def record(self) -> dict[str, Any]:
-        """What it says, as plain values for JSON."""
+        """Return its content as plain values for JSON."""
         raise NotImplementedError
 
     def _said(self) -> str:
@@ -51,7 +51,7 @@ class Recorded(ReadOnly):
 
 
 class Saveable(Recorded):
-    """Base of results: what has a record and a table. A loaded result equals the one that was saved."""
+    """Base of results with a record and a table. A loaded result equals the one that was saved."""
 
     def columns(self) -> dict[str, list[Any]]:
         """The table of `to_frame`, by columns."""
@@ -110,26 +110,26 @@ class Plan:
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Result(Saveable):
-    """What an inference says of a study: base of diagnoses and contrasts.
+    """The result of an inference: base of diagnoses and contrasts.
 
     Attributes
     ----------
     verdict
-        One word; "stopped" where a limit of time ended the search, or fits did not converge. Then the causes are the
-        best set so far, and nothing is claimed of what is not among them.
+        The verdict in one word; "stopped" where a limit of time ended the search, or fits did not converge. Then the
+        causes are the best set so far, and nothing is claimed about other causes.
     causes
-        What is named: by gain, largest first, or changes, surest first.
+        Named causes, largest gain first, or changes, most significant first.
     remainder
         Lack of fit.
     warnings
-        What is odd about the study, and what could not be done, one line each.
+        Warnings about the study, and about steps that could not be made, one line each.
     reason
-        Why something is unexplained, where it is no test of the residuals that says so: nothing could be fitted, or an
-        error stays that is no noise.
+        Why the model has a lack of fit, where no test of residuals finds it: nothing could be fitted, or an error
+        remains that is no noise.
     next_experiment
         The experiment that would distinguish the first cause from its equivalents.
     provenance
-        When, by which versions, from which files it was made.
+        Time, versions and files of its making.
     """
 
     study: Study
@@ -142,10 +142,10 @@ class Result(Saveable):
     next_experiment: Plan | None = None
     provenance: Provenance | None = None
     KIND: ClassVar[type[Named]] = Cause
-    """Of what is named."""
+    """Type of the causes."""
     FILE: ClassVar[str] = "diagnosis.json"
     MODEL: ClassVar[str] = "the model"
-    """What is diagnosed, in words."""
+    """The diagnosed model, in words."""
 
     @property
     def is_stopped(self) -> bool:
@@ -154,20 +154,20 @@ class Result(Saveable):
 
     @property
     def judged_on(self) -> str:
-        """Of which predictions the errors count, in words."""
+        """The predictions whose errors count, in words."""
         return ""
 
     def errors(self) -> list[Explained]:
-        """Errors of every kind of prediction, on data that were fitted and, last, on data that took no part."""
+        """Return errors of every kind of prediction, on fitted data and, last, on held-out data."""
         return []
 
     @property
     def explained(self) -> Explained | None:
-        """What all causes together gain, and against what that is measured."""
+        """The gain of all causes together, with its reference and measure; None without errors."""
         return next((one for one in reversed(self.errors()) if one.what == self.judged_on), None)
 
     def title(self) -> str:
-        """The verdict in a few words."""
+        """Return the verdict in a few words."""
         begun = "stopped: best set so far: " if self.is_stopped else ""
         lacks = [one.name.replace("_", " ") for one in self.causes if one.trial is None]
         said = [one.words for one in self.causes if one.trial is not None]
@@ -181,20 +181,20 @@ class Result(Saveable):
         return f"{begun}{listed(said) if said else nothing[self.verdict]}{more}"
 
     def headline(self) -> str:
-        """The verdict in one sentence, with what is explained, and against what that is measured."""
+        """Return the verdict in one sentence, with the gain of all causes and its reference."""
         explains = f": that explains {self.explained}" if self.explained and self.causes else ""
         return f"{self.title()}{explains}{f': {self.reason}' if self.reason else ''}."
 
     def notes(self) -> list[tuple[str, str]]:
-        """What is said besides the table of what is named, by topic."""
+        """Return notes in addition to the table of causes, by topic."""
         return [*self.judged(), ("next", self.advice()), *(("warning", words) for words in self.warnings)]
 
     def effect(self, name: str) -> type | None:
-        """The class that describes a cause, with its equation; None of what has none."""
+        """Return the class of a cause, with its equation; None without one."""
         return None
 
     def advice(self) -> str:
-        """What to do next."""
+        """Return the next step, in words."""
         if self.is_stopped:
             return "diagnose again without a limit of time, or with a longer one, before this answer is used"
         if self.next_experiment is not None and self.causes:
@@ -206,7 +206,7 @@ class Result(Saveable):
         return "keep the model; to look for causes that these data cannot show, record other ones"
 
     def judged(self) -> list[tuple[str, str]]:
-        """By which measure, and on what data, each is judged that is named, with its gain by that."""
+        """Return the measure and the data by which each cause is judged, with its gain."""
         gains: dict[str, list[str]] = {}
         for one in self.causes:
             if (gain := one.judged) is not None:
@@ -214,13 +214,13 @@ class Result(Saveable):
         return [(f"judged by {measure}", ", ".join(names)) for measure, names in gains.items()]
 
     def own_record(self) -> dict[str, Any]:
-        """What the record has that those of others have not."""
+        """Return the part of the record that only this kind of result has."""
         raise NotImplementedError
 
     def head(self) -> tuple[str, ...]:
-        """Titles of the table of what is named."""
+        """Return the titles of the table of causes."""
         held_out = any(one.gain_held_out.is_held_out for one in self.causes if isinstance(one, Cause))
-        return "cause", "where", "parameters", f"{'held-out' if held_out else 'fitted'} gain", "cannot be told from"
+        return "cause", "where", "parameters", f"{'held-out' if held_out else 'fitted'} gain", "equivalents"
 
     def record(self) -> dict[str, Any]:
         """The JSON file as a dictionary, without the text and the table that a saved result has as well."""
@@ -306,7 +306,7 @@ class SavedResult(Saveable):
         return tuple(self.found.get("causes", self.found.get("changes", ())))
 
     def record(self) -> dict[str, Any]:
-        """What was saved of the result, as plain values."""
+        """Return the saved record, as plain values."""
         return dict(as_dicts(self.found))
 
     def columns(self) -> dict[str, list[Any]]:
