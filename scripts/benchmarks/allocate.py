@@ -161,7 +161,7 @@ def horizon() -> list[tuple]:
         taken = durations(lambda k, a=ahead, p=plans: p.append(a.advance(torque[k : k + 10])), range(400))
         residual, gap = max(max(p.primal, p.dual) for p in plans), max(p.gap for p in plans)
         label = f"10-step horizon{', fatigue' if fatigue else ''}, {name} (rank {rank})"
-        rows += timed(label, tuple(t[20:] for t in taken), 1e3, None, "ms", 33.0)
+        rows += timed(label, tuple(t[20:] for t in taken), 1e3, None, "ms", 15.0)
         rows += [
             (f"{label}: greatest residual", residual, 1e-9, "of strongest channel^2"),
             (f"{label}: greatest proven gap", gap, 1e-9, "of strongest channel^2"),
