@@ -4,7 +4,7 @@
 
 Studies that hide nothing, of `scripts/accuracy free`, in white, first-order autoregressive (0.6 to 0.9) and coloured
 noise (a random torque, or ARMA(2, 1) in the sensor), are fitted with the nominal model. Printed are quantiles of
-`refused.slowness`, and how many studies lie beyond `levels.SMALL_SHARE`, where no model is adequate.
+`rejected.slowness`, and how many studies lie beyond `levels.SMALL_SHARE`, where no model is adequate.
 """
 
 from __future__ import annotations
