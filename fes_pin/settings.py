@@ -1,7 +1,5 @@
 """What environment variables choose; each is read where it is needed, and all of them before a command begins."""
 
-from __future__ import annotations
-
 import os
 import re
 from datetime import UTC, datetime

@@ -1,7 +1,5 @@
 """Two threads for independent fits (machine code and linear algebra release the interpreter lock), and their time."""
 
-from __future__ import annotations
-
 import math
 import threading
 import time

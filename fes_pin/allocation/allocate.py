@@ -1,7 +1,5 @@
 """From wanted joint torques to recruitments and pulse widths, in one call."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache

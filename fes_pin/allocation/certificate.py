@@ -1,7 +1,5 @@
 """Proof of optimality that knows nothing of the solver: recomputed from moment arms, torque and limits."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

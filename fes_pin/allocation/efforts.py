@@ -1,7 +1,5 @@
 """Other prices of effort: cubes of recruitment, and effort only after the least torque error is reached."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.linalg import null_space
 from scipy.optimize import lsq_linear

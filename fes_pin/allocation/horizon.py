@@ -1,7 +1,5 @@
 """Allocation through time: muscles that lag, pulses that may not jump, strength that tires."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Checks of given torques and torque matrices; numbers that no body makes are input errors."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

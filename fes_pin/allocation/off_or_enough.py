@@ -4,8 +4,6 @@ Each channel that may choose has a variable z, 0 or 1, with least z <= r <= uppe
 which is 0 where z is 0 or 1, makes the program strictly convex without changing the cost of any choice.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import daqp

@@ -1,7 +1,5 @@
 """Allocation over a motion: another posture, so other moment arms, at every sample."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any
 

@@ -17,8 +17,6 @@ length from the heel, forefoot 0.138 of the foot's mass: rounded from the measur
 of 1.513 kg).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

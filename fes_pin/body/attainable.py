@@ -4,8 +4,6 @@ A constant input holds a lean where it balances gravity in every falling mode. I
 (see `fes_pin.body.catchable`); what is here says what can be held for as long as the muscles last.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar

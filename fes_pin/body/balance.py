@@ -1,7 +1,5 @@
 """Whether the feet carry a linearized body: the centre of pressure as inequalities of its modes, and in words."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

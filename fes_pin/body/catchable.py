@@ -8,8 +8,6 @@ and on the centre of pressure, it is a linear program over inputs that are held 
 plan catches beyond the modal bound is lost to any stimulation; between the two a finer plan may do more.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -7,8 +7,6 @@ the linear model has them; with `moving_arms` they follow the joints, a stiffnes
 know. What is held here may still be lost with a person.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any

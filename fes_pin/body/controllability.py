@@ -6,8 +6,6 @@ only if, besides, every real left eigenvector of F sees pulls of both signs (R. 
 autonomous systems with positive controllers", SIAM J. Control 10:339-353, 1972).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any
 

@@ -6,8 +6,6 @@ hold for every answer, so the first choice that meets all demands is a smallest 
 procedures for solving mixed-variables programming problems", Numer. Math. 4:238-252, 1962).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 

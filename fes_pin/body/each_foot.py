@@ -10,8 +10,6 @@ braces hold so much that J loses rank, some of l moves no free joint, and rigid 
 The feet can then carry the body if any such share keeps both centres of pressure on their soles.
 """
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

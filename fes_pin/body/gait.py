@@ -1,7 +1,5 @@
 """Postures of the walk by name, and measured walking as postures of a body that stands on one forefoot."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from functools import lru_cache

@@ -5,8 +5,6 @@ through one centre, written from the pelvis outwards; positive as named (adducti
 internal, bending right, lumbar rotation left).
 """
 
-from __future__ import annotations
-
 import difflib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass

@@ -10,8 +10,6 @@ B. Around a moving posture (v0, a0) the same equation holds for the deviation wi
 + g)/d q and a rate matrix, E = d c / d v: A Gamma'' + E Gamma' - B Gamma - C = D; B is then symmetric no longer.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -5,8 +5,6 @@ Stimulation *over time* must only bring the body back to rest; that needs fewer 
 unless the other is asked for.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -5,8 +5,6 @@ paper's three properties follow: the 38 eigenvalues of F are +-sqrt(mu); its eig
 and A^-1 B is similar to the symmetric Q = A^(-1/2) B A^(-1/2), which Jacobi's rotations diagonalize.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any

@@ -7,8 +7,6 @@ second, each with white noise of `NOISE_DEG`. The uncertainty is the standard de
 of the look (S. Kay, Fundamentals of Statistical Signal Processing: Estimation Theory, 1993, section 11.6).
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field

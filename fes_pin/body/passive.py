@@ -3,8 +3,6 @@
 Every class here answers `torque(q, names)`, `stiffness(q, names)` = -d torque / d q, symmetric, and `damping(names)`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol

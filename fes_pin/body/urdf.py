@@ -1,7 +1,5 @@
 """The URDF of a body that stands on one forefoot, written from its skeleton."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from xml.sax.saxutils import quoteattr
 

@@ -1,7 +1,5 @@
 """`fes-pin allocate`: from wanted joint torques to pulse widths."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Annotated

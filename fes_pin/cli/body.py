@@ -1,7 +1,5 @@
 """`fes-pin body`: the modes of a walking body, which nerves control them, and the body to look at."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import wraps
 from inspect import Signature, signature

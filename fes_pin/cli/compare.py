@@ -1,7 +1,5 @@
 """`fes-pin compare`: models from the literature on a study's trials, ranked by errors on held-out trials."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """`fes-pin contrast`: what differs between groups of trials, or between two studies of one rig."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """`fes-pin datasets`: the public recordings that the documentation uses, listed and fetched."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """Parts of all commands: help, needs of options, and bad input as one line on standard error and exit code 2."""
 
-from __future__ import annotations
-
 import io
 import math
 import os

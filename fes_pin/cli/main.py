@@ -1,7 +1,5 @@
 """The command line: `fes-pin new-study | check | diagnose | predict | effects | ...`."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -3,8 +3,6 @@
 A worker that is lost has its studies diagnosed elsewhere by the scheduler; answers are written here alone.
 """
 
-from __future__ import annotations
-
 import re
 import socket
 import uuid

@@ -1,7 +1,5 @@
 """Which studies a cohort has, and what each is called in it."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path

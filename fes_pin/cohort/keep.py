@@ -1,7 +1,5 @@
 """Answers of a cohort on disk: each complete or absent, so that a run that was killed can go on."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Studies in processes of this machine. A process that dies takes no other study with it."""
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import threading

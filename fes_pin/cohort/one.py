@@ -4,8 +4,6 @@ What a worker is given and gives back are plain values: it writes nothing, so th
 nothing behind, and one study that is diagnosed twice is still kept once.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

@@ -1,7 +1,5 @@
 """The page of a cohort: which causes in which studies, what is common to them, and each study's own report."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence

@@ -14,8 +14,6 @@ Higgins, Thompson and Spiegelhalter, A re-evaluation of random-effects meta-anal
 Benjamini and Hochberg, Controlling the false discovery rate, J. R. Stat. Soc. B 57 (1995).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """A cohort from its studies to its tables and its page; a run that was killed goes on where it was."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """A cohort as tables: a row a study, a row a parameter of a cause, a row a pooled value."""
 
-from __future__ import annotations
-
 import math
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Models from the literature ranked by their errors of prediction on held-out trials."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Iterable, Mapping, Sequence

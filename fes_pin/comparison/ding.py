@@ -1,7 +1,5 @@
 """Force of a pulse train after Ding, Wexler and Binder-Macleod (2003): troponin, then a force of its own dynamics."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Errors of a model on trials that took no part in its fit: free, over a horizon, and once a trial has begun."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

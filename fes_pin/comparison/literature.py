@@ -4,8 +4,6 @@ A composition keeps the nominal recruitment and the rig; what a publication has 
 has not in common with it. Start values are the publication's where it has any; all parameters are fitted.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -9,8 +9,6 @@ the one of `WORTH` that predicts the later samples of the fitted trials best fro
 estimated from its first samples alone. Laird and Ware, Biometrics 38 (1982).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The answer of a comparison: models by their errors on held-out trials, and which of them differ significantly."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Reports of each change, and of parameters and causes that did not change."""
 
-from __future__ import annotations
-
 import math
 
 from fes_pin.contrasts.grouped import Grouped, Item

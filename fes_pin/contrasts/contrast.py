@@ -1,7 +1,5 @@
 """Contrast of groups of trials: the parameters and causes that changed, by how much, and those that did not."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Faults of a recording that are no change: a trial that states a wrong condition, efforts that were recorded late."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

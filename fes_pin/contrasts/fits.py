@@ -1,7 +1,5 @@
 """Fits of grouped models to the trials of all groups by the likelihood."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Mapping, Sequence
 from functools import partial

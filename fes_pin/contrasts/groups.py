@@ -1,7 +1,5 @@
 """The groups of a contrast: trials of one study by their label, or two studies of one rig."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

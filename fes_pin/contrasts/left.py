@@ -1,7 +1,5 @@
 """Lack of fit of the model of all groups in some of them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Sets of common causes and changes for the search of `infer`: their fits, and the rules that judge them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The result of a contrast, and it in words."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar

@@ -1,7 +1,5 @@
 """Score tests of every item by which a grouped model may be extended."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property

@@ -1,7 +1,5 @@
 """The verdict on changes: by held-out trials and by tests of lack of fit."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

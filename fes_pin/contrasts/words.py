@@ -1,7 +1,5 @@
 """Changes in words."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Checks of angles from a caller, with one line that says what was expected."""
 
-from __future__ import annotations
-
 import math
 
 from fes_pin.data.errors import InputError

@@ -10,8 +10,6 @@ Nothing is stimulated before the sensor has shown a joint, and readings are judg
 the controller says so and becomes calmer; if that does not help, it is a fault.
 """
 
-from __future__ import annotations
-
 import copy
 import math
 from collections.abc import Mapping, Sequence

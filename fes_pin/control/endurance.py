@@ -8,8 +8,6 @@ where `needed` is the activation that a fresh muscle would need. What is needed 
 the budget as long as needed <= (1 - RESERVE) c at every moment.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

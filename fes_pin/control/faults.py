@@ -14,8 +14,6 @@
    torque as large as a third of what the muscle can do.
 """
 
-from __future__ import annotations
-
 import math
 from collections import Counter, deque
 from enum import Enum

@@ -4,8 +4,6 @@ The equations are the model's own (`models.compile.equations`); their derivative
 past pulses.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """A controller and a joint in one loop, recorded."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ A margin at one angle of the believed ankle is not what a person gets: near rest
 stronger and quicker muscle the loop bears far less dead time.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -6,8 +6,6 @@ more slowly (it takes up fatigue). What is fed in is the recruitment that the ne
 limit that holds the stimulus back leaves nothing to wind up.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

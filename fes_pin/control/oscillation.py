@@ -6,8 +6,6 @@ seldom. Source: Haegglund, A control-loop performance monitor, Control Engineeri
 the reference is watched too is of this project.
 """
 
-from __future__ import annotations
-
 import math
 
 from fes_pin.control.dynamics import PULSE_S

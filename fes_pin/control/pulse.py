@@ -1,7 +1,5 @@
 """Pulse widths for recruitments, one channel, with the play of hysteresis undone."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any

@@ -1,7 +1,5 @@
 """A wanted angle as a stream of numbers, made smooth enough to be followed."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from operator import mul
 

@@ -1,7 +1,5 @@
 """Whether a controller is called once a pulse."""
 
-from __future__ import annotations
-
 import math
 import time
 

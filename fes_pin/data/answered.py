@@ -13,8 +13,6 @@ noise of the recorded effort is in no reading of the rig: over a long stretch th
 Source: Chow, Tests of equality between sets of coefficients in two linear regressions, Econometrica 28 (1960).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise

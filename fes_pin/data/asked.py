@@ -1,7 +1,5 @@
 """What is asked of a long search: checked once, where a public function is entered."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from numbers import Integral

@@ -4,8 +4,6 @@ The reader of a file and the objects themselves ask the same: a file adds its na
 the trial and the sample.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial

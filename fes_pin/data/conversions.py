@@ -4,8 +4,6 @@ Each function takes the folder that holds the upstream files, by their paths in 
 study. The steps are those that the data set's description names; nothing is filtered.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Readings in counts, as an encoder's: each is the same for all values within half a count of it."""
 
-from __future__ import annotations
-
 import numpy as np
 
 SAME = 0.1

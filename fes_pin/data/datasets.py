@@ -4,8 +4,6 @@
 licences, checksums.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import logging

@@ -1,7 +1,5 @@
 """Test whether a velocity was computed from positions, or measured by a sensor of its own."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The one error that bad input raises: a line that says where it is and what was expected."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

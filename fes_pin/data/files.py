@@ -1,7 +1,5 @@
 """Files of a study: read as text, kept inside its folder, written whole or not at all."""
 
-from __future__ import annotations
-
 import fcntl
 import json
 import os

@@ -7,8 +7,6 @@ from the position. Noise that smoothing leaves in them acts on a model's force; 
 process noise and the measurement noise of the force.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import lru_cache
 

@@ -1,7 +1,5 @@
 """Libraries that are installed with an extra of the package only."""
 
-from __future__ import annotations
-
 import importlib
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """How a log differs from what acted and from what was read: how late, with what noise, and smoothed by what it is."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Marker positions in .trc and C3D files as columns: `<marker>_x`, `_y`, `_z` in m, NaN where one was not seen."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Walking data: joint coordinates and ground reactions from CSV and from OpenSim's .mot and .sto files."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from pathlib import Path

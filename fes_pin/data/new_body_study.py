@@ -1,7 +1,5 @@
 """A study of walking made of recordings: which holds coordinates, which the ground reaction, which go together."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from fes_pin.data.errors import InputError, fault_at

@@ -3,8 +3,6 @@
 What the files do not say is taken from options, or asked of a person at a terminal; only start values are guessed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import asdict, dataclass
 from functools import partial

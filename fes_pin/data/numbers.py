@@ -1,7 +1,5 @@
 """Numbers that a caller gives: one clear error where they are none, or out of range."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Collection, Iterable, Sequence
 from numbers import Real

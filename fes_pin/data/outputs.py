@@ -1,7 +1,5 @@
 """What a command writes: never over what was read, and only over what the same command wrote and nobody has changed."""
 
-from __future__ import annotations
-
 import fcntl
 import hashlib
 import json

@@ -6,8 +6,6 @@ what `check_trial` refuses of each trial: an angle that only degrees explain. Ev
 diagnosis goes on. Trials that are only to be predicted are held to the same list, but for what a fit needs.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """What a result was made of: when, by which versions, from which files, with which seed and command."""
 
-from __future__ import annotations
-
 import hashlib
 import platform
 import shlex

@@ -1,7 +1,5 @@
 """A proposed trial as a list of pulses that a stimulator can be given, within the limits that somebody states."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

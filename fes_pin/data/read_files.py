@@ -4,8 +4,6 @@ Identity is the device and the number of a file on it, so that links, hard links
 for the same are one file.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """Frozen dataclasses whose mappings and arrays cannot be changed either, compared and hashed by what they hold."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Set
 from dataclasses import dataclass, fields

@@ -1,7 +1,5 @@
 """What a study of each rig must and may hold: keys, columns, units, bounds."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field

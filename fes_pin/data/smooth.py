@@ -1,7 +1,5 @@
 """Measured signals made smooth without delay: a zero-phase low pass, and splines whose bandwidth the data set."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Which code an answer was made by."""
 
-from __future__ import annotations
-
 import hashlib
 from functools import cache
 from pathlib import Path

@@ -6,8 +6,6 @@ the kink of a contact and the onset of a stimulus each lie on the line of one si
 deviation, which is the robust one of the surroundings. In white noise of deviation 1 a spike must be about 9 high.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -9,8 +9,6 @@ A reading of one value for a while is the sensor's own, and not a rig's that sta
 What is coarse, or comes to rest as a rig does, stays as it was measured.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """The tables of a study.toml that say what the rig is and how its recordings are written: all but the trials."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A study's TOML as `fes-pin new-study` writes it, and what its options say of a column."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from functools import partial

@@ -1,7 +1,5 @@
 """Numbers by named column, with what is asked of their times."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Tables out: Parquet by the suffix of the file, where pyarrow is installed; else CSV."""
 
-from __future__ import annotations
-
 import csv
 import io
 import math

@@ -1,7 +1,5 @@
 """URDF templates of the commonest one-joint rigs, to be written and then improved upon by hand."""
 
-from __future__ import annotations
-
 from fes_pin.data.errors import InputError
 
 _URDF = """<?xml version="1.0"?>

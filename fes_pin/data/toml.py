@@ -1,7 +1,5 @@
 """TOML read so that an error can name the line of a key."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from collections import Counter

@@ -5,8 +5,6 @@ International System of Units, 9th edition; inch, pound-force and kilogram-force
 write units as no library reads them: `Torque_Nm` is a newton metre, which a units library takes for a nanometre.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable, Mapping

@@ -1,7 +1,5 @@
 """URDF files checked before anything else reads them: safe XML, a tree of links, positive masses."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping
 from pathlib import Path

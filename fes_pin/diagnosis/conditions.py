@@ -7,8 +7,6 @@ causes that the restated trials still need, with the parameter of the condition,
 need.
 """
 
-from __future__ import annotations
-
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """Diagnosis of a study: it is prepared, its causes are searched, and what is found is judged."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Errors of predictions one step ahead, over a horizon and in free simulation; and the process noise of driven rigs."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from weakref import WeakKeyDictionary

@@ -1,7 +1,5 @@
 """Estimators of one study: without process noise, with coloured or white process noise, by least squares."""
 
-from __future__ import annotations
-
 from fes_pin.data.schema import IMPOSED
 from fes_pin.diagnosis.decide.by_prediction import FEWEST, best_predicting
 from fes_pin.diagnosis.decide.rivals import not_excluded

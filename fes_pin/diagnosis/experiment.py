@@ -1,7 +1,5 @@
 """The next experiment: the trial that distinguishes confounded causes best."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass

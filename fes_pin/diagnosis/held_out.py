@@ -1,7 +1,5 @@
 """Trials held out of a diagnosis: evidence for each cause from their likelihood, and gains on their errors."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """Faults of a log: efforts that were recorded late or with noise."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace

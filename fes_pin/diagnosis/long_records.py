@@ -1,7 +1,5 @@
 """Records longer than a search can hold: the part that is searched, and the warning that says so."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -10,8 +10,6 @@ has Student's distribution with as many degrees of freedom as there are other tr
 therefore not taken for a misreading. A restated trial must also be explained as well as the others.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace

@@ -1,7 +1,5 @@
 """A few long trials, each cut into parts, so that some parts can be held out and predicted by fits to the others."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """Checks of a study's time step, range and signs against its nominal model, before a fit."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 

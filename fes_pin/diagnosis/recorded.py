@@ -1,7 +1,5 @@
 """Parts of a diagnosis as plain values, as they stand in `diagnosis.json`, and in words."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any

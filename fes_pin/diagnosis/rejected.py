@@ -1,7 +1,5 @@
 """Rejected causes: held-out trials do not support them, or the recorded input does not move the rig."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

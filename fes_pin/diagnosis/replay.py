@@ -1,7 +1,5 @@
 """Every trial of a study with the predictions of its nominal and its extended model."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The diagnosis that reports a verdict on a rig, or that its fits did not converge."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Diagnosis of a study in which the condition of one trial was misread."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 

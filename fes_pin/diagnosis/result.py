@@ -1,7 +1,5 @@
 """The result of a diagnosis: named causes with their significance and gain, lack of fit, errors; and it in words."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path

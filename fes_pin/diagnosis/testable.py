@@ -4,8 +4,6 @@ A cause is linearized at the fitted nominal model, as in the search. It is not i
 nominal parameters and the initial states can reproduce its sensitivity.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """Every sample of a study with the predictions of both models, as one long table for other programs."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

@@ -6,8 +6,6 @@ on held-out trials. For a rig in closed loop these are errors over a horizon: er
 simulations.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

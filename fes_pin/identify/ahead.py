@@ -9,8 +9,6 @@ its autoregression (`NoiseModel`) where a rig is simulated freely:
     y_t = free_t + e_t,    e_(t|t-k) = e_1' A^k (e_(t-k), e_(t-k-1), ...)',    A the companion matrix.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -5,8 +5,6 @@ assumed: with a white share of 0.3 % the innovations of coloured noise were 2 to
 that by process noise that did not exist.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 

@@ -11,8 +11,6 @@ Innovations are white if they correlate little with the next two. A model that m
 by its square: every second reading by itself may fit better by no more.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace

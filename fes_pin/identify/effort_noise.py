@@ -6,8 +6,6 @@ computes from its reading separates the noise from the effort that acted (`data.
 estimates how much noise there is.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

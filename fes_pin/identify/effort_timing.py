@@ -33,8 +33,6 @@ Source: Koopmans, Rubin and Leipnik, Measuring the equation systems of dynamic e
 Dynamic Economic Models, Cowles Commission Monograph 10, Wiley, 1950.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace

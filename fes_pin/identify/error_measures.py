@@ -14,8 +14,6 @@ Trials are fitted (`fit`) or held out (`held_out`). In records `fit` and `held_o
 its first output.
 """
 
-from __future__ import annotations
-
 E_WORDS = (
     "E is the squared error of a model, in percent of the measurement's squares about its mean (equation 2 of the "
     "paper): 0 % is a perfect model, 100 % no better than the mean."

@@ -1,7 +1,5 @@
 """Test for feedback: whether the input of a rig follows its reading."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Sequence
 

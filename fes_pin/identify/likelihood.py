@@ -11,8 +11,6 @@ the variance N = n white^2 each time (`models.compile.predictor`). Its one error
 Source: Kristensen, Madsen and Jorgensen, Parameter estimation in stochastic grey-box models, Automatica 40 (2004).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

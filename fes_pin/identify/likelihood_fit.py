@@ -1,7 +1,5 @@
 """Fits by the likelihood of one-step predictions: parameters, with process and measurement noise."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

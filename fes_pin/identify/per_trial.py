@@ -5,8 +5,6 @@ measured trial is cut into `SEGMENTS` pieces. The amplitudes that predict the od
 ones and vice versa (cross-fitting), so that no sample takes part in its own prediction.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 

@@ -1,7 +1,5 @@
 """Whitened residuals and sensitivities of a free simulation of trials."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property

@@ -11,8 +11,6 @@ imperfect computer models, Annals of Statistics 43, 2015). Where the process noi
 prediction are smaller with a coloured model of it (`diagnosis.estimators`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -6,8 +6,6 @@ from sample to sample, compared with the residuals of the nominal model, may be 
 which the simulation, low-passed as well, is likeliest under the noise of its residuals.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

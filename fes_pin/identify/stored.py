@@ -4,8 +4,6 @@ Noise of each output column, autoregressive where it is coloured, and first-orde
 versions saved of rigs that are simulated freely have autoregressive noise by output column, `noise`.
 """
 
-from __future__ import annotations
-
 import warnings
 from dataclasses import asdict
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Covariance of fitted parameters, and the gain of a further step, from the second derivatives of a fit."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -3,8 +3,6 @@
 `scipy.stats` has the same numbers, but loading it takes longer than many a fit.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -4,8 +4,6 @@ Source: Hothorn, Bretz and Westfall, Simultaneous inference in general parametri
 for the distribution of the largest of correlated statistics by simulation.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

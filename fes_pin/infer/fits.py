@@ -1,7 +1,5 @@
 """Fits of sets of candidates by their names: extended, converged and ranked, with defaults for most front ends."""
 
-from __future__ import annotations
-
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Hashable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Gains on held-out data: errors by unit of evidence, gains with their intervals, likelihoods."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass

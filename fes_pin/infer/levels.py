@@ -4,8 +4,6 @@ All other constants of inference control an algorithm, guard arithmetic, or desc
 are in docs/data/numbers.toml.
 """
 
-from __future__ import annotations
-
 from fes_pin.infer.distributions import chi2_quantile, normal_quantile
 
 # Levels of tests

@@ -7,8 +7,6 @@ it still predicts a gain that no step reaches, parameters and noise move togethe
 started large, it explains every error of the model.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Measurement noise: autoregressive, one model for each measured channel."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass

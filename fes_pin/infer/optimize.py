@@ -1,7 +1,5 @@
 """Nonlinear least squares by Levenberg and Marquardt's method, with bounds and with unknowns of each trial."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

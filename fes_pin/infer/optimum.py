@@ -1,7 +1,5 @@
 """The optimum of a fit: values with their covariance, and the derivatives from which all else follows."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

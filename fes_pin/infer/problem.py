@@ -1,7 +1,5 @@
 """A fit as a problem of nonlinear least squares: whitened residuals, their derivatives, and the normal equations."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

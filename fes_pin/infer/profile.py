@@ -13,8 +13,6 @@ Source: Venzon and Moolgavkar, A method for computing profile-likelihood-based c
 under nonstandard conditions, Journal of the American Statistical Association 82 (1987).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 
 from scipy.optimize import brentq

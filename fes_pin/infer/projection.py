@@ -3,8 +3,6 @@
 C. R. Rao, Math. Proc. Camb. Phil. Soc. 44:50 (1948).
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

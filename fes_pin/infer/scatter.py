@@ -9,8 +9,6 @@ Source: Kent, Robust properties of likelihood ratio tests, Biometrika 69 (1982);
 difference chi-square test statistic for moment structure analysis, Psychometrika 66 (2001).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

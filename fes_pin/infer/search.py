@@ -5,8 +5,6 @@ each degree of freedom. It depends on the set alone. A larger set is accepted if
 over the whole library. Source: Miller, Subset Selection in Regression, 2nd ed., 2002, chapter 3.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 import time

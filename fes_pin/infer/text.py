@@ -1,7 +1,5 @@
 """Numbers in words: p-values, percentages and estimates as they are printed everywhere."""
 
-from __future__ import annotations
-
 import math
 
 LEAST_P, LEAST_PERCENT = 1e-12, 1e-3

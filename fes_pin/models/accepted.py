@@ -1,7 +1,5 @@
 """Checks of the trials on which a model is simulated or fitted, made once where a public function is entered."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 

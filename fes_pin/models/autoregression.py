@@ -13,8 +13,6 @@ variances v_k (Levinson's recursion backwards, c the last coefficient of each):
 Source: Ljung, System Identification, 2nd ed., sections 3.2 and 10.1.
 """
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Effects in words."""
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Mapping
 from typing import Any

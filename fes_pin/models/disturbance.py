@@ -5,8 +5,6 @@ that belong to no library, as noise is never named as a cause. Their deviations 
 but constants of a predictor (`models.predictor.StateSpaceNoise`), as measurement noise is.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

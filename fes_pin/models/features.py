@@ -4,8 +4,6 @@ They are effects that belong to no library, and functions of the states of the m
 predictor these are estimated from earlier samples, so that features are independent of the noise of the test.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Callable, Iterator, Mapping

@@ -1,7 +1,5 @@
 """One-step predictions of measured trials without process noise: a free simulation."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

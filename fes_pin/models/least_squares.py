@@ -1,7 +1,5 @@
 """Linear least squares that does not fail for columns of extreme sizes."""
 
-from __future__ import annotations
-
 import numpy as np
 
 

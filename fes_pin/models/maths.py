@@ -1,7 +1,5 @@
 """Elementary functions on numbers, arrays and CasADi expressions alike."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import casadi as ca

@@ -1,7 +1,5 @@
 """The nominal model of a study: its rig with the start values."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path

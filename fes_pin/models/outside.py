@@ -1,7 +1,5 @@
 """Causes and rigs of anybody's own file or module: loaded, checked, and distinguished from those written here."""
 
-from __future__ import annotations
-
 import hashlib
 import importlib
 import importlib.util

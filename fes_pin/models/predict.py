@@ -1,7 +1,5 @@
 """Prediction of a trial from its inputs and conditions alone."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from fes_pin.data.errors import InputError

@@ -1,7 +1,5 @@
 """One-step predictions of one trial: innovations, their variances, and their cost."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import cached_property

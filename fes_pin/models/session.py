@@ -8,8 +8,6 @@ second. In a trial without a time of beginning the muscle starts unfatigued. So 
 as they then belong to more than one session.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from numbers import Real

@@ -1,7 +1,5 @@
 """Simulation of a model on the inputs of trials, with sensitivities."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass

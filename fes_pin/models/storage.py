@@ -1,7 +1,5 @@
 """Low pass of simulated readings, where measured ones were low-passed before they were stored."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Models on disk: `model.toml`, complete without other files."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any

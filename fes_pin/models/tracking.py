@@ -11,8 +11,6 @@ Source: Ohnishi, Shibata and Murakami, Motion control for advanced mechatronics,
 1 (1996): the effort of a servo as an observer of disturbances.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """An extended joint as URDF: fitted inertia and weight, and damping and dry friction in `<dynamics>`."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 

@@ -1,7 +1,5 @@
 """Force of a fully active muscle over its length and speed: fibres in series with a tendon that gives way."""
 
-from __future__ import annotations
-
 import numpy as np
 
 ACTIVE_WIDTH = 0.45

@@ -1,7 +1,5 @@
 """The table of muscles: strength, paths over posture, fibres and tendons; the right side, mirrored to the left."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """Nerves as inputs of a linearized body: by name, with the strength of the body's size, sex and years."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import replace
 

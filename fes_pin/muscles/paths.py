@@ -6,8 +6,6 @@ joints of the body (`fes_pin.body.joints`), each about its own axis, so that a m
 length along a joint's angle, is the torque about that joint per unit of force.
 """
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Strength of other people relative to a healthy young man, from measured joint torques."""
 
-from __future__ import annotations
-
 import numpy as np
 
 PEAKS_2007 = {

@@ -6,8 +6,6 @@ because they carry the noise. Source: Dombre, Fournier and Coiffet, section II-2
 evaluated").
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -10,8 +10,6 @@ from here.
 Source: Dombre, Fournier and Coiffet, section II-3-2.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from typing import Any

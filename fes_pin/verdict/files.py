@@ -1,7 +1,5 @@
 """Names of the files of an answer to a study, of a rig or of a walk."""
 
-from __future__ import annotations
-
 from fes_pin.data.study import Study
 
 REPORT_FILE, NEXT_FILE = "report.html", "next_trial.csv"

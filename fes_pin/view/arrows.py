@@ -1,7 +1,5 @@
 """Forces to look at: arrows that move with a body, for pages of `view.viewer`."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Figures drawn by matplotlib, as SVG text whose colours are those of the page around it."""
 
-from __future__ import annotations
-
 import html
 import io
 import re

@@ -1,7 +1,5 @@
 """Influence of inputs on joints and modes, as a table and as a heat map: what the paper announces at its end."""
 
-from __future__ import annotations
-
 import io
 from pathlib import Path
 

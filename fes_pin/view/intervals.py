@@ -1,7 +1,5 @@
 """Charts of one row a name: estimates with their intervals, and rivals by how much worse they fit."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

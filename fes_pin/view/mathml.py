@@ -7,8 +7,6 @@ from a remark on it. It is rewritten as an expression of Python, which Python's 
 Source: MathML Core, W3C.
 """
 
-from __future__ import annotations
-
 import ast
 import html
 import re

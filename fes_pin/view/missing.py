@@ -10,8 +10,6 @@ not cut at first order. It is in N m for a revolute joint, in N for a prismatic 
 force is the smoothed residual itself, N; where the motion is imposed, so is the missing effort.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -3,8 +3,6 @@
 Each takes results and returns a `Drawing`. No text of the study stands in a figure but in its description.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

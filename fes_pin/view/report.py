@@ -1,7 +1,5 @@
 """The report of a result: one page of sections, the same for every front end, and what each front end adds."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from importlib import import_module

@@ -1,7 +1,5 @@
 """Sections of the report of a contrast: parameters and causes that did not change."""
 
-from __future__ import annotations
-
 from fes_pin.contrasts.result import Contrast
 from fes_pin.view.page import Content, Markup, element, html_table, section, unit_text
 from fes_pin.view.sections import Parts

@@ -1,7 +1,5 @@
 """Sections of the report of a rig: missing torque, trials, parameters, the model."""
 
-from __future__ import annotations
-
 from collections import Counter
 from pathlib import Path
 

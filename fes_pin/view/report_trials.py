@@ -1,7 +1,5 @@
 """The part of the report that shows the trials: curves, residuals, missing torque."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from fes_pin.data.schema import IMPOSED

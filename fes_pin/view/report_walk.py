@@ -1,7 +1,5 @@
 """Sections of the report of a walk: the ground reaction, and the extended body."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

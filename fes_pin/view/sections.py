@@ -1,7 +1,5 @@
 """Parts of pages that several of them show."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence

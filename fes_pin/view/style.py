@@ -4,8 +4,6 @@ The colours are Okabe and Ito's, which colour-blind readers can distinguish (Col
 name, under which a page may give it another shade on a dark ground.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 STAGES = {"nerve": "#0072b2", "muscle": "#d55e00", "joint": "#00855f", "rig": "#8f6800", "sensor": "#a8477f"}

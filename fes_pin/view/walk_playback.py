@@ -1,7 +1,5 @@
 """A measured walk to look at: the body moves as measured, with the ground reactions that were read and are required."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 

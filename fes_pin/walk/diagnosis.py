@@ -1,7 +1,5 @@
 """Diagnosis of a study of walking: named causes with their significance and gain, and lack of fit."""
 
-from __future__ import annotations
-
 import math
 import time
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Changes of the residual by errors in the coordinates: soft tissue, white noise, misplaced landmarks."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 
 import numpy as np

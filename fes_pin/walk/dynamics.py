@@ -1,7 +1,5 @@
 """Inverse dynamics of the whole body: the ground reaction that a motion requires, and its segments' share in it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 

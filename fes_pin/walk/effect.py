@@ -1,7 +1,5 @@
 """Causes of errors in a model of walking, and the forms that each can take."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import ClassVar

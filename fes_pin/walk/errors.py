@@ -1,7 +1,5 @@
 """Errors of sets of causes in held-out strides: in newtons, and as evidence in units of the noise."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from fes_pin.infer.held_out import Errors, added_likelihood, held_out_gain

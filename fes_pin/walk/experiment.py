@@ -1,7 +1,5 @@
 """The next experiment of walking or standing: the simple trial that distinguishes two causes best."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any

@@ -1,7 +1,5 @@
 """The body extended by the causes of a diagnosis, for `linearize`, `allocate` and the viewer."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from xml.etree.ElementTree import tostring
 

@@ -1,7 +1,5 @@
 """What else is said of a set of causes: whether it serves the other leg, its lack of fit, what could not be shown."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from fes_pin.infer.distributions import f_tail

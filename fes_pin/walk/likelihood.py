@@ -16,8 +16,6 @@ Every set has nuisance parameters with normal priors, which are no causes (`nuis
 the required reaction, misplaced landmarks, and plates as accurate as their calibration.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

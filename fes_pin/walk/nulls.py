@@ -1,7 +1,5 @@
 """Simulated null of a walk: distribution of the largest gain, and scatter of values, without a cause."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Whether plates and motion can be of one walk: which records are errors, and which part of a record is used."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 

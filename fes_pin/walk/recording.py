@@ -1,7 +1,5 @@
 """A study of walking made ready: the body that is believed, its motion, and the plates on the motion's clock."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """The result of a diagnosis of walking: causes with significance and gain, lack of fit; and it in words."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, ClassVar
 

@@ -1,7 +1,5 @@
 """Signals of a walk by stride, as waves of the stride: means over strides, and differences between them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property

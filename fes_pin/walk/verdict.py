@@ -1,7 +1,5 @@
 """The verdict on causes of a walk: those that are named, with their size, significance and equivalents."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 

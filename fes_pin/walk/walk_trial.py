@@ -1,7 +1,5 @@
 """A trial of walking: the residual of the ground reaction, and the regressors of its possible causes."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from functools import cached_property
 

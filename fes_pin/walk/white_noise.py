@@ -1,7 +1,5 @@
 """White noise of markers, estimated from differences between strides."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The table `[columns]` of a study: which column of the recordings is which of the rig's, in which unit."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial

@@ -9,8 +9,6 @@
 | `.mot`, `.sto`, `.trc` | none | |
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager

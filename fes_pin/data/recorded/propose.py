@@ -1,7 +1,5 @@
 """Which column of a recording is probably which of the rig's, and in which unit: from names, never from numbers."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass

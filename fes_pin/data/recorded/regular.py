@@ -1,7 +1,5 @@
 """Missing samples, and times that are not equally spaced: filled in only where a study says so, and reported."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Collection
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """What form a text file seems to have: proposed to a person, or named by an error, and never used unseen."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from pathlib import Path

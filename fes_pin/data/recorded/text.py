@@ -3,8 +3,6 @@
 They are read fast where they are clean, and cell by cell to say where they are not.
 """
 
-from __future__ import annotations
-
 import csv
 import math
 from collections.abc import Sequence

@@ -4,8 +4,6 @@ Likelihoods then compare wrong models, and a flexible one may win by overfitting
 prediction of trials that it was not fitted to.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Reports on a set of causes and its rivals: estimates, equivalents, ranking and the next experiment."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 from fes_pin.data.study import Study

@@ -1,7 +1,5 @@
 """The level of a claim about a fit by the likelihood."""
 
-from __future__ import annotations
-
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.levels import CLAIM_LEVEL, DRIVEN_LEVEL
 

@@ -1,7 +1,5 @@
 """Test for bursts in the innovations: deviations at irregular times, as spasms or a slipping sensor."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

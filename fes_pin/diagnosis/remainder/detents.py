@@ -1,7 +1,5 @@
 """Test for torque that is periodic in the angle over short distances, as of detents: a scan over its wave number."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, ClassVar
 

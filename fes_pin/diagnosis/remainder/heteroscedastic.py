@@ -1,7 +1,5 @@
 """Test for heteroscedastic residuals: those of a sensor are not larger while the muscle is active."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Innovations of a fit by channel, under the noise of its residuals, for the tests of lack of fit."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

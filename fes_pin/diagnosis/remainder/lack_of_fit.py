@@ -5,8 +5,6 @@ features: functions of state, input and time that act as an effort at the joint 
 fitted parameters are free in these tests. Estimated process noise is part of the model: a lack of fit must exceed it.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any

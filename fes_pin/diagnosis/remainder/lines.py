@@ -1,7 +1,5 @@
 """Test for spectral lines: ripple at the rate of the pulses, hum, a fan; steady, or in proportion to activation."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -5,8 +5,6 @@ deviations at the same time of every trial, deviations that grow with the stimul
 trial, and readings that lag where the motion reverses. An autoregressive noise model takes each of them for noise.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from fes_pin.diagnosis.remainder.bursts import burst_p_value

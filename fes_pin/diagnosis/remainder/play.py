@@ -1,7 +1,5 @@
 """Test for play in a sensor: a reading that depends on the side from which it was reached."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Test for deviations at the same time of every trial, whatever the stimulus, against differences between trials."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Sets of causes, by the names of the causes in alphabetical order."""
 
-from __future__ import annotations
-
 from fes_pin.identify.fit import Fit
 from fes_pin.infer.search import Names
 

@@ -1,7 +1,5 @@
 """Candidate causes of a fitted model: sensitivities to each effect at its null, over its shapes."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass

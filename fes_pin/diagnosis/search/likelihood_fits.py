@@ -1,7 +1,5 @@
 """Fits of sets of causes by the likelihood, each with its process and measurement noise."""
 
-from __future__ import annotations
-
 import copy
 import math
 from collections.abc import Mapping, Sequence

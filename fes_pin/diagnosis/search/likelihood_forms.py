@@ -1,7 +1,5 @@
 """Forms of the causes of a fitted set: one refinement more, one fewer, or all refinements of a cause restarted."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from typing import TypeVar
 

@@ -1,7 +1,5 @@
 """Maximum of the likelihood of one model on the trials of a search: from start values, from a fit, in a few steps."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

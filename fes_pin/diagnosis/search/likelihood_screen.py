@@ -1,7 +1,5 @@
 """Score tests of every cause in a fit by the likelihood, from one linearization of each cause."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Sizes of causes that are physically impossible, however well they fit."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

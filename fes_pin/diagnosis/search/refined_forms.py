@@ -1,7 +1,5 @@
 """Identifiability of the refinements of a model's effects."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from fes_pin.identify.fit import Fit

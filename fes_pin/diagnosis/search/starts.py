@@ -1,7 +1,5 @@
 """Start values of the fit of a cause: next to its null, at a linear estimate, far from it, and in another form."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

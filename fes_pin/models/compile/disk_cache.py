@@ -1,7 +1,5 @@
 """Machine code kept on disk: where it cannot be used it costs time; executed is what this user alone can write."""
 
-from __future__ import annotations
-
 import hashlib
 import logging
 import os

@@ -15,8 +15,6 @@ longer than dt / (J - 1). The stretch is part of the equations, so that the sens
 exact jump.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass

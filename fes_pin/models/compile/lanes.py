@@ -7,8 +7,6 @@ and NaN from 1e9; `tanh` takes any number. Polynomials are Taylor series after r
 truncation error is below the rounding error.
 """
 
-from __future__ import annotations
-
 import math
 import sys
 from collections.abc import Callable, Sequence

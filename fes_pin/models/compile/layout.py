@@ -1,7 +1,5 @@
 """Names, order and sizes of what goes in and out of a program."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ What depends on nothing that changes in a loop is worked out before it: an instr
 which stage all of that is known.
 """
 
-from __future__ import annotations
-
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """LLVM on this processor: IR text in, callable machine code out."""
 
-from __future__ import annotations
-
 import ctypes
 import threading
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Programs as machine code: a whole trial, with sensitivities, several lanes at a time."""
 
-from __future__ import annotations
-
 import ctypes
 import json
 from collections.abc import Callable, Mapping, Sequence

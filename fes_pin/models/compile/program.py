@@ -1,7 +1,5 @@
 """The program of a model: compiled once for its structure, kept in memory and on disk."""
 
-from __future__ import annotations
-
 import json
 import logging
 import threading

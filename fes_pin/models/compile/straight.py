@@ -4,8 +4,6 @@ What a model's equations are is thousands of instructions without a branch. llvm
 each and formats them one by one; here an instruction is a line. The time loop, which branches, is llvmlite's.
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Sequence
 from functools import partialmethod

@@ -1,7 +1,5 @@
 """Programs on CasADi's virtual machine: the oracle of the machine code, and what runs where that cannot be made."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

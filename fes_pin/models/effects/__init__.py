@@ -3,8 +3,6 @@
 An effect is in the tests, the report, the documentation and the diagnosis by its file in this folder.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from fes_pin.models.stage import Effect, by_name, classes_in, in_order

@@ -1,7 +1,5 @@
 """Above some pulse width the stimulus also recruits the antagonist."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from fes_pin.models.maths import clip, lag, maximum

@@ -1,7 +1,5 @@
 """Play between the joint and what is read."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

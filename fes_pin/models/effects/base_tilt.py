@@ -1,7 +1,5 @@
 """Gravity acts at another angle than believed."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from fes_pin.models.stage import Effect, Scalar, Signals, Stage, parameter

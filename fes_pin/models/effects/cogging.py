@@ -1,7 +1,5 @@
 """Torque that is periodic in the angle."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The effort is scaled, or has the wrong sign."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from fes_pin.models.stage import Effect, Scalar, Signals, Stage, parameter

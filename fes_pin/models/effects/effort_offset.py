@@ -1,7 +1,5 @@
 """A constant effort added to the commanded one."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

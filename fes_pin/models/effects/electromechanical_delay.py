@@ -1,7 +1,5 @@
 """A pure delay from pulse to force."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from fes_pin.models.stage import Effect, Scalar, Signals, Stage, parameter

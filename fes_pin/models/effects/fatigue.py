@@ -1,7 +1,5 @@
 """Force capacity falls with use and recovers with rest."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from fes_pin.models.session import after_the_past

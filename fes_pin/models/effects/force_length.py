@@ -1,7 +1,5 @@
 """Force depends on the muscle's length."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from fes_pin.models.maths import exp

@@ -1,7 +1,5 @@
 """Force depends on the shortening velocity, in proportion to activation."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from fes_pin.models.maths import sqrt, where

@@ -1,7 +1,5 @@
 """The frame that holds the joint swings as a lightly damped mode driven by the joint's reaction."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from fes_pin.models.maths import TURN

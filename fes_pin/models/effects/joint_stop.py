@@ -1,7 +1,5 @@
 """A stiff limit beyond an angle that the motion reaches."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The same stimulus activates a longer muscle more."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from fes_pin.models.maths import exp, power

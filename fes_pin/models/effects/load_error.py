@@ -1,7 +1,5 @@
 """The load is heavier or lighter than recorded, in proportion."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from fes_pin.models.stage import Effect, Scalar, Signals, Stage, parameter

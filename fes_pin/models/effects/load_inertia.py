@@ -1,7 +1,5 @@
 """The load's own inertia, felt through its cable."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from fes_pin.models.maths import cos, sin

@@ -1,7 +1,5 @@
 """A sinusoid at the mains frequency in the measured output."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from fes_pin.models.maths import TURN, cos, sin

@@ -1,7 +1,5 @@
 """An extra spring across the joint."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A spring and damper in series across the joint: passive torque depends on history."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from fes_pin.models.stage import ByName, Effect, Scalar, Signals, Stage, parameter

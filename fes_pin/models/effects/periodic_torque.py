@@ -1,7 +1,5 @@
 """A slow periodic external torque, as of breathing."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Force of a train of pulses is not the sum of its twitches."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from fes_pin.models.maths import power

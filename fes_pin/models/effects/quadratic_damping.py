@@ -1,7 +1,5 @@
 """Drag in proportion to the square of the speed."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from fes_pin.models.maths import fabs

@@ -1,7 +1,5 @@
 """Recruitment between threshold and saturation is not linear."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from fes_pin.models.maths import exp, log, maximum

@@ -1,7 +1,5 @@
 """Recruitment depends on the direction in which the pulse width came."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from fes_pin.models.maths import play

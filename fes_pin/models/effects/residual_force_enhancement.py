@@ -1,7 +1,5 @@
 """After a stretch the steady force stays above the isometric one at that length."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from fes_pin.models.maths import ramp

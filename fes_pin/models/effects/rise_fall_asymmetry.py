@@ -1,7 +1,5 @@
 """Activation falls with another time constant than it rises with."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from fes_pin.models.maths import exp, where

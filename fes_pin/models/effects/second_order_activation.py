@@ -1,7 +1,5 @@
 """A second lag in series with the activation."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from fes_pin.models.maths import lag

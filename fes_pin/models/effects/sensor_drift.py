@@ -1,7 +1,5 @@
 """A ramp in time added to the measured output of a trial."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

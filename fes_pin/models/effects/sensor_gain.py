@@ -1,7 +1,5 @@
 """Deviations of the output from its rest value are scaled."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from fes_pin.models.stage import FromAPlace, Scalar, Signals, Stage, counted_from, parameter

@@ -1,7 +1,5 @@
 """A low pass, or a time shift, between the output and its reading."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from fes_pin.models.maths import lag, lag_time

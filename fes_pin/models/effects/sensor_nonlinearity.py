@@ -1,7 +1,5 @@
 """Curvature of the sensor's characteristic."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from fes_pin.models.stage import FromAPlace, Scalar, Signals, Stage, counted_from, parameter, refinement

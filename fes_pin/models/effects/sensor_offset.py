@@ -1,7 +1,5 @@
 """A constant added to the measured output."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from fes_pin.models.stage import Bounds, Effect, Measured, Scalar, Signals, Stage, parameter, reading_range, symmetric

@@ -1,7 +1,5 @@
 """Tendon and aponeurosis stretch: the fibres are shorter than the muscle, and move later."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

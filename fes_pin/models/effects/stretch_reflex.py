@@ -1,7 +1,5 @@
 """A torque against fast motion in one direction, some tens of milliseconds late."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from fes_pin.models.maths import ramp

@@ -1,7 +1,5 @@
 """The threshold moves with time within a trial, stimulated or not."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from fes_pin.models.stage import Effect, Scalar, Signals, Stage, parameter, refinement

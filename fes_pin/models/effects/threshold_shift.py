@@ -1,7 +1,5 @@
 """Threshold and saturation sit at other pulse widths than believed."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from fes_pin.models.stage import Effect, Scalar, Signals, Stage, parameter

@@ -3,8 +3,6 @@
 A rig is in the study format, the diagnosis, the report and the command line by its file in this folder.
 """
 
-from __future__ import annotations
-
 from fes_pin.models.rigs.ankle import Ankle
 from fes_pin.models.rigs.base import Rig
 from fes_pin.models.rigs.joint import Joint

@@ -1,7 +1,5 @@
 """One-joint rigid bodies from Pinocchio: inertia and gravity as numbers that expressions can use."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Stimuli: what a pulse width recruits, and stimuli of a shape from 0 (off) to 1 and trains for proposed trials."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The catalogue of what a walking model may get wrong: one file for each cause."""
 
-from __future__ import annotations
-
 from fes_pin.models.stage import classes_in
 from fes_pin.walk.effect import Form, WalkEffect
 

@@ -1,7 +1,5 @@
 """The ground slopes: gravity acts at another angle than believed."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from functools import partial
 

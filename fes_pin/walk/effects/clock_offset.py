@@ -1,7 +1,5 @@
 """Force plates and motion capture are not in time with each other."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

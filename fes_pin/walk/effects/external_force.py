@@ -1,7 +1,5 @@
 """Something pushes or holds the body that no plate measures."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from functools import partial
 

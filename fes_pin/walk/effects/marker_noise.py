@@ -1,7 +1,5 @@
 """Accelerations carry noise or filtering that the plates do not confirm."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

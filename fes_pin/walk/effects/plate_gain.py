@@ -1,7 +1,5 @@
 """A force plate reads off by a factor."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from functools import partial
 

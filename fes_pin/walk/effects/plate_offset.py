@@ -1,7 +1,5 @@
 """A force plate reads a constant off."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from functools import partial
 

@@ -1,7 +1,5 @@
 """A segment's centre of mass lies elsewhere."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 
 import numpy as np

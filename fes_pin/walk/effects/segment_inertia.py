@@ -1,7 +1,5 @@
 """A segment's inertia tensor is off."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 
 import numpy as np

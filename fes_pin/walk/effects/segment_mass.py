@@ -1,7 +1,5 @@
 """A segment is heavier or lighter than believed."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 
 import numpy as np
