@@ -14,7 +14,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import scipy.linalg
@@ -43,8 +42,6 @@ class Missing:
 
     Attributes
     ----------
-    trial
-        Name of the trial.
     kind
         "torque" or "force"; "effort" of an imposed motion.
     unit
@@ -56,78 +53,64 @@ class Missing:
         muscle, and the stimulus by its column, where there are such.
     """
 
-    trial: str
     kind: str
     unit: str
     value: np.ndarray
     against: Mapping[str, np.ndarray]
 
 
-def missing_input(model: Model, measured: Trial, simulated: Trial) -> Missing:
-    """The torque or force that a model lacks in a trial; see the module.
+def missing_input(model: Model, measured: Trial, simulated: Trial | None = None) -> Missing:
+    """Return the torque or force that a model lacks in a trial; see the module.
 
     Parameters
     ----------
     model
-        The nominal model; only its rig is used.
+        The model. Of one that was simulated only the rig is used.
     measured
         The trial.
     simulated
-        What the model predicts of it.
+        What the model predicts of it. None for a rig whose effort answers the reading: it integrates or falls over, so
+        that a free simulation is no reference that a motion could be near to. Then it is the effort that the model,
+        its effects included, lacks along the measured motion; see `models.tracking`.
     """
-    rig = model.rig
-    output = rig.output(measured.kind)
-    count = max(1, math.ceil(len(measured) / MAX_POINTS))
+    rig, count = model.rig, _averaged(measured.time)
     step = count * measured.dt
+    unit, output = rig.units()["effort"], rig.output(measured.kind)
+    kind, time = "force" if unit == "N" else "torque", thin(measured.time - measured.time[0], count)
+    inputs = {n: thin(measured[n], count) for n in rig.input_columns(measured)}
+    if simulated is None:
+        motion = measured_motion(measured, output)
+        value, position, rate = (thin(v, count) for v in (tracking_effort(model, measured, *motion), *motion))
+        return Missing(kind, unit, value, {"angle": position, "rate": rate, "time_s": time, **inputs})
     residual = smooth(thin(measured.residual(simulated, output), count))
-    stimulus = {n: thin(measured[n], count) for n in rig.input_columns(measured)}
-    driven = {n: thin(v, count) for n, v in activation(rig, measured).items()}
-    shown = {n: v for n, v in stimulus.items() if n != "stim"}  # a pulse is an event, not a value to plot against
-    against = {"time_s": thin(measured.time - measured.time[0], count), **driven, **shown}
-    force = rig.constants.get("revolute", 1.0) == 0.0
     if measured.kind == IMPOSED:
         position, velocity, _ = (thin(v, count) for v in imposed_motion(measured, rig.schema.imposed).values)
-        against = {"angle": position, "rate": velocity, "time_s": against["time_s"]}
-        return Missing(measured.name, "effort", "N" if force else "N m", residual, against)
+        return Missing("effort", unit, residual, {"angle": position, "rate": velocity, "time_s": time})
+    driven = {**{n: thin(v, count) for n, v in activation(rig, measured).items()}, **inputs}
+    shown = {n: v for n, v in driven.items() if n != "stim"}  # a pulse is an event, not a value to plot against
     if "v" not in rig.states(measured.kind):
-        return Missing(measured.name, "force", "N", residual, against)
+        return Missing("force", "N", residual, {"time_s": time, **shown})
     q = thin(simulated[output], count)
-    v, rate = np.gradient(q, step), np.gradient(residual, step)
-    without, inertia = nominal_torque(rig, measured, q, v, {**driven, **stimulus})
-    moved, _ = nominal_torque(rig, measured, q + residual, v + rate, {**driven, **stimulus})
-    value = inertia * np.gradient(rate, step) - (moved - without)
-    against = {"angle": q + residual, "rate": v + rate, **against}
-    return Missing(measured.name, "force" if force else "torque", "N" if force else "N m", value, against)
+    v, slope = np.gradient(q, step), np.gradient(residual, step)
+    without, inertia = nominal_torque(rig, measured, q, v, driven)
+    moved, _ = nominal_torque(rig, measured, q + residual, v + slope, driven)
+    against = {"angle": q + residual, "rate": v + slope, "time_s": time, **shown}
+    return Missing(kind, unit, inertia * np.gradient(slope, step) - (moved - without), against)
 
 
-def missing_along(model: Model, measured: Trial) -> Missing:
-    """The effort that a model, its effects included, lacks along the measured motion; see `models.tracking`.
-
-    Of rigs whose effort answers what is read: they integrate or fall over, and a free simulation of them is no
-    reference that a motion could be near to.
-    """
-    rig = model.rig
-    output = rig.output(measured.kind)
-    position, rate = measured_motion(measured, output)
-    value = tracking_effort(model, measured, position, rate)
-    count = max(1, math.ceil(len(measured) / MAX_POINTS))
-    shown = {n: thin(measured[n], count) for n in rig.input_columns(measured)}
-    motion = {"angle": position, "rate": rate, "time_s": measured.time - measured.time[0]}
-    against = {**{n: thin(v, count) for n, v in motion.items()}, **shown}
-    force = rig.constants.get("revolute", 1.0) == 0.0
-    kind, unit = ("force", "N") if force else ("torque", "N m")
-    return Missing(measured.name, kind, unit, thin(value, count), against)
+def _averaged(values: np.ndarray) -> int:
+    """Return how many samples are averaged into one of at most `MAX_POINTS`."""
+    return max(1, math.ceil(len(values) / MAX_POINTS))
 
 
 def activation(rig: Rig, trial: Trial) -> dict[str, np.ndarray]:
-    """Activation of the nominal muscle by name, shape (n,); nothing for a rig without one.
+    """Return the activation of the nominal muscle by name, shape (n,); nothing for a rig without one.
 
     The first-order lag answers a recruitment that is held between samples exactly.
     """
-    if "act" not in rig.states(trial.kind):
+    recruited = rig.recruited(trial)
+    if recruited is None:
         return {}
-    s = _signals(rig, trial, {n: trial[n] for n in rig.input_columns(trial)})
-    recruited = np.asarray(rig.sample(s)["r"], dtype=float) * np.ones(len(trial))
     pole = math.exp(-trial.dt / float(getattr(rig, "time_constant_s")))  # noqa: B009
     return {"activation": first_order_low_pass(np.r_[0.0, recruited[:-1]], pole)}
 
@@ -135,36 +118,28 @@ def activation(rig: Rig, trial: Trial) -> dict[str, np.ndarray]:
 def nominal_torque(
     rig: Rig, trial: Trial, q: np.ndarray, v: np.ndarray, driven: Mapping[str, np.ndarray]
 ) -> tuple[np.ndarray, float]:
-    """Torque of a rig on its joint along a motion, shape (n,), N m; and its inertia, kg m2 (N and kg if prismatic)."""
-    s = _signals(rig, trial, driven)
-    s.x = SimpleNamespace(q=q, v=v, act=driven.get("activation", 0.0))
-    s.m = SimpleNamespace(r=0.0, r_before=0.0, rest=0.0)
+    """Return a rig's torque on its joint along a motion, (n,) N m, and its inertia, kg m2 (N and kg if prismatic)."""
+    s = Signals(
+        (),
+        kind=trial.kind,
+        x=SimpleNamespace(q=q, v=v, act=driven.get("activation", 0.0)),
+        m=SimpleNamespace(r=0.0, r_before=0.0, rest=0.0),
+        u=SimpleNamespace(**driven),
+        c=SimpleNamespace(**rig.trial_constants(trial), dt=trial.dt),
+        delayed=lambda now, _before: now,
+    )
     rig.rates(s)
     return np.asarray(s.torque, dtype=float) * np.ones(len(q)), float(s.inertia)
 
 
-def _signals(rig: Rig, trial: Trial, inputs: Mapping[str, np.ndarray]) -> Signals:
-    """Signals of a rig without effects, of whole trials at once."""
-    constants = {**rig.trial_constants(trial), "dt": trial.dt}
-    held: Any = SimpleNamespace(r=0.0, r_before=0.0, rest=0.0)
-    return Signals(
-        (),
-        kind=trial.kind,
-        m=held,
-        u=SimpleNamespace(**inputs),
-        c=SimpleNamespace(**constants),
-        delayed=lambda now, _before: now,
-    )
-
-
 def smoothed(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Time and smooth curve of a signal of any length, by `smooth` on at most `MAX_POINTS` averages."""
-    count = max(1, math.ceil(len(values) / MAX_POINTS))
+    """Return time and smooth curve of a signal of any length, by `smooth` on at most `MAX_POINTS` averages."""
+    count = _averaged(values)
     return thin(time, count), smooth(thin(values, count))
 
 
 def smooth(values: np.ndarray) -> np.ndarray:
-    """The smoothest curve that leaves no more than the noise, shape (n,).
+    """Return the smoothest curve that leaves no more than the noise, shape (n,).
 
     It minimises the sum of squared residuals plus a penalty on its third differences, which are small for a torque that
     changes little from instant to instant. The penalty is the largest whose residuals have the noise's standard
@@ -182,7 +157,7 @@ def smooth(values: np.ndarray) -> np.ndarray:
 
 
 def _penalised(values: np.ndarray, penalty: float) -> np.ndarray:
-    """Whittaker's smoother with third differences D: (1 + penalty D' D) x = values."""
+    """Return what Whittaker's smoother with third differences D makes of them: (1 + penalty D' D) x = values."""
     difference = np.array([-1.0, 3.0, -3.0, 1.0])
     n = len(values)
     bands = np.zeros((4, n))

@@ -9,7 +9,7 @@ from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.infer.text import percent
 from fes_pin.models.model import Model
 from fes_pin.models.tracking import can_track
-from fes_pin.view.missing import Missing, missing_along, missing_input
+from fes_pin.view.missing import Missing, missing_input
 from fes_pin.view.page import Markup, element, figure, folded, joined, key
 from fes_pin.view.plots import missing_drawing, share, trial_drawing
 
@@ -62,9 +62,7 @@ def _missing(
 ) -> list[Missing]:
     tracked = _is_tracked(diagnosis)
     return [
-        missing_along(model, r.measured)
-        if tracked and r.measured.kind != IMPOSED
-        else missing_input(model, r.measured, one)
+        missing_input(model, r.measured, None if tracked and r.measured.kind != IMPOSED else one)
         for r, one in zip(replays, simulated, strict=True)
     ]
 
