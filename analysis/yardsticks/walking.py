@@ -11,7 +11,7 @@ from fes_pin.body.gait import postures_of_walk
 from fes_pin.body.joints import SIDES
 from fes_pin.data.motion import OPTIONAL
 from fes_pin.data.smooth import low_pass, rates
-from fes_pin.walk.motion import Motion
+from fes_pin.walk.motion import Motion, has_rates
 
 
 def rooted_motion(free: Motion, columns: Mapping[str, np.ndarray], rows: slice) -> Motion:
@@ -31,7 +31,7 @@ def rooted_motion(free: Motion, columns: Mapping[str, np.ndarray], rows: slice) 
     """
     taken = {f"q_{n}": np.zeros(len(free.time)) for n in OPTIONAL}
     for name in (n for n in columns if n.startswith("q_")):
-        taken[name] = low_pass(columns[name], free.dt, free.bandwidth_hz[0]) if free.bandwidth_hz else columns[name]
+        taken[name] = columns[name] if has_rates(columns) else low_pass(columns[name], free.dt)
     angles = np.asarray(postures_of_walk(taken, free.body.stance)[list(free.joint_names)])
     q, v, a = free.q[rows].copy(), np.zeros_like(free.v[rows]), np.zeros_like(free.a[rows])
     q[:, 7:], v[:, 6:], a[:, 6:] = (each[rows] for each in (angles, *rates(angles, free.time)))
@@ -45,7 +45,7 @@ def rooted_motion(free: Motion, columns: Mapping[str, np.ndarray], rows: slice) 
     middle = np.mean([place.translation for place in places], axis=0)
     level = pin.utils.rotate("z", float(np.arctan2(ahead[1], ahead[0])))
     q[:, :7] = pin.SE3ToXYZQUAT(pin.SE3(level, middle * [1.0, 1.0, 0.0]))
-    return Motion(free.body, free.model, free.time[rows], q, v, a, free.bandwidth_hz)
+    return Motion(free.body, free.model, free.time[rows], q, v, a)
 
 
 def joint_torques(

@@ -18,7 +18,7 @@ from fes_pin.walk.effects import walk_library
 from fes_pin.walk.likelihood import MEAN_ARM_M, MEAN_FORCE, MEAN_TWIST_NM, WalkNoise, fit_walk, rotation
 from fes_pin.walk.recording import WalkRecording
 from fes_pin.walk.strides import Strides, strides_of
-from fes_pin.walk.walk_trial import WalkTrial, walk_trial_of
+from fes_pin.walk.walk_trial import WalkTrial
 
 TISSUE_DRAWS, WHITE_DRAWS = 40, 64
 TAKEN = 0.3
@@ -48,7 +48,7 @@ class Designs:
 
     Attributes
     ----------
-    recordings, cutoff_hz, seed
+    recordings, seed
         As given.
     forms
         The library, by names.
@@ -64,12 +64,12 @@ class Designs:
         (1, 6, k, m) rotated: residuals by ordinary errors of landmarks and plates.
     """
 
-    def __init__(self, recordings: Sequence[WalkRecording], cutoff_hz: float, seed: int = 0) -> None:
-        self.recordings, self.cutoff_hz, self.seed = list(recordings), cutoff_hz, seed
+    def __init__(self, recordings: Sequence[WalkRecording], seed: int = 0) -> None:
+        self.recordings, self.seed = list(recordings), seed
         self.forms = _by_name()
         self.shift = next(n for n, f in self.forms.items() if f.shifts)
-        trials = [walk_trial_of(r, cutoff_hz) for r in self.recordings]
-        self.strides: Strides = strides_of(trials, cutoff_hz)
+        trials = [r.trial() for r in self.recordings]
+        self.strides: Strides = strides_of(trials, self.recordings[0].session.cutoff_hz)
         self._first = self.recordings[self.strides.windows[0][0]]
         self.as_read = self._design(trials, 0.0)
         self._turn(self.as_read.y)
@@ -139,7 +139,7 @@ class Designs:
             found = fit_walk(self.noise.rotated(y), self.noise.rotated(rate), np.array(form.plausible), self.noise)
             step = float(np.clip(found.values[0], -0.05, 0.05))
             later = float(np.clip(later + step, -0.2, 0.2))
-            trials = [walk_trial_of(r, self.cutoff_hz, later) for r in self.recordings]
+            trials = [r.trial(later) for r in self.recordings]
             y, rate = self._residual(trials), self.strides.mean([form.columns(s) for s in trials])
             if abs(step) < SHIFT_ENDS_S:
                 break

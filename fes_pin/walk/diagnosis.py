@@ -59,7 +59,7 @@ def diagnose_walk(
     with one_thread_each(), noting_stops() as stops:
         tell(0.02, "inverse dynamics")
         recordings = recordings_of(replace(study, trials=trials), cutoff_hz=cutoff_hz)
-        models = WalkModels(Designs(recordings, cutoff_hz, seed), seed)
+        models = WalkModels(Designs(recordings, seed), seed)
         with time_limit(math.inf if limit is None else limit - (time.perf_counter() - began)):
             search, found = _searched(models, tell)
         tell(0.85, "strides held out")

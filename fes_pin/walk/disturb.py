@@ -6,7 +6,6 @@ import numpy as np
 
 from fes_pin.data.motion import TRANSLATIONS
 from fes_pin.walk.dynamics import about, centre_of_mass, required
-from fes_pin.walk.motion import motion_of
 from fes_pin.walk.recording import WalkRecording
 from fes_pin.walk.strides import Strides
 
@@ -77,21 +76,16 @@ def _responses(
     """Return changes of the residual's waves in the first stride by errors of the coordinates: (errors, 6, k)."""
     _, rows, phase = strides.windows[0]
     time = recording.motion.time[rows]
-    near = (recording.coordinates_time >= time[0] - PAD_S) & (recording.coordinates_time <= time[-1] + PAD_S)
-    clock = recording.coordinates_time[near]
+    near = (recording.time >= time[0] - PAD_S) & (recording.time <= time[-1] + PAD_S)
+    clock = recording.time[near]
     columns = {n: c[near] for n, c in recording.coordinates.items() if n.startswith("q_")}
     turn = (clock - time[0]) / ((time[-1] - time[0]) * len(time) / (len(time) - 1)) + phase[0]
     inside = (clock >= time[0] - 1e-9) & (clock <= time[-1] + 1e-9)
     total = recording.plates.total[rows]
 
     def residual(own: dict[str, np.ndarray]) -> np.ndarray:
-        motion = motion_of(
-            recording.motion.body, clock, own, recording.hip, cutoff_hz=recording.cutoff_hz,
-            belt_speed_mps=recording.belt_speed_mps,
-        ).part(inside)  # fmt: skip
-        way = [recording.belt_speed_mps * (clock[0] - recording.start_s), 0.0, 0.0]
-        centre = centre_of_mass(motion)
-        return about(total, centre + way) - about(required(motion), centre)
+        motion = recording.moved(clock, own).part(inside)
+        return about(total - required(motion), centre_of_mass(motion))
 
     base = residual(columns)
     out = []

@@ -11,10 +11,9 @@ from fes_pin.data.results import Plan
 from fes_pin.infer.levels import STRONG_EVIDENCE
 from fes_pin.infer.search import SearchResult
 from fes_pin.walk.designs import Designs
-from fes_pin.walk.dynamics import about, centre_of_mass, required
+from fes_pin.walk.dynamics import about, required
 from fes_pin.walk.models import WalkFit, WalkModels
 from fes_pin.walk.motion import Motion
-from fes_pin.walk.plates import Plates
 from fes_pin.walk.walk_trial import WalkTrial
 
 NEXT_FILE = "next_trial.csv"
@@ -72,8 +71,8 @@ def next_walk(models: WalkModels, found: SearchResult[WalkFit], cause: str) -> N
         )
         return NextWalk(why, pair, None, None)
     first = designs.recordings[0]
-    time, columns = first.coordinates_time, {n: c for n, c in first.coordinates.items() if n.startswith("q_")}
-    time, columns, conditions = _program(name, time - time[0], columns, first.belt_speed_mps)
+    time, columns = first.time, {n: c for n, c in first.coordinates.items() if n.startswith("q_")}
+    time, columns, conditions = _program(name, time - time[0], columns, first.session.belt_speed_mps)
     why = f"{_WORDS[name]} (it separates {pair[0]} from {pair[1]} by {np.sqrt(scores[name]):.1f} standard deviations)"
     return NextWalk(why, pair, conditions, {"time_s": time, **columns})
 
@@ -98,8 +97,8 @@ def _trial(old: WalkTrial, motion: Motion, load: dict[str, np.ndarray], extra: n
         needed = needed + extra
     feet = {side: share[:, None] * needed for side, share in load.items()}
     loaded = {side: share > 0.0 for side, share in load.items()}
-    plates = Plates(old.motion.time, feet, old.plates.pressure, loaded)
-    return WalkTrial(old.name, motion, plates, centre_of_mass(motion))
+    plates = replace(old.plates, feet=feet, loaded=loaded, way=0.0 * old.plates.way)
+    return WalkTrial(old.name, motion, plates)
 
 
 def _shares(old: WalkTrial) -> dict[str, np.ndarray]:

@@ -22,6 +22,33 @@ _STEP = 1e-3
 """s; how far a sample's path is followed for its rates, by differences of fourth order: 1e-8 of the acceleration."""
 
 
+@dataclass(frozen=True)
+class Session:
+    """The low pass and the treadmill with which a walk is read.
+
+    Attributes
+    ----------
+    cutoff_hz
+        Of the zero-phase low pass of plates, and of coordinates without rates, Hz.
+    belt_speed_mps
+        Speed of the belt, taken as walking over ground: its way is added to pelvis and centres of pressure.
+    start_s
+        Time at which that way is 0, s.
+    """
+
+    cutoff_hz: float = CUTOFF_HZ
+    belt_speed_mps: float = 0.0
+    start_s: float = 0.0
+
+    def way(self, time: np.ndarray) -> np.ndarray:
+        """Return the way of the belt, forwards: (n, 3) m."""
+        return np.outer(self.belt_speed_mps * (time - self.start_s), [1.0, 0.0, 0.0])
+
+
+OVER_GROUND = Session()
+"""Without a treadmill, at the usual low pass."""
+
+
 def free_model(body: Body) -> pin.Model:
     """The body's model let go of the ground: a free joint under the stance forefoot, then the 19."""
     model = pin.buildModelFromXML(body.urdf, pin.JointModelFreeFlyer())
@@ -41,8 +68,6 @@ class Motion:
         (n,) s.
     q, v, a
         (n, 26), (n, 25), (n, 25) as Pinocchio has them: the free joint in its own frame, then the joints.
-    bandwidth_hz
-        Of the coordinates: the low pass, or the narrowest and widest spline's; None where the file gave the rates.
     """
 
     body: Body
@@ -51,7 +76,6 @@ class Motion:
     q: np.ndarray = field(repr=False)
     v: np.ndarray = field(repr=False)
     a: np.ndarray = field(repr=False)
-    bandwidth_hz: tuple[float, float] | None = None
 
     @property
     def dt(self) -> float:
@@ -97,14 +121,12 @@ def motion_of(
     time: np.ndarray,
     columns: Mapping[str, np.ndarray],
     hip: np.ndarray,
-    *,
-    cutoff_hz: float = CUTOFF_HZ,
-    belt_speed_mps: float = 0.0,
+    session: Session = OVER_GROUND,
 ) -> Motion:
     """The body's motion from OpenSim's coordinates.
 
     Rates and accelerations are the file's where it has both for every coordinate (`qd_`, `qdd_`), and then nothing is
-    filtered; else coordinates are low-passed at `cutoff_hz`, and differentiated.
+    filtered; else coordinates are low-passed, and differentiated.
 
     Parameters
     ----------
@@ -114,10 +136,8 @@ def motion_of(
         (n,) s; `q_<coordinate>`, and `qd_`, `qdd_` if known, (n,) in rad and m. What is optional and absent is 0.
     hip
         Right hip centre in OpenSim's pelvis, (3,) m; see `pelvis_to_hip`.
-    cutoff_hz
-        Of the low pass, Hz.
-    belt_speed_mps
-        Speed of a treadmill's belt, taken as walking over ground: its way is added to the pelvis's.
+    session
+        Low pass and treadmill.
 
     Raises
     ------
@@ -125,32 +145,33 @@ def motion_of(
         A coordinate is missing or not finite.
     """
     model, names = free_model(body), [n.removeprefix("q_") for n in columns if n.startswith("q_")]
-    (place, rate, change), bandwidth = _paths(names, time, columns, cutoff_hz)
+    if absent := [n for n in REQUIRED if n not in names]:
+        raise InputError("the coordinate is missing", column=f"q_{absent[0]}")
+    place, rate, change = _paths(columns, time, names, session.cutoff_hz)
     ahead = names.index("pelvis_tx")
-    place[:, ahead] += belt_speed_mps * (time - time[0])
-    rate[:, ahead] += belt_speed_mps
+    place[:, ahead] += session.way(time)[:, 0]
+    rate[:, ahead] += session.belt_speed_mps
     moved = (place + step * rate + 0.5 * step**2 * change for step in (0.0, _STEP, -_STEP, 2.0 * _STEP, -2.0 * _STEP))
     q, *near = (_placed(body, model, dict(zip(names, m.T, strict=True)), hip) for m in moved)
     apart = np.array([list(map(partial(pin.difference, model), q, other)) for other in near])
     v = np.tensordot([8.0, -8.0, -1.0, 1.0], apart, 1) / (12.0 * _STEP)
     a = np.tensordot([16.0, 16.0, -1.0, -1.0], apart, 1) / (12.0 * _STEP**2)
-    return Motion(body, model, np.array(time, dtype=float), q, v, a, bandwidth)
+    return Motion(body, model, np.array(time, dtype=float), q, v, a)
 
 
-def _paths(
-    names: list[str], time: np.ndarray, columns: Mapping[str, np.ndarray], cutoff_hz: float
-) -> tuple[tuple[np.ndarray, np.ndarray, np.ndarray], tuple[float, float] | None]:
-    """Coordinates, rates and accelerations (n, coordinates), and the bandwidth that was left to them."""
-    for name in REQUIRED:
-        if name not in names:
-            raise InputError("the coordinate is missing", column=f"q_{name}")
+def has_rates(columns: Mapping[str, np.ndarray]) -> bool:
+    """Return whether there are a rate and an acceleration of every coordinate."""
+    names = [n.removeprefix("q_") for n in columns if n.startswith("q_")]
+    return all(f"{kind}_{n}" in columns for kind in ("qd", "qdd") for n in names)
+
+
+def _paths(columns: Mapping[str, np.ndarray], time: np.ndarray, names: list[str], cutoff_hz: float) -> list[np.ndarray]:
+    """Return coordinates, rates and accelerations: (n, coordinates) each."""
+    if has_rates(columns):
+        return [np.stack([columns[f"{kind}_{n}"] for n in names], axis=1) for kind in ("q", "qd", "qdd")]
     raw = np.stack([np.asarray(columns[f"q_{n}"], dtype=float) for n in names], axis=1)
-    if all(f"{kind}_{n}" in columns for kind in ("qd", "qdd") for n in names):
-        first, second = (np.stack([columns[f"{kind}_{n}"] for n in names], axis=1) for kind in ("qd", "qdd"))
-        return (raw, first, second), None
-    dt = float(time[-1] - time[0]) / (len(time) - 1)
-    smooth = low_pass(raw, dt, cutoff_hz)
-    return (smooth, *rates(smooth, time)), (cutoff_hz, cutoff_hz)
+    smooth = low_pass(raw, float(time[-1] - time[0]) / (len(time) - 1), cutoff_hz)
+    return [smooth, *rates(smooth, time)]
 
 
 def _placed(body: Body, model: pin.Model, coordinates: dict[str, np.ndarray], hip: np.ndarray) -> np.ndarray:

@@ -11,8 +11,8 @@ from scipy.ndimage import distance_transform_edt
 
 from fes_pin.body.joints import SIDES
 from fes_pin.body.skeleton import TO_WORLD
-from fes_pin.data.errors import InputError
-from fes_pin.data.smooth import CUTOFF_HZ, low_pass
+from fes_pin.data.smooth import low_pass
+from fes_pin.walk.motion import OVER_GROUND, Session
 
 LOADED_N = 20.0
 """A foot stands where its vertical force is above this: the usual threshold on instrumented treadmills."""
@@ -28,6 +28,8 @@ class Plates:
     ----------
     time
         (n,) s.
+    way
+        (n, 3) m: the place of the plates relative to a treadmill's belt; zeros over ground.
     feet
         By side, (n, 6): force, N, and moment about the world's origin, N m; x forward, y left, z up.
     pressure
@@ -37,6 +39,7 @@ class Plates:
     """
 
     time: np.ndarray = field(repr=False)
+    way: np.ndarray = field(repr=False)
     feet: dict[str, np.ndarray] = field(repr=False)
     pressure: dict[str, np.ndarray] = field(repr=False)
     loaded: dict[str, np.ndarray] = field(repr=False)
@@ -49,7 +52,7 @@ class Plates:
     def part(self, rows: slice) -> Plates:
         """Some of the samples."""
         cut = ({side: values[rows] for side, values in one.items()} for one in (self.feet, self.pressure, self.loaded))
-        return Plates(self.time[rows], *cut)
+        return Plates(self.time[rows], self.way[rows], *cut)
 
     def support(self) -> np.ndarray:
         """The one foot that stands in every sample: `left`, `right`, `both` or "" for none."""
@@ -69,15 +72,9 @@ class Plates:
 
 
 def plates_of(
-    time: np.ndarray,
-    columns: Mapping[str, np.ndarray],
-    at: np.ndarray,
-    *,
-    cutoff_hz: float = CUTOFF_HZ,
-    belt_speed_mps: float = 0.0,
-    start_s: float | None = None,
+    time: np.ndarray, columns: Mapping[str, np.ndarray], at: np.ndarray, session: Session = OVER_GROUND
 ) -> Plates:
-    """The ground reaction at the motion's times.
+    """Return the ground reaction at the motion's times; where the plates were not recorded, as at their nearest time.
 
     Parameters
     ----------
@@ -85,35 +82,23 @@ def plates_of(
         (m,) s; `r_` and `l_`: `F[xyz]`, `cop[xyz]`, `T[xyz]` as `fes_pin.data.motion.read_ground_reaction` gives them.
     at
         (n,) s; times of the motion.
-    cutoff_hz
-        Of the zero-phase low pass that forces and moments about the origin go through, Hz.
-    belt_speed_mps
-        Of a treadmill: its way since `start_s` is added to the centres of pressure, as to the pelvis.
-    start_s
-        Time at which the belt's way is 0, s; the motion's first without it.
-
-    Raises
-    ------
-    InputError
-        The two were not recorded at the same time.
+    session
+        Low pass, which forces and moments about the origin go through, and treadmill.
     """
-    if at[0] < time[0] - 1e-9 or at[-1] > time[-1] + 1e-9:
-        raise InputError(f"ground reaction is known from {time[0]:g} to {time[-1]:g} s, motion from {at[0]:g}")
     dt = float(time[-1] - time[0]) / (len(time) - 1)
-    way = np.outer(belt_speed_mps * (time - (at[0] if start_s is None else start_s)), [1.0, 0.0, 0.0])
     feet, pressure, loaded = {}, {}, {}
     for side in SIDES:
         force, point, free = (
             np.stack([columns[f"{side[0]}_{kind}{c}"] for c in "xyz"], axis=1) @ TO_WORLD.T
             for kind in ("F", "cop", "T")
         )
-        point = point + way
+        point = point + session.way(time)
         wrench = np.hstack([force, np.cross(point, force) + free])
-        smooth = low_pass(wrench, dt, cutoff_hz)
+        smooth = low_pass(wrench, dt, session.cutoff_hz)
         feet[side] = _at(at, time, smooth)
         loaded[side] = _at(at, time, force[:, 2:]).ravel() > LOADED_N
         pressure[side] = _held(_at(at, time, point), loaded[side])
-    return Plates(np.asarray(at, dtype=float), feet, pressure, loaded)
+    return Plates(np.asarray(at, dtype=float), session.way(at), feet, pressure, loaded)
 
 
 def _at(at: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarray:

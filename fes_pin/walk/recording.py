@@ -1,8 +1,9 @@
 """A study of walking made ready: the body that is believed, its motion, and the plates on the motion's clock."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,9 +13,10 @@ from fes_pin.data.errors import InputError
 from fes_pin.data.smooth import CUTOFF_HZ
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
-from fes_pin.walk.motion import Motion, motion_of, pelvis_to_hip
+from fes_pin.walk.motion import Motion, Session, has_rates, motion_of, pelvis_to_hip
 from fes_pin.walk.plates import Plates, plates_of
 from fes_pin.walk.plausible import carried_along, check_together
+from fes_pin.walk.walk_trial import WalkTrial
 
 MASS_SHARE = 0.01
 """Share by which the mass that a study states may differ from that of its segments."""
@@ -32,29 +34,32 @@ class WalkRecording:
         Of the trial.
     motion, plates
         On one clock; where coordinates are filtered, the filter's ends are cut off.
-    raw_time, raw_plates
-        The plates' own clock and columns, as read.
-    coordinates_time, coordinates
-        The coordinates, as read.
-    hip, cutoff_hz
-        As the motion was read with.
-    belt_speed_mps
-        Of the treadmill.
-    start_s
-        Time at which the belt's way is 0, s.
+    time, coordinates
+        The coordinates and their clock, as read.
+    plates_time
+        The plates' clock, as read.
+    moved
+        Function of times and coordinates of the same session: their motion.
+    read
+        Function of the plates' clock, and of the times `at` which to read them: the plates.
+    session
+        Low pass and treadmill.
     """
 
     name: str
     motion: Motion
     plates: Plates
-    raw_time: np.ndarray = field(repr=False)
-    raw_plates: Mapping[str, np.ndarray] = field(repr=False)
-    coordinates_time: np.ndarray = field(repr=False)
+    time: np.ndarray = field(repr=False)
     coordinates: Mapping[str, np.ndarray] = field(repr=False)
-    hip: np.ndarray = field(repr=False)
-    cutoff_hz: float = CUTOFF_HZ
-    belt_speed_mps: float = 0.0
-    start_s: float = 0.0
+    plates_time: np.ndarray = field(repr=False)
+    moved: Callable[[np.ndarray, Mapping[str, np.ndarray]], Motion] = field(repr=False)
+    read: Callable[..., Plates] = field(repr=False)
+    session: Session
+
+    def trial(self, later_s: float = 0.0) -> WalkTrial:
+        """Return the trial, with the plates read that much later than their clock says."""
+        plates = self.read(self.plates_time - later_s, at=self.motion.time) if later_s else self.plates
+        return WalkTrial(self.name, self.motion, plates)
 
 
 def body_of(study: Study) -> tuple[Body, np.ndarray]:
@@ -119,16 +124,15 @@ def _recording(trial: Trial, body: Body, hip: np.ndarray, cutoff_hz: float) -> W
         time, raw_time = trial.time, trial.time
         columns = {n: v for n, v in trial.columns.items() if n.startswith(("q_", "qd_", "qdd_"))}
         raw = {n: v for n, v in trial.columns.items() if n not in columns}
-    belt = trial.conditions.get("belt_speed_mps", 0.0)
-    filtered = not all(f"qdd_{n[2:]}" in columns for n in columns if n.startswith("q_"))
-    edge = 0.5 / cutoff_hz if filtered else 0.0
+    edge = 0.0 if has_rates(columns) else 0.5 / cutoff_hz
     inside = (time >= max(raw_time[0], time[0] + edge)) & (time <= min(raw_time[-1], time[-1] - edge))
     if inside.sum() < FEWEST:
         raise InputError(f"trial {trial.name} has {inside.sum()} samples of motion and reaction together", file=source)
+    session = Session(cutoff_hz, trial.conditions.get("belt_speed_mps", 0.0), float(time[0]))
+    moved, read = partial(motion_of, body, hip=hip, session=session), partial(plates_of, columns=raw, session=session)
     try:
-        whole = motion_of(body, time, columns, hip, cutoff_hz=cutoff_hz, belt_speed_mps=belt)
-        motion = whole.part(inside)
-        plates = plates_of(raw_time, raw, motion.time, cutoff_hz=cutoff_hz, belt_speed_mps=belt, start_s=float(time[0]))
+        motion = moved(time, columns).part(inside)
+        plates = read(raw_time, at=motion.time)
     except InputError as error:
         raise InputError(error.message, file=source, column=error.column) from None
     try:
@@ -136,6 +140,5 @@ def _recording(trial: Trial, body: Body, hip: np.ndarray, cutoff_hz: float) -> W
         rows = carried_along(motion, plates)
     except InputError as error:
         raise InputError(error.message, file=reaction, column=error.column) from None
-    motion, plates = motion.part(rows), plates.part(rows)
-    as_read = raw_time, dict(raw), time, dict(columns)
-    return WalkRecording(trial.name, motion, plates, *as_read, hip, cutoff_hz, belt, float(time[0]))
+    used = motion.part(rows), plates.part(rows)
+    return WalkRecording(trial.name, *used, time, dict(columns), raw_time, moved, read, session)

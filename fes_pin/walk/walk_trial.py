@@ -14,8 +14,7 @@ from fes_pin.walk.dynamics import (
     segment_regressors,
 )
 from fes_pin.walk.motion import Motion
-from fes_pin.walk.plates import Plates, plates_of
-from fes_pin.walk.recording import WalkRecording
+from fes_pin.walk.plates import Plates
 
 
 @dataclass(frozen=True)
@@ -28,17 +27,16 @@ class WalkTrial:
         Of the trial.
     motion, plates
         On one clock.
-    centre
-        (n, 3) m: the believed centre of mass.
-    way
-        (n, 3) m: the place of the plates relative to a treadmill's belt; zeros over ground.
     """
 
     name: str
     motion: Motion = field(repr=False)
     plates: Plates = field(repr=False)
-    centre: np.ndarray = field(repr=False)
-    way: np.ndarray | None = field(default=None, repr=False)
+
+    @cached_property
+    def centre(self) -> np.ndarray:
+        """The believed centre of mass: (n, 3) m."""
+        return centre_of_mass(self.motion)
 
     @cached_property
     def needed(self) -> np.ndarray:
@@ -58,9 +56,8 @@ class WalkTrial:
     @cached_property
     def rate(self) -> np.ndarray:
         """How fast the plates' reading changes, about the centre of mass where it is: (n, 6) per s."""
-        way = np.zeros_like(self.centre) if self.way is None else self.way
-        read = about(self.plates.total, way)
-        return about(np.gradient(read, self.dt, axis=0), self.centre - way)
+        read = about(self.plates.total, self.plates.way)
+        return about(np.gradient(read, self.dt, axis=0), self.centre - self.plates.way)
 
     @cached_property
     def feet(self) -> dict[str, np.ndarray]:
@@ -102,17 +99,3 @@ class WalkTrial:
         """Return the wrench of 1 N along world directions at points: (n, 6); `point`, `direction` (n, 3)."""
         along = np.broadcast_to(direction, point.shape)
         return np.hstack([along, np.cross(point - self.centre, along)])
-
-
-def walk_trial_of(recording: WalkRecording, cutoff_hz: float, later_s: float = 0.0) -> WalkTrial:
-    """Return a recording as a trial; `later_s` reads the plates that much later than their clock says."""
-    plates = recording.plates
-    if later_s:
-        time = recording.raw_time - later_s
-        held = np.clip(recording.motion.time, time[0], time[-1])
-        plates = plates_of(
-            time, recording.raw_plates, held, cutoff_hz=cutoff_hz, belt_speed_mps=recording.belt_speed_mps,
-            start_s=recording.start_s,
-        )  # fmt: skip
-    way = np.outer(recording.belt_speed_mps * (recording.motion.time - recording.start_s), [1.0, 0.0, 0.0])
-    return WalkTrial(recording.name, recording.motion, plates, centre_of_mass(recording.motion), way)

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-from fes_pin.data.smooth import CUTOFF_HZ
 from fes_pin.data.study import Study, read_study
 from fes_pin.walk.designs import Designs
 from fes_pin.walk.models import WalkModels
@@ -40,4 +39,4 @@ def strength(gait: Gait, wrong: Wrong, seed: int, study: Study) -> float:
 
 
 def _designs(study: Study) -> Designs:
-    return Designs(recordings_of(study, cutoff_hz=CUTOFF_HZ), CUTOFF_HZ)
+    return Designs(recordings_of(study))

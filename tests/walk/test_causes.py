@@ -6,7 +6,6 @@ import pytest
 from fes_pin.data.study import read_study
 from fes_pin.walk.effects import EFFECTS, walk_library
 from fes_pin.walk.recording import recordings_of
-from fes_pin.walk.walk_trial import walk_trial_of
 
 pytestmark = pytest.mark.shared
 HIDDEN = [  # cause, site as it is hidden, size, more of it, form that must take it away, size of its parameter
@@ -30,7 +29,7 @@ def trial(gait, folder, wrong, seed=3):
 
     make(gait, folder, wrong, seed)
     (recording,) = recordings_of(read_study(folder))
-    return walk_trial_of(recording, recording.cutoff_hz)
+    return recording.trial()
 
 
 def size(residual):

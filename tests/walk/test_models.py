@@ -21,7 +21,7 @@ def models_of(gait, folder, seed, *args, **more):
 
     make(gait, folder, Wrong(*args, **{"strides": 2, "tissue": 0.4, **more}), seed)
     recordings = recordings_of(read_study(folder))
-    return WalkModels(Designs(recordings, recordings[0].cutoff_hz), seed=0)
+    return WalkModels(Designs(recordings), seed=0)
 
 
 @pytest.fixture(scope="module")
