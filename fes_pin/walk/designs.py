@@ -136,7 +136,7 @@ class Designs:
         form, later = self.forms[self.shift], 0.0
         trials, y, rate = self.as_read.trials, self.as_read.y, self.as_read.x[self.shift]
         for _ in range(SHIFT_ROUNDS):
-            found = fit_walk(self.noise.rotated(y), self.noise.rotated(rate), np.array(form.plausible), self.noise)
+            found = fit_walk(self.noise.rotated(y), self.noise.rotated(rate), self.plausible((self.shift,)), self.noise)
             step = float(np.clip(found.values[0], -0.05, 0.05))
             later = float(np.clip(later + step, -0.2, 0.2))
             trials = [r.trial(later) for r in self.recordings]
@@ -170,7 +170,7 @@ class Designs:
 
     def plausible(self, names: Names) -> np.ndarray:
         """Return the plausible size of every parameter of a set, (p,)."""
-        return np.array([size for n in names for size in self.forms[n].plausible])
+        return np.array([form.plausible for form in (self.forms[n] for n in names) for _ in form.parameters])
 
     def _columns(self, names: Names) -> np.ndarray:
         return np.concatenate([self._none(), *(self.design(names).x[n] for n in names)], axis=3)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
@@ -13,7 +14,12 @@ STAGE = "body"
 """Stage of these causes."""
 AXES = ("forward", "left", "up")
 
+UNITS = {"n": "N", "share": ""}
+"""Units that the end of a parameter's name writes otherwise."""
+
 EffectColumns = Callable[[WalkTrial], np.ndarray]
+SegmentChange = Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]]
+"""Function of the segments' ten mass parameters: their changes per unit of each parameter, (10, p) by segment."""
 
 
 @dataclass(frozen=True)
@@ -26,10 +32,10 @@ class Form:
         Its canonical name.
     site
         Where or how it acts, in a few words.
-    parameters, units
-        Names and units of its columns.
+    parameters
+        Names of its columns, which end in their units.
     plausible
-        A large but possible size of each parameter; a form that is not significant at this size is not testable.
+        A large but possible size of every parameter; a form that is not significant at this size is not testable.
     columns
         Residual (measured - required) per unit of each parameter: (n, 6, p).
     shifts
@@ -42,14 +48,13 @@ class Form:
         Function of a trial that returns directly measured values (p,) and standard deviations of the parameters, or
         None.
     segments
-        By segment, the change of its ten mass parameters per unit of each parameter, (10, p), given what is believed.
+        The change of segments' mass parameters; None of a form that changes none.
     """
 
     cause: str
     site: str
     parameters: tuple[str, ...]
-    units: tuple[str, ...]
-    plausible: tuple[float, ...]
+    plausible: float
     columns: EffectColumns = field(repr=False, compare=False)
     shifts: bool = False
     positive: bool = False
@@ -57,9 +62,13 @@ class Form:
     reading: Callable[[WalkTrial], tuple[np.ndarray, float] | None] | None = field(
         default=None, repr=False, compare=False
     )
-    segments: Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]] | None = field(
-        default=None, repr=False, compare=False
-    )
+    segments: SegmentChange | None = field(default=None, repr=False, compare=False)
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Units of the parameters."""
+        ends = (n.rpartition("_")[2] for n in self.parameters)
+        return tuple(UNITS.get(end, end) for end in ends)
 
     @property
     def label(self) -> str:
@@ -103,17 +112,14 @@ SITES: dict[str, tuple[str, ...]] = {
 """Sites at which a segment's parameters may be wrong: one segment, or the same segment of both legs."""
 
 
-def segment_form(
-    cause: str,
-    site: str,
-    parameters: tuple[str, ...],
-    units: tuple[str, ...],
-    plausible: tuple[float, ...],
-    change: Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]],
-) -> Form:
+PLATES: dict[str, tuple[str, ...]] = {"both plates": SIDES, **{f"{side} plate": (side,) for side in SIDES}}
+"""Sites at which plates may be wrong, with the sides of their feet."""
+
+
+def segment_form(cause: str, site: str, parameters: tuple[str, ...], plausible: float, change: SegmentChange) -> Form:
     """Return a form that changes segments' mass parameters, with columns of Pinocchio's regressors times the change."""
+    return Form(cause, site, parameters, plausible, partial(_regressed, change=change), segments=change)
 
-    def columns(trial: WalkTrial) -> np.ndarray:
-        return np.sum([trial.regressors[s] @ d for s, d in change(trial.parameters).items()], axis=0)
 
-    return Form(cause, site, parameters, units, plausible, columns, segments=change)
+def _regressed(trial: WalkTrial, change: SegmentChange) -> np.ndarray:
+    return np.sum([trial.regressors[s] @ d for s, d in change(trial.parameters).items()], axis=0)

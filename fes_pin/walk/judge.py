@@ -71,7 +71,7 @@ def not_testable(designs: Designs, one: WalkFit) -> list[str]:
     ridge = np.diag(np.r_[np.ones(noise.nuisance.shape[3]), np.zeros(one.degrees)]) + 1e-12 * np.eye(taken.shape[1])
     best: dict[str, float] = {}
     for name, form in designs.forms.items():
-        x = noise.rotated(designs.as_read.x[name]).reshape(variance.size, -1) * root[:, None] * np.array(form.plausible)
+        x = noise.rotated(designs.as_read.x[name]).reshape(variance.size, -1) * root[:, None] * form.plausible
         kept = x - taken @ np.linalg.solve(taken.T @ taken + ridge, taken.T @ x)
         best[form.cause] = max(best.get(form.cause, 0.0), float(np.sqrt(max(np.sum(kept * x, axis=0).max(), 0.0))))
     found = {designs.forms[n].cause for n in one.names}

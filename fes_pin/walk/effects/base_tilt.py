@@ -6,13 +6,12 @@ from functools import partial
 import numpy as np
 
 from fes_pin.body.build import GRAVITY
-from fes_pin.walk.effect import Form, WalkEffect
+from fes_pin.walk.effect import AXES, Form, WalkEffect
 from fes_pin.walk.walk_trial import WalkTrial
 
 ORDINARY_RAD = 0.004
 """Standard deviation where nothing is wrong: frames of cameras and plates are level to a quarter of a degree each way,
 about what a spirit level and a calibration frame tell (a round figure)."""
-_WORDS = {"forward": 0, "left": 1}
 
 
 class LaboratoryTilt(WalkEffect):
@@ -28,14 +27,11 @@ class LaboratoryTilt(WalkEffect):
 
     @classmethod
     def forms(cls) -> Iterator[Form]:
-        for words in (("forward",), ("left",), ("forward", "left")):
+        for axes in ((0,), (1,), (0, 1)):
+            words, columns = [AXES[a] for a in axes], partial(_tilted, axes=axes)
             names = tuple(f"{w}_rad" for w in words)
-            columns = partial(_tilted, axes=tuple(_WORDS[w] for w in words))
             ordinary = ORDINARY_RAD * (len(words) == 1)
-            yield Form(
-                cls.name, " and ".join(words), names, ("rad",) * len(words), (0.05,) * len(words), columns,
-                ordinary=ordinary,
-            )  # fmt: skip
+            yield Form(cls.name, " and ".join(words), names, 0.05, columns, ordinary=ordinary)
 
 
 def _tilted(trial: WalkTrial, axes: tuple[int, ...]) -> np.ndarray:

@@ -21,7 +21,7 @@ class ClockOffset(WalkEffect):
 
     @classmethod
     def forms(cls) -> Iterator[Form]:
-        yield Form(cls.name, "both plates", ("late_s",), ("s",), (0.03,), _rate, shifts=True)
+        yield Form(cls.name, "both plates", ("late_s",), 0.03, _rate, shifts=True)
 
 
 def _rate(trial: WalkTrial) -> np.ndarray:

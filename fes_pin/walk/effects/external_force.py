@@ -36,7 +36,7 @@ class ExternalForce(WalkEffect):
                 names = tuple(f"{AXES[a]}_n" for a in axes)
                 words = " and ".join(AXES[a] for a in axes)
                 columns = partial(_pushed, place=place, axes=axes)
-                yield Form(cls.name, f"{place}, {words}", names, ("N",) * len(axes), (50.0,) * len(axes), columns)
+                yield Form(cls.name, f"{place}, {words}", names, 50.0, columns)
 
 
 def place_of(trial: WalkTrial, place: str) -> np.ndarray:

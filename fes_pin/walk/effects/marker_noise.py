@@ -23,7 +23,7 @@ class MarkerNoise(WalkEffect):
 
     @classmethod
     def forms(cls) -> Iterator[Form]:
-        yield Form(cls.name, "smoothed", ("smoothing_s2",), ("s2",), (4e-4,), _smoothed, positive=True)
+        yield Form(cls.name, "smoothed", ("smoothing_s2",), 4e-4, _smoothed, positive=True)
 
 
 def _smoothed(trial: WalkTrial) -> np.ndarray:

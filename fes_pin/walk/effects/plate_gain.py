@@ -5,8 +5,7 @@ from functools import partial
 
 import numpy as np
 
-from fes_pin.body.joints import SIDES
-from fes_pin.walk.effect import Form, WalkEffect
+from fes_pin.walk.effect import PLATES, Form, WalkEffect
 from fes_pin.walk.walk_trial import WalkTrial
 
 
@@ -23,12 +22,11 @@ class PlateGain(WalkEffect):
 
     @classmethod
     def forms(cls) -> Iterator[Form]:
-        for site in ("both plates", *(f"{side} plate" for side in SIDES)):
-            sides = SIDES if site == "both plates" else (site.split()[0],)
-            yield Form(cls.name, site, ("share",), ("",), (0.1,), partial(_scaled, sides=sides, axes=AXES))
+        for site, sides in PLATES.items():
+            yield Form(cls.name, site, ("share",), 0.1, partial(_scaled, sides=sides, axes=AXES))
             for axis, word in ((2, "vertical"), (0, "forward"), (1, "sideways")):
                 columns = partial(_scaled, sides=sides, axes=(axis,))
-                yield Form(cls.name, f"{site}, {word}", ("share",), ("",), (0.1,), columns)
+                yield Form(cls.name, f"{site}, {word}", ("share",), 0.1, columns)
 
 
 AXES = (0, 1, 2)

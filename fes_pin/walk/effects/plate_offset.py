@@ -5,8 +5,7 @@ from functools import partial
 
 import numpy as np
 
-from fes_pin.body.joints import SIDES
-from fes_pin.walk.effect import AXES, Form, WalkEffect
+from fes_pin.walk.effect import AXES, PLATES, Form, WalkEffect
 from fes_pin.walk.walk_trial import WalkTrial
 
 ORDINARY_N, ORDINARY_M = 1.5, 0.004
@@ -31,21 +30,20 @@ class PlateOffset(WalkEffect):
 
     @classmethod
     def forms(cls) -> Iterator[Form]:
-        for site in ("both plates", *(f"{side} plate" for side in SIDES)):
-            sides = SIDES if site == "both plates" else (site.split()[0],)
+        for site, sides in PLATES.items():
             single = float(len(sides) == 1)
             for axis, word in enumerate(AXES):
                 for when in ("while loaded", "always"):
                     columns = partial(_constant, sides=sides, axis=axis, loaded=when == "while loaded")
                     yield Form(
-                        cls.name, f"{site}, {word} force, {when}", (f"{word}_n",), ("N",), (20.0,), columns,
+                        cls.name, f"{site}, {word} force, {when}", (f"{word}_n",), 20.0, columns,
                         ordinary=single * ORDINARY_N * (when == "while loaded"),
                         reading=partial(_unloaded, sides=sides, axis=axis) if when == "always" else None,
                     )  # fmt: skip
             for axis, word in enumerate(AXES[:2]):
                 columns = partial(_displaced, sides=sides, axis=axis)
                 yield Form(
-                    cls.name, f"{site}, centre of pressure {word}", (f"{word}_m",), ("m",), (0.02,), columns,
+                    cls.name, f"{site}, centre of pressure {word}", (f"{word}_m",), 0.02, columns,
                     ordinary=single * ORDINARY_M,
                 )  # fmt: skip
 

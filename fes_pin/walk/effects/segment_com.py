@@ -1,6 +1,7 @@
 """A segment's centre of mass lies elsewhere."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 import pinocchio as pin
@@ -29,22 +30,19 @@ class SegmentCom(WalkEffect):
             for axes in ((0,), (1,), (2,), *(((0, 1), (0, 2)) if len(segments) == 1 else ())):
                 names = tuple(f"{AXES[a]}_m" if len(segments) == 1 or a != 1 else "outwards_m" for a in axes)
                 words = " and ".join(n.removesuffix("_m") for n in names)
-                label, size = f"{site}, {words}", (_PLAUSIBLE.get(site, 0.015),) * len(axes)
-                yield segment_form(cls.name, label, names, ("m",) * len(axes), size, _shifted(segments, axes))
+                change = partial(_shifted, segments=segments, axes=axes)
+                yield segment_form(cls.name, f"{site}, {words}", names, _PLAUSIBLE.get(site, 0.015), change)
 
 
 def _shifted(
-    segments: tuple[str, ...], axes: tuple[int, ...]
-) -> Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]]:
-    def change(believed: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-        out = {}
-        for s in segments:
-            outwards = -1.0 if len(segments) > 1 and s.startswith("right") else 1.0
-            columns = [(outwards if a == 1 else 1.0) * _along(believed[s], a) for a in axes]
-            out[s] = np.stack(columns, axis=1)
-        return out
-
-    return change
+    believed: dict[str, np.ndarray], segments: tuple[str, ...], axes: tuple[int, ...]
+) -> dict[str, np.ndarray]:
+    out = {}
+    for s in segments:
+        outwards = -1.0 if len(segments) > 1 and s.startswith("right") else 1.0
+        columns = [(outwards if a == 1 else 1.0) * _along(believed[s], a) for a in axes]
+        out[s] = np.stack(columns, axis=1)
+    return out
 
 
 def _along(believed: np.ndarray, axis: int) -> np.ndarray:

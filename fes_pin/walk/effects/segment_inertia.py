@@ -1,6 +1,7 @@
 """A segment's inertia tensor is off."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 import pinocchio as pin
@@ -22,12 +23,9 @@ class SegmentInertia(WalkEffect):
     @classmethod
     def forms(cls) -> Iterator[Form]:
         for site, segments in SITES.items():
-            yield segment_form(cls.name, site, ("share",), ("",), (0.3,), _scaled(segments))
+            yield segment_form(cls.name, site, ("share",), 0.3, partial(_scaled, segments=segments))
 
 
-def _scaled(segments: tuple[str, ...]) -> Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]]:
-    def change(believed: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-        inertias = {s: pin.Inertia.FromDynamicParameters(believed[s]).inertia for s in segments}
-        return {s: pin.Inertia(0.0, np.zeros(3), i).toDynamicParameters()[:, None] for s, i in inertias.items()}
-
-    return change
+def _scaled(believed: dict[str, np.ndarray], segments: tuple[str, ...]) -> dict[str, np.ndarray]:
+    inertias = {s: pin.Inertia.FromDynamicParameters(believed[s]).inertia for s in segments}
+    return {s: pin.Inertia(0.0, np.zeros(3), i).toDynamicParameters()[:, None] for s, i in inertias.items()}

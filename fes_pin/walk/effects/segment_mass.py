@@ -1,6 +1,7 @@
 """A segment is heavier or lighter than believed."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 
@@ -20,24 +21,16 @@ class SegmentMass(WalkEffect):
 
     @classmethod
     def forms(cls) -> Iterator[Form]:
-        for site, segments in SITES.items():
-            yield segment_form(cls.name, site, ("share",), ("",), (0.2,), _added(segments))
-        for site, segments in SITES.items():
-            moved = f"{site}, taken from the others"
-            yield segment_form(cls.name, moved, ("share",), ("",), (0.2,), _moved(segments))
+        for change, words in ((_added, ""), (_moved, ", taken from the others")):
+            for site, segments in SITES.items():
+                yield segment_form(cls.name, f"{site}{words}", ("share",), 0.2, partial(change, segments=segments))
 
 
-def _added(segments: tuple[str, ...]) -> Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]]:
-    def change(believed: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-        return {s: believed[s][:, None] for s in segments}
-
-    return change
+def _added(believed: dict[str, np.ndarray], segments: tuple[str, ...]) -> dict[str, np.ndarray]:
+    return {s: believed[s][:, None] for s in segments}
 
 
-def _moved(segments: tuple[str, ...]) -> Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]]:
-    def change(believed: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-        others = [s for s in believed if s not in segments]
-        ratio = sum(believed[s][0] for s in segments) / sum(believed[s][0] for s in others)
-        return {**_added(segments)(believed), **{s: -ratio * believed[s][:, None] for s in others}}
-
-    return change
+def _moved(believed: dict[str, np.ndarray], segments: tuple[str, ...]) -> dict[str, np.ndarray]:
+    others = [s for s in believed if s not in segments]
+    ratio = sum(believed[s][0] for s in segments) / sum(believed[s][0] for s in others)
+    return {**_added(believed, segments), **{s: -ratio * believed[s][:, None] for s in others}}
