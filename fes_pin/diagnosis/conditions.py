@@ -109,12 +109,15 @@ class Conditions(ABC, Generic[F, M]):
         return attempted(lambda: self.misread(trials, searched), None)
 
     def _restated(self, trials: Sequence[Trial], misread: Misread) -> Restated[F, M]:
-        """Return a search of the restated trials, made again with the value by the causes that it finds."""
+        """Return a search of the restated trials, made again with the value by other causes while it finds these."""
         other = restated_trials(self.nominal, trials, misread)
         search, searched = self.run(other)
-        if searched.without and not search.was_stopped:
+        tried = [set[str]()]
+        while set(searched.without) not in tried and not search.was_stopped:
+            tried.append(set(searched.without))
             again = self._misread(trials, searched)
-            if again is not None and (again.trial, again.condition) == (misread.trial, misread.condition):
-                misread, other = again, restated_trials(self.nominal, trials, again)
-                search, searched = self.run(other)
+            if again is None or (again.trial, again.condition) != (misread.trial, misread.condition):
+                break
+            misread, other = again, restated_trials(self.nominal, trials, again)
+            search, searched = self.run(other)
         return Restated(misread, other, search, searched)
