@@ -38,7 +38,7 @@ def change_of(
         group=item.group,
         words=f"{words} (from {one} to {two})",
         parameters=parameters,
-        equivalents=_equivalents(found, item),
+        equivalents=_equivalents(models, found, item),
         p_value=found.p_values[str(item)],
         evidence=evidence,
     )
@@ -65,12 +65,15 @@ def _by_group(
     return parameters
 
 
-def _equivalents(found: Found, item: Item) -> tuple[str, ...]:
-    """Return the equivalents of a change; of driven rigs also with more parameters, if they are as likely."""
+def _equivalents(models: ContrastModels, found: Found, item: Item) -> tuple[str, ...]:
+    """Return the equivalents of a change; of driven rigs also with more parameters, if they are as likely.
+
+    An equivalent is significant by the test of the change itself.
+    """
     best, near = found.best, set[str]()
     for rival in found.rivals[str(item)]:
         criterion = min(rival.criterion, rival.sse + best.criterion - best.sse) if best.is_driven else rival.criterion
-        if criterion < best.criterion + SEPARABLE:
+        if criterion < best.criterion + SEPARABLE and models.p_value(rival, found.without[str(item)]) < CLAIM_LEVEL:
             near |= {i.name for i in rival.items - best.items}
     return tuple(sorted(near - {item.name}))
 
