@@ -91,11 +91,16 @@ class GroupedFits:
         return [f if f.noise.correlation_s == longest else fitted(g, longest) for g, f in each.items()]
 
     def converged(
-        self, model: GroupedModel, items: Collection[Item], weights: Weights, unknowns: Unknowns | None
+        self,
+        model: GroupedModel,
+        items: Collection[Item],
+        weights: Weights,
+        unknowns: Unknowns | None,
+        rounds: int = ROUNDS,
     ) -> Grouped:
         """Fit a grouped model and its noise by alternating maximisation."""
         problem = GroupedProblem(model, self.trials, weights)
-        return Grouped.of(items, problem, alternate(problem, model.parameters(), unknowns, ROUNDS, LOOK))
+        return Grouped.of(items, problem, alternate(problem, model.parameters(), unknowns, rounds, LOOK))
 
     def go_on(self, one: Grouped) -> Grouped:
         """Fit a set until it converges, also from little process noise and from that of each group alone.

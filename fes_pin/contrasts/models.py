@@ -92,14 +92,14 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
         return dict(zip(starts, looks, strict=True))
 
     def _look(self, base: Grouped, scores: Sequence[ItemScore]) -> Grouped:
-        """Return a first fit of a set; a converged one where the scatter of a parameter hides its change."""
+        """Return a first fit of a set, with one round of its own noise: that of the smaller set explains its items."""
         out = []
         for one in scores:
             items = base.items | {one.item}
             model = base.model.having(items, () if one.effect is None else (one.effect,)).with_parameters(one.start)
             out.append(self.maxima.look(model, items, base))
         best = min(out, key=lambda f: f.criterion)
-        return self.maxima.go_on(best) if scores[0].item.name in base.repeats else best
+        return self.maxima.converged(best.model, best.items, best.weights, best.fit.unknowns, rounds=1)
 
     def converged(self, fits: Sequence[Grouped]) -> list[Grouped]:
         """Return the converged fits."""
