@@ -15,6 +15,7 @@ from fes_pin.data.provenance import Provenance
 from fes_pin.data.read_only import ReadOnly, as_dicts
 from fes_pin.data.show import by_columns, frame, table_html, table_text
 from fes_pin.data.study import Study
+from fes_pin.data.trial import Trial, trial_csv
 from fes_pin.infer.result import ON, STOPPED, Cause, Explained, Named, Remainder, shown
 from fes_pin.infer.text import listed, percent
 
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 RESULT, TEXT, TABLE = "result", "text", "table"
 """Keys that every saved result has in addition to those of its kind: its kind, its text by lines, its table by
 columns."""
+NEXT_FILE = "next_trial.csv"
+"""File of the trial that is proposed."""
 UNCOMPARED = ("wall_s", "provenance")
 """Keys of a record that say how a result was made, not what it is."""
 
@@ -94,14 +97,22 @@ class Plan:
         The reason, in words.
     separates
         The two causes; of several rivals the one that the experiment separates least.
+    trial
+        The trial to run: its inputs and conditions, without outputs; None where no trial separates the two.
     """
 
     why: str
     separates: tuple[str, str]
+    trial: Trial | None = None
+    FILES: ClassVar[tuple[str, ...]] = ("file",)
+    """Keys of a `[[trial]]` that name `NEXT_FILE`."""
 
     def trial_record(self) -> dict[str, Any] | None:
-        """Return the trial as JSON files have it; None where no trial separates the two."""
-        raise NotImplementedError
+        """Return the trial as JSON files have it; its columns are in `NEXT_FILE`."""
+        if (one := self.trial) is None:
+            return None
+        conditions = {n: shown(v) for n, v in one.conditions.items()}
+        return {**dict.fromkeys(self.FILES, NEXT_FILE), "kind": one.kind, **conditions}
 
     def record(self) -> dict[str, Any]:
         """Return the experiment as JSON files have it."""
@@ -252,7 +263,8 @@ class Result(Saveable):
 
     def files(self) -> dict[str, str | bytes]:
         """Content of every file of the answer but the report, by name."""
-        return {self.FILE: self.to_json()}
+        proposed = self.next_experiment.trial if self.next_experiment else None
+        return {self.FILE: self.to_json(), **({NEXT_FILE: trial_csv(proposed)} if proposed else {})}
 
     def by_command(self, command: str) -> Self:
         """The same with a command line in its provenance."""

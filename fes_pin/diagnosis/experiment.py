@@ -3,7 +3,6 @@
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -17,11 +16,9 @@ from fes_pin.identify.problem import measured_columns
 from fes_pin.infer.covariance import least_squares_step
 from fes_pin.infer.levels import SEPARABLE, SURE
 from fes_pin.infer.problem import Linearized, NormalEquations, normal_equations
-from fes_pin.infer.result import shown
 from fes_pin.models.nominal import rig_of
 from fes_pin.models.simulate import Simulator
 
-NEXT_FILE = "next_trial.csv"
 MOST_REPEATS = 50
 """A trial that must be run more often than this is not proposed."""
 SECONDS = 8.0
@@ -42,16 +39,13 @@ class NextExperiment(Plan):
 
     Attributes
     ----------
-    why, separates
+    why, separates, trial
         As of `Plan`.
-    trial
-        Its inputs and conditions, without outputs; None where no input of the rig separates the pair.
     expected
         What the trial is expected to add to the lead of the first cause if it is the true one, and to that of the
         second if that is, in twice the log-likelihood.
     """
 
-    trial: Trial | None
     expected: tuple[float, float] = (0.0, 0.0)
 
     @property
@@ -60,12 +54,6 @@ class NextExperiment(Plan):
         said = "NextExperiment.promised is NextExperiment.expected now; it ends with version 0.3"
         warnings.warn(said, DeprecationWarning, stacklevel=2)
         return self.expected
-
-    def trial_record(self) -> dict[str, Any] | None:
-        """Return the trial as JSON files have it; its inputs are in `NEXT_FILE`."""
-        if (one := self.trial) is None:
-            return None
-        return {"file": NEXT_FILE, "kind": one.kind, **{n: shown(v) for n, v in one.conditions.items()}}
 
 
 @dataclass(frozen=True)
@@ -138,12 +126,12 @@ def next_experiment(
     if falls(best.model, best.trials):
         pair = (name, next(iter(rivals)))
         why = f"{' and '.join(pair)}: the rig falls unless its controller holds it, and no effort is proposed"
-        return NextExperiment(f"{why}; move it further, or another way, and diagnose again", pair, None)
+        return NextExperiment(f"{why}; move it further, or another way, and diagnose again", pair)
     found = _best(best, rivals, list(candidates(study)), study)
     if found is None:
         pair = (name, next(iter(rivals)))
         why = f"no trial was found for {' and '.join(pair)} that stays near what has been measured"
-        return NextExperiment(why, pair, None)
+        return NextExperiment(why, pair)
     expected, trial = _refined(best, rivals, found, study)
     closest = min(expected, key=lambda n: expected[n].worth)
     pair, separation = (name, closest), expected[closest]
@@ -151,7 +139,7 @@ def next_experiment(
         most = f"{separation.worth:.2g} squared noise units at most" if separation.worth >= ALIKE else "nothing"
         why = f"no stimulus or load of this rig separates {name} and {closest}: the models differ by {most}"
         why = f"{why}; {best.model.rig.elsewhere}"
-        return NextExperiment(why, pair, None)
+        return NextExperiment(why, pair)
     others = ", the other rivals by more" if len(rivals) > 1 else ""
     differ = f"{name} and {closest} differ by {separation.worth:.3g} squared noise units{others}"
     why = f"on this trial {differ}; {_often(separation.repeats())}"

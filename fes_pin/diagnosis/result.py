@@ -7,10 +7,9 @@ from typing import Any
 
 from fes_pin.data.log import Log
 from fes_pin.data.results import Result
-from fes_pin.data.trial import trial_csv
 from fes_pin.diagnosis import recorded
 from fes_pin.diagnosis.errors_ahead import AheadErrors, RandomPart
-from fes_pin.diagnosis.experiment import NEXT_FILE, NextExperiment
+from fes_pin.diagnosis.experiment import NextExperiment
 from fes_pin.identify.error_measures import FREE, ONE_STEP
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.stored import log_table, stored_tables
@@ -141,10 +140,7 @@ class Diagnosis(Result):
 
     def files(self) -> dict[str, str | bytes]:
         """Return the content of every file of the diagnosis but the report, by name: with the extended model."""
-        files = super().files() | {"model.toml": model_toml(self.model, stored_tables(self.extended, self.log))}
-        if self.next_experiment and self.next_experiment.trial is not None:
-            files[NEXT_FILE] = trial_csv(self.next_experiment.trial)
-        return files
+        return super().files() | {"model.toml": model_toml(self.model, stored_tables(self.extended, self.log))}
 
     def own_record(self) -> dict[str, Any]:
         """Return the part of `diagnosis.json` that only a rig has."""

@@ -1,8 +1,9 @@
 """Names of the files of an answer to a study, of a rig or of a walk."""
 
+from fes_pin.data.results import NEXT_FILE
 from fes_pin.data.study import Study
 
-REPORT_FILE, NEXT_FILE = "report.html", "next_trial.csv"
+REPORT_FILE = "report.html"
 OF_ALL = ("diagnosis.json", "model.toml", REPORT_FILE, NEXT_FILE)
 OF_WALKS = ("body.urdf", "playback.html")
 """Files of a study at most, and further files of a walk; the next trial where one is proposed."""

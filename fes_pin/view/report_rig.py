@@ -4,7 +4,7 @@ from collections import Counter
 from pathlib import Path
 
 from fes_pin.data.log import Log
-from fes_pin.diagnosis.experiment import NEXT_FILE
+from fes_pin.data.results import NEXT_FILE
 from fes_pin.diagnosis.replay import replayed_trials
 from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.infer.result import ParameterEstimate

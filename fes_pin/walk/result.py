@@ -9,12 +9,11 @@ import tomli_w
 from fes_pin.body.build import Body
 from fes_pin.data.results import Result
 from fes_pin.data.smooth import CUTOFF_HZ
-from fes_pin.data.table import format_csv
 from fes_pin.infer.result import CROSS_VALIDATED, FITTED, Cause, Explained, shown
 from fes_pin.infer.text import percent, probability
 from fes_pin.walk.effect import WalkEffect
 from fes_pin.walk.effects import EFFECTS
-from fes_pin.walk.experiment import NEXT_FILE, NextWalk
+from fes_pin.walk.experiment import NextWalk
 from fes_pin.walk.extended import extended_body
 from fes_pin.walk.judge import CHANNELS
 from fes_pin.walk.models import WalkFit, WalkModels
@@ -76,10 +75,7 @@ class WalkDiagnosis(Result):
             for c in self.causes
         ]
         model = {"model": {"rig": "body", "urdf": BODY_FILE, "cutoff_hz": self.cutoff_hz}, "effect": causes}
-        files = super().files() | {"model.toml": tomli_w.dumps(model), BODY_FILE: self.model.urdf}
-        if self.next_experiment and self.next_experiment.coordinates is not None:
-            files[NEXT_FILE] = format_csv(self.next_experiment.coordinates)
-        return files
+        return super().files() | {"model.toml": tomli_w.dumps(model), BODY_FILE: self.model.urdf}
 
     def own_record(self) -> dict[str, Any]:
         """Return the part of `diagnosis.json` that only a walk has."""

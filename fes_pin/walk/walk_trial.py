@@ -65,15 +65,21 @@ class WalkTrial:
         return {side: about(wrench, self.centre) for side, wrench in self.plates.feet.items()}
 
     @cached_property
+    def load_shares(self) -> dict[str, np.ndarray]:
+        """Share of each foot in the vertical load: (n,)."""
+        up = {side: np.clip(wrench[:, 2], 0.0, None) for side, wrench in self.plates.feet.items()}
+        total = np.maximum(sum(up.values()), 1.0)
+        return {side: v / total for side, v in up.items()}
+
+    @cached_property
     def true_feet(self) -> dict[str, np.ndarray]:
         """The reaction of each foot if both together were the required reaction: (n, 6).
 
         The residual is divided between the feet by their vertical load. A gain error is proportional to this reaction:
         in proportion to the reading, a gain that makes all readings small would make every residual small.
         """
-        up = {side: np.clip(wrench[:, 2], 0.0, None) for side, wrench in self.feet.items()}
-        total = np.maximum(sum(up.values()), 1.0)
-        return {side: wrench - (up[side] / total)[:, None] * self.residual for side, wrench in self.feet.items()}
+        shares = self.load_shares
+        return {side: wrench - shares[side][:, None] * self.residual for side, wrench in self.feet.items()}
 
     @cached_property
     def regressors(self) -> dict[str, np.ndarray]:
