@@ -156,7 +156,7 @@ def _compared(
     """A model with its errors; `white` weighs the columns in its fits, `floor` in E."""
     fits = fits_of(one.model, parts, white)
     kinds = left_out_errors(fits, parts, horizon_s, given_s)
-    whole = fits[0] if len(parts) == 1 else fit_multistart(Problem(one.model, fitted, white), one.model.parameters())
+    whole = fits[0] if len(parts) == 1 else fit_multistart(Problem(one.model, fitted, white))
     trials = [t for p in parts for t in p.held]
     columns = np.array([one.model.rig.output(t.kind) for t in trials])
     weight = np.array([len(t) / floor[c].std ** 2 for t, c in zip(trials, columns, strict=True)])

@@ -50,7 +50,7 @@ def spread_noise(model: Model, trials: Sequence[Trial]) -> dict[str, Noise]:
 
 def fits_of(model: Model, parts: Sequence[Parting], white: Mapping[str, Noise]) -> list[Fit]:
     """Fits for least free error, one for each parting."""
-    return in_parallel(lambda p: fit_multistart(Problem(model, p.fitted, white), model.parameters()), parts)
+    return in_parallel(lambda p: fit_multistart(Problem(model, p.fitted, white)), parts)
 
 
 def left_out_errors(

@@ -113,7 +113,7 @@ class RepeatedProblem(LikelihoodProblem):
         own = np.linalg.solve(np.eye(len(at)) + v.T @ v, v.T @ part.residual) * self._sizes
         own_step = least_squares(part.local, part.jacobian[:, at] @ own, rcond=1e-10)
         moved = one.sensitivities[..., at] @ own - one.sensitivities[..., len(self.free) :] @ own_step
-        return replace(one, values=np.where(one.seen, one.values + moved, 0.0))
+        return replace(one, values=np.where(one.seen, one.values - moved, 0.0))
 
 
 @dataclass(frozen=True)

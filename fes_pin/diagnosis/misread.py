@@ -12,17 +12,17 @@ therefore not taken for a misreading. A restated trial must also be explained as
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy import special
 
 from fes_pin.data.trial import Trial
-from fes_pin.identify.fit import Fit, fit_multistart, fit_problem, noise_of, rough_noise
+from fes_pin.identify.fit import Fit, fit_problem, noise_of, rough_fit, under_own_noise
 from fes_pin.identify.per_trial import halves
 from fes_pin.identify.problem import Problem
 from fes_pin.infer.levels import CLAIM_LEVEL, EXPLAINED_AS_WELL, FEWEST_STATED, MISREAD_SCORE
-from fes_pin.infer.noise import as_white
+from fes_pin.infer.optimum import MAX_ITERATIONS
 from fes_pin.infer.problem import Linearized
 from fes_pin.infer.projection import Projection, without_locals
 from fes_pin.models.model import Model
@@ -115,7 +115,7 @@ def find_misread(model: Model, trials: Sequence[Trial]) -> Misread | None:
     wanted = [(i, n) for i, t in enumerate(trials) for n in model.rig.stated(t) if felt[t.kind, n]]
     if len({i for i, _ in wanted}) < FEWEST_STATED:
         return None
-    whole = fit_multistart(Problem(model, trials, rough_noise(model, trials)), model.parameters())
+    whole = rough_fit(model, trials)
     if not math.isfinite(whole.sse):
         return None
     odd = _screen(whole, trials, wanted, sizes)
@@ -159,8 +159,8 @@ def _screen(
     whole: Fit, trials: Sequence[Trial], wanted: Sequence[tuple[int, str]], sizes: dict[str, float]
 ) -> list[tuple[int, str]]:
     """Return the conditions of largest score in a model whose parameters are free too, under white noise."""
-    white = replace(whole, noise=as_white(noise_of(whole)))
-    projection = Projection(Problem(whole.model, trials, white.noise).linearize(whole.values, whole.unknowns))
+    white = under_own_noise(whole, longest=0)
+    projection = Projection(white.parts)
 
     def score(pick: tuple[int, str]) -> float:
         i, name = pick
@@ -197,8 +197,8 @@ def _left_out(
     i, name = pick
     others = [k for k in range(len(trials)) if k != i]
     rest = [trials[k] for k in others]
-    near = fit_problem(Problem(whole.model, rest, as_white(noise_of(whole))), whole.values)
-    fitted = fit_problem(Problem(whole.model, rest, noise_of(near)), near.values)
+    near = fit_problem(Problem(whole.model, rest, noise_of(whole, longest=0)), whole.values)
+    fitted = under_own_noise(near, max_iterations=MAX_ITERATIONS)
     if not math.isfinite(fitted.sse):
         return None
     own = _step(fitted, trials[i], name, sizes[name])

@@ -67,7 +67,7 @@ def with_misread(
     before, best = made.misread.whole, made.searched.best
     if before.model.effects:
         bare = Model(before.model.rig)
-        before = fit_multistart(Problem(bare, trials, before.noise), bare.parameters())
+        before = fit_multistart(Problem(bare, trials, before.noise))
     floor = rough_noise(before.model, trials)
     pair = (free_errors(before.model, trials, floor), free_errors(diagnosis.nominal.model, made.trials, floor))
     cause = _cause(made, held_out_gain(pair[0], *pair, seed).percent, trials, seed)

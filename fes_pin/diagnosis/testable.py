@@ -19,10 +19,9 @@ from fes_pin.diagnosis.search.library import Library
 from fes_pin.diagnosis.search.likelihood_screen import LikelihoodScreen
 from fes_pin.diagnosis.search.score import Scores
 from fes_pin.identify.feedback import is_fed_back
-from fes_pin.identify.fit import Fit, fit_multistart, rough_noise
+from fes_pin.identify.fit import Fit, residuals_of, rough_fit
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit, fit_of
-from fes_pin.identify.problem import Problem
 from fes_pin.identify.process_noise import first_guess
 from fes_pin.infer.levels import ALIKE_COSINE, IDENTIFIABLE_SHARE, LEAST_SHIFT_S, REVERSED_LEAVES, SMALL_SHARE
 from fes_pin.infer.optimum import minimise
@@ -81,7 +80,7 @@ def testable_causes(study: Study, catalogue: Catalogue | None = None) -> Testabl
     effects = (catalogue or installed()).effects_for(nominal.rig)
     with one_thread_each():
         try:
-            fitted = _fitted(nominal, trials)
+            fitted = rough_fit(nominal, trials)
             if not math.isfinite(fitted.sse):
                 return "the nominal model diverges when it is simulated from its start values"
             library = Library(nominal, trials, effects)
@@ -112,7 +111,7 @@ def given_away(study: Study) -> list[str]:
         return []
 
     def of_fit() -> list[str]:
-        fitted = _fitted(nominal, trials)
+        fitted = rough_fit(nominal, trials)
         return _given_away(nominal, trials, fitted) if math.isfinite(fitted.sse) else []
 
     with one_thread_each():
@@ -128,10 +127,6 @@ def _to_fit(study: Study) -> tuple[Model, Sequence[Trial]]:
     return nominal_model(study), searched_part(trials, study.schema)[0]
 
 
-def _fitted(model: Model, trials: Sequence[Trial]) -> Fit:
-    return fit_multistart(Problem(model, trials, rough_noise(model, trials)), model.parameters())
-
-
 def _by_likelihood(fitted: Fit) -> LikelihoodFit:
     """The same values as a fit by the likelihood without process noise, in white measurement noise."""
     white = replace(first_guess(fitted.model, fitted.trials), std={}, time={})
@@ -143,9 +138,8 @@ def _unexplained(fitted: Fit) -> float:
     """Return the largest share of a column's variance that a fit leaves."""
     left: dict[str, float] = {}
     there: dict[str, float] = {}
-    residuals = Problem(fitted.model, fitted.trials, fitted.noise).residuals(fitted.values, fitted.unknowns)
-    for trial, columns in zip(fitted.trials, residuals, strict=True):
-        for name, residual in columns.items():
+    for trial, one in zip(fitted.trials, residuals_of(fitted), strict=True):
+        for name, residual in zip(one.outputs, one.values.T, strict=True):
             left[name] = left.get(name, 0.0) + float(residual @ residual)
             there[name] = there.get(name, 0.0) + len(trial) * float(np.var(trial[name]))
     return max((left[n] / max(there[n], 1e-300) for n in left), default=0.0)
@@ -175,7 +169,7 @@ def _reversed(model: Model, trials: Sequence[Trial], fitted: Fit) -> list[str]:
     if not any("effort" in t and "position" in t for t in trials):
         return []
     turned = [t.with_columns(effort=-t["effort"]) if "effort" in t else t for t in trials]
-    other = _fitted(model, turned)
+    other = rough_fit(model, turned)
     if not (
         math.isfinite(other.sse) and other.sse < REVERSED_LEAVES * fitted.sse and _unexplained(other) < REVERSED_LEAVES
     ):
@@ -193,7 +187,7 @@ def _shifted(model: Model, trials: Sequence[Trial], fitted: Fit) -> list[str]:
         return []
     sums = [float(p.residual @ p.residual) / len(p.residual) for p in fitted.parts]
     worst = [trials[i] for i in np.argsort(sums)[::-1][:MOST_LOOKED_AT]]
-    shifts = [_shift(_fitted(model, [t for t in trials if t is not one]).model, one) for one in worst]
+    shifts = [_shift(rough_fit(model, [t for t in trials if t is not one]).model, one) for one in worst]
     usual = float(np.median([shift if share < SMALL_SHARE else 0.0 for shift, share in shifts]))
     out = []
     for trial, (shift, share) in zip(worst, shifts, strict=True):

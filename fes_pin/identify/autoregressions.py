@@ -26,7 +26,7 @@ def autoregressions(run: Sequence[PredictedTrial], orders: Mapping[str, Sequence
         left = [_left(one, name) for one in run if name in one.outputs]
         if left:
             most = min(MOST, min(map(len, left)) // SAMPLES_EACH)
-            out[name] = likeliest_autoregression(left, [p for p in own if p <= most] or [0])
+            out[name], _ = likeliest_autoregression(left, [p for p in own if p <= most] or [0])
     return out
 
 
@@ -41,7 +41,7 @@ def residual_powers(run: Sequence[PredictedTrial]) -> dict[str, float]:
         for one in run:
             if name in one.outputs:
                 own = one.of_seen(np.broadcast_to(np.array(one.outputs) == name, one.seen.shape))
-                squares += float(np.sum(one.whitened[0][own] ** 2))
+                squares += float(np.sum(one.whitened[own] ** 2))
                 count += float(np.sum(1.0 - one.readings.again[own]))
         if 0.0 < squares < math.inf:
             out[name] = squares / count

@@ -66,9 +66,9 @@ def _shared(fitted: LikelihoodFit) -> float:
 
 def _other(fitted: LikelihoodFit, sparser: LikelihoodFit) -> float:
     """Return by how much less likely each sparser reading is under a fit than under the fit of these readings."""
-    problem = LikelihoodProblem(sparser.model, sparser.trials, sparser.noise)
     as_it_was = replace(fitted.noise, correlation_s=sparser.noise.correlation_s)
-    lost = problem.cost(fitted.values, fitted.unknowns, as_it_was) - sparser.sse
+    problem = LikelihoodProblem(sparser.model, sparser.trials, as_it_was)
+    lost = problem.cost(fitted.values, fitted.unknowns) - sparser.sse
     return lost / max(sum(len(p.residual) for p in sparser.parts), 1)
 
 

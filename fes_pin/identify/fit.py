@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,13 +21,13 @@ from fes_pin.data.trial import Trial
 from fes_pin.identify.problem import Problem
 from fes_pin.infer.noise import ORDERS, Noise, NoiseModel, estimate_noise, noise_step, thin, thinning
 from fes_pin.infer.optimum import MAX_ITERATIONS, Optimum, minimise
-from fes_pin.infer.problem import Problem as AnyProblem
 from fes_pin.infer.problem import Unknowns
 from fes_pin.infer.profile import profile_interval
 from fes_pin.infer.result import shown
 from fes_pin.infer.scoring import LITTLE
 from fes_pin.models.accepted import accepted_trials
 from fes_pin.models.model import Model
+from fes_pin.models.predictions import PredictedTrial
 from fes_pin.models.predictor import StateSpaceNoise
 from fes_pin.workers import one_thread_each
 
@@ -121,8 +121,7 @@ class Fit(Optimum, Saveable):
         return {n: self._profile(n) for n in self.at_bound}
 
     def _profile(self, name: str) -> tuple[float, float]:
-        problem = Problem(self.model, self.trials, self.noise, self.free)
-        problem.limits |= self.bounds
+        problem = problem_of(self, self.noise)
         if not math.isfinite(reach := self.reach(name)):
             return problem.limits[name]
         with one_thread_each():
@@ -151,17 +150,6 @@ class Fit(Optimum, Saveable):
         values = ", ".join(f"{n} = {self._estimate(n)}" for n in self.free)
         return f"Fit {' + '.join(self.model.structure())}: {self.samples} samples, chi2 {self.reduced:.3f}; {values}"
 
-    def __str__(self) -> str:
-        info = self.model.parameter_info()
-        lines = [self._title()]
-        for name in self.free:
-            note = " (not identified)" if name in self.not_identified() else ""
-            lines.append(f"  {name:40s} {self._estimate(name):>24s} {info[name].unit}{note}".rstrip())
-        return "\n".join(lines)
-
-    def _title(self) -> str:
-        return f"{' + '.join(self.model.structure())}: {self.samples} samples, reduced chi2 {self.reduced:.3f}"
-
     def as_table(self) -> tuple[str, Sequence[str], Sequence[Sequence[str]], Sequence[str]]:
         """Return title, head, rows and notes of the printed table."""
         rows = [
@@ -169,7 +157,8 @@ class Fit(Optimum, Saveable):
             for n, value, _, low, high, unit, note in zip(*self.columns().values(), strict=True)
         ]
         notes = [] if self.is_optimal() else ["The fit did not end at an optimum."]
-        return self._title(), ("parameter", "value", "95 % interval", "unit", ""), rows, notes
+        title = f"{' + '.join(self.model.structure())}: {self.samples} samples, reduced chi2 {self.reduced:.3f}"
+        return title, ("parameter", "value", "95 % interval", "unit", ""), rows, notes
 
     def columns(self) -> dict[str, list[Any]]:
         """Return the fitted parameters with standard deviations, 95 % intervals and units.
@@ -234,6 +223,9 @@ class Fit(Optimum, Saveable):
         return "Fit"
 
 
+F = TypeVar("F", bound=Fit)
+
+
 def fit_problem(
     problem: Problem,
     start: Mapping[str, float],
@@ -245,45 +237,59 @@ def fit_problem(
     return Fit(**ended(problem.model, found), trials=problem.trials, noise=problem.noise)
 
 
-def grown_start(
-    of: Callable[[list[Trial]], AnyProblem], trials: Sequence[Trial], start: Mapping[str, float], max_iterations: int
-) -> tuple[dict[str, float], Unknowns | None]:
-    """Return start values from fits to the beginning of every trial, to twice as much of it, and so on.
+def from_beginnings(
+    problem: Problem,
+    plain: F,
+    again: Callable[[Mapping[str, float], Unknowns], F],
+    max_iterations: int = MAX_ITERATIONS,
+) -> F:
+    """Return a fit, or the one from fits to the beginning of every trial, to twice as much of it, and so on, if better.
 
     The error of an angle by a wrong parameter grows with time, past half a swing. The sum of squares of a long trial
     then has many minima, that of its beginning few. Source: Voss, Timmer and Kurths, Int. J. Bifurc. Chaos 14 (2004).
 
     Parameters
     ----------
-    of
-        The problem on some trials.
-
-    Returns
-    -------
-    tuple
-        Values of all parameters, and the unknowns of each trial.
+    plain
+        The fit from the values of the problem's model.
+    again
+        Returns the fit from other values of parameters and unknowns.
     """
-    values, unknowns = dict(start), None
+    values, unknowns = problem.model.parameters(), None
     for share in GROWTH:
-        short = of([t.first(max(SHORTEST, round(share * len(t)))) for t in trials])
+        short = problem.on([t.first(max(SHORTEST, round(share * len(t)))) for t in problem.trials])
         near = minimise(short, values, unknowns, max_iterations)
         values, unknowns = near.values, near.unknowns
-    return values, unknowns
+    grown = again(near.values, near.unknowns)
+    return grown if grown.sse < plain.sse or not math.isfinite(plain.sse) else plain
 
 
-def fit_multistart(problem: Problem, start: Mapping[str, float], max_iterations: int = MAX_ITERATIONS) -> Fit:
-    """Fit a problem from a start, and from afar where that leaves a gross misfit; return the better fit."""
-
-    def short(trials: list[Trial]) -> Problem:
-        made = Problem(problem.model, trials, problem.noise, problem.free)
-        made.limits = problem.limits
-        return made
-
-    plain = fit_problem(problem, start, max_iterations=max_iterations)
+def fit_multistart(problem: Problem, max_iterations: int = MAX_ITERATIONS) -> Fit:
+    """Fit a problem from its model's values, and from afar where that leaves a gross misfit; return the better fit."""
+    plain = fit_problem(problem, problem.model.parameters(), max_iterations=max_iterations)
     if plain.reduced < GROSS:
         return plain
-    grown = fit_problem(problem, *grown_start(short, problem.trials, start, max_iterations), max_iterations)
-    return grown if grown.sse < plain.sse or not np.isfinite(plain.sse) else plain
+    return from_beginnings(
+        problem, plain, lambda values, own: fit_problem(problem, values, own, max_iterations), max_iterations
+    )
+
+
+def rough_fit(model: Model, trials: Sequence[Trial]) -> Fit:
+    """Fit a model from its values under white noise as known before a fit; see `fit_multistart`."""
+    return fit_multistart(Problem(model, trials, rough_noise(model, trials)))
+
+
+def problem_of(fitted: Fit, noise: NoiseModel) -> Problem:
+    """Return the problem of a fit at another noise."""
+    problem = Problem(fitted.model, fitted.trials, noise, fitted.free)
+    problem.limits |= fitted.bounds
+    return problem
+
+
+def under_own_noise(fitted: Fit, longest: int = ORDERS[-1], least: int = 0, max_iterations: int = 0) -> Fit:
+    """Return a fit under the noise of its residuals, of orders as in `noise_of`, after some steps more."""
+    problem = problem_of(fitted, noise_of(fitted, longest, least))
+    return replace(fit_problem(problem, fitted.values, fitted.unknowns, max_iterations), bounds=fitted.bounds)
 
 
 def ended(model: Model, found: Optimum) -> dict[str, Any]:
@@ -339,20 +345,14 @@ def fit(
     names = [fixed] if isinstance(fixed, str) else list(instance(fixed, Iterable, "fixed"))
     free, narrower = _chosen(model, names, instance({} if bounds is None else bounds, Mapping, "bounds"))
 
-    def problem(noise: NoiseModel) -> Problem:
-        made = Problem(model, measured, noise, free)
-        made.limits |= narrower
-        return made
-
+    problem = Problem(model, measured, rough_noise(model, measured) if noise is None else noise, free)
+    problem.limits |= narrower
     with one_thread_each():  # products this small are slower on several threads
-        if noise is not None:
-            found = fit_multistart(problem(noise), model.parameters(), max_iterations=max_iterations)
-        else:
-            found = fit_multistart(problem(rough_noise(model, measured)), model.parameters())
-            if math.isfinite(found.sse):  # else the simulation runs away wherever the fit began
-                model = found.model
-                found = fit_problem(problem(noise_of(found)), found.values, found.unknowns, max_iterations)
-    return replace(found, bounds=narrower)
+        found = fit_multistart(problem, MAX_ITERATIONS if noise is None else max_iterations)
+        found = replace(found, bounds=narrower)
+        if noise is None and math.isfinite(found.sse):  # else the simulation runs away wherever the fit began
+            found = under_own_noise(found, max_iterations=max_iterations)
+    return found
 
 
 def _chosen(
@@ -376,13 +376,19 @@ def _chosen(
     return free, narrower
 
 
-def rough_noise(model: Model, trials: Sequence[Trial]) -> dict[str, Noise]:
-    """Return white noise at the level of the second differences of each measured column, as known before a fit."""
+def rough_noise(model: Model, trials: Sequence[Trial], correlation_s: float = 0.0) -> dict[str, Noise]:
+    """Return white noise at the level of the second differences of each measured column, as known before a fit.
+
+    Parameters
+    ----------
+    correlation_s
+        Correlation time of the noise, s: of readings so far apart.
+    """
     columns: dict[str, list[np.ndarray]] = {}
     for trial in trials:
         for name in model.rig.outputs(trial.kind):
             if name in trial.columns:
-                columns.setdefault(name, []).append(trial[name])
+                columns.setdefault(name, []).append(trial[name][:: max(1, round(correlation_s / trial.dt))])
     out = {}
     step = noise_step([t.dt for t in trials])
     for name, pieces in columns.items():
@@ -394,19 +400,21 @@ def rough_noise(model: Model, trials: Sequence[Trial]) -> dict[str, Noise]:
 
 
 def noise_of(fitted: Fit, longest: int = ORDERS[-1], least: int = 0) -> dict[str, Noise]:
-    """Return the noise of a fit's residuals, by output column, with autoregressions of orders `least` to `longest`.
-
-    A long autoregression would learn the effect of a trial's initial state as noise: that is projected off first.
-    """
-    problem = Problem(fitted.model, fitted.trials, fitted.noise, free=())
+    """Return the noise of a fit's residuals, by output column, with autoregressions of orders `least` to `longest`."""
     step = noise_step([t.dt for t in fitted.trials])
     columns: dict[str, list[np.ndarray]] = {}
     squares: dict[str, list[float]] = {}
-    for trial, residuals in zip(fitted.trials, problem.settled(fitted.values, fitted.unknowns), strict=True):
-        for name, residual in residuals.items():
+    for trial, one in zip(fitted.trials, residuals_of(fitted), strict=True):
+        for name, residual in zip(one.outputs, one.values.T, strict=True):
             columns.setdefault(name, []).append(thin(residual, thinning(trial.dt, step)))
             squares.setdefault(name, []).append(float(np.mean(residual**2)))
     return {
         name: estimate_noise(pieces, fitted.degrees, math.sqrt(float(np.mean(squares[name]))), step, longest, least)
         for name, pieces in columns.items()
     }
+
+
+def residuals_of(fitted: Fit) -> list[PredictedTrial]:
+    """Return every trial as simulated by a fit, in the units of its outputs, sample by sample."""
+    units = {n: Noise(1.0) for t in fitted.trials for n in fitted.model.rig.outputs(t.kind)}
+    return Problem(fitted.model, fitted.trials, units, ()).innovations(fitted.values, fitted.unknowns)

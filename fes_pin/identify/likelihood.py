@@ -21,7 +21,7 @@ import numpy as np
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
 from fes_pin.identify.autoregressions import autoregressions, residual_powers
-from fes_pin.identify.problem import limits_of, products_of
+from fes_pin.identify.problem import Problem
 from fes_pin.identify.process_noise import noise_limits, spread_of_start
 from fes_pin.infer.noise import ORDERS
 from fes_pin.infer.problem import Linearized, Unknowns, whitened_sse
@@ -39,7 +39,7 @@ FOLLOWED_STEP = 0.01
 """Step of a difference of the cost by a parameter of the reading, in its standard deviations."""
 
 
-class LikelihoodProblem(NoisyProblem):
+class LikelihoodProblem(Problem, NoisyProblem):
     """The likelihood of a model structure on trials, with process and measurement noise.
 
     Parameters
@@ -50,11 +50,11 @@ class LikelihoodProblem(NoisyProblem):
         Measured trials; NaN where nothing was measured.
     noise
         Process and measurement noise.
-    free
-        The free parameters; by default the fitted ones of the model.
-    starts
-        Trials whose first samples give the initial states, where those of `trials` are not all measured.
+    free, starts
+        As in `Problem`.
     """
+
+    noise: StateSpaceNoise
 
     def __init__(
         self,
@@ -64,12 +64,8 @@ class LikelihoodProblem(NoisyProblem):
         free: tuple[str, ...] | None = None,
         starts: Sequence[Trial] | None = None,
     ) -> None:
-        self.model, self.trials, self.noise = model, tuple(trials), noise
-        self.free = model.fitted_parameters() if free is None else free
-        self.limits = limits_of(model, self.trials)
-        self.is_simulated = is_simulated(noise, self.trials)
-        self.unknown_names = unknown_names(model, noise, self.trials)
-        self.begins = [model.rig.initial_unknowns(t) for t in starts or self.trials]
+        self.is_simulated = is_simulated(noise, trials)
+        super().__init__(model, trials, noise, free, starts)
         self.priors = [spread_of_start(model, t) for t in starts or self.trials]
         self._predictor: Predictor | None = None
         self._linearized: Predictor | FreeRun | None = None
@@ -78,30 +74,14 @@ class LikelihoodProblem(NoisyProblem):
     def _made(self, count: int, columns: tuple[str, ...]) -> Predictor | FreeRun:
         """Return the predictor of `count` copies of the trials, with sensitivities to some parameters and unknowns."""
         if self.is_simulated:
-            return FreeRun(self.model, self.trials * count, columns, self.noise.correlation_s)
+            return FreeRun(self.model, self.trials * count, columns, self.noise)
         own = (self.noise.processes, self.priors * count, self.noise.correlation_s)
         return Predictor(self.model, self.trials * count, columns, *own)
 
-    @cached_property
-    def products(self) -> list[tuple[int, int]]:
-        """Places in `free` of shapes and of the amplitudes that they multiply."""
-        return products_of(self.free, self.model.parameter_info())
-
-    def start_unknowns(self) -> Unknowns:
-        """Return start values of the unknowns: initial states from first samples, effects at their null."""
-        own = self.model.own_nulls()
-        return [{**begin, **own} if self.is_simulated else dict(own) for begin in self.begins]
-
-    def innovations(
-        self, values: Mapping[str, float], unknowns: Unknowns, noise: StateSpaceNoise | None = None
-    ) -> list[PredictedTrial]:
-        """Return innovations of every trial, with sensitivities to `free` and to the effects' unknowns."""
-        check_limit()
+    def _run(self, values: Mapping[str, float], unknowns: Unknowns) -> list[PredictedTrial]:
         if self._linearized is None:
             self._linearized = self._made(1, (*self.free, *self.unknown_names))
-        own = [{**begin, **u} for begin, u in zip(self.begins, unknowns, strict=True)]
-        with np.errstate(all="ignore"):
-            return self._linearized.run(values, noise or self.noise, own)
+        return self._linearized.run(values, self.noise, unknowns)
 
     @property
     def noise_parameters(self) -> dict[str, float]:
@@ -143,7 +123,7 @@ class LikelihoodProblem(NoisyProblem):
             filled = [*some, *[some[-1]] * (count - len(some))]
             repeated = [one for one in filled for _ in range(trials)]
             values, noises = ([one[0] for one in repeated], [one[2] for one in repeated])
-            own = [{**begin, **u} for one in filled for begin, u in zip(self.begins, one[1], strict=True)]
+            own = [whole for one in filled for whole in self.begun(one[1])]
             with np.errstate(all="ignore"):
                 run = predictor.run(values, noises, own)
             return [run[j * trials : (j + 1) * trials] for j in range(len(some))]
@@ -160,8 +140,7 @@ class LikelihoodProblem(NoisyProblem):
         self, values: Mapping[str, float], unknowns: Unknowns | None = None
     ) -> list[dict[str, PredictedOutput]]:
         """Return the prediction of each output of each trial, also where nothing was measured."""
-        given = self.start_unknowns() if unknowns is None else unknowns
-        own = [{**begin, **u} for begin, u in zip(self.begins, given, strict=True)]
+        own = self.begun(self.start_unknowns() if unknowns is None else unknowns)
         if self._predictor is None:  # a filter estimates the state also without process noise
             random = (self.noise.processes, self.priors, self.noise.correlation_s)
             self._predictor = Predictor(self.model, self.trials, (), *random)
@@ -169,8 +148,8 @@ class LikelihoodProblem(NoisyProblem):
             return self._predictor.predict(values, self.noise, own)
 
     def linearize(self, values: Mapping[str, float], unknowns: Unknowns) -> list[Linearized]:
-        """Return standardised innovations and their sensitivities at a parameter value; see `check_limit`."""
-        parts = [self.whitened(one) for one in self.innovations(values, unknowns)]
+        """Return standardised innovations and their sensitivities at a parameter value."""
+        parts = super().linearize(values, unknowns)
         if self.is_simulated:
             return [self._marginal(p, prior) for p, prior in zip(parts, self.priors, strict=True)]
         return self._followed(parts, values, unknowns) if self._scales else parts
@@ -285,28 +264,18 @@ class LikelihoodProblem(NoisyProblem):
         return np.nan_to_num(out)
 
     def whitened(self, one: PredictedTrial) -> Linearized:
-        """Return a trial's standardised innovations; its sensitivities are scaled in place."""
+        """Return the same with the logarithms of the variances."""
         with np.errstate(all="ignore"):
-            residual, logs = one.whitened
-            moved = one.over_deviations(one.sensitivities)
-            moved *= -1.0
-        split = len(self.free)
-        return Linearized(residual, moved[:, :split], moved[:, split:], float(np.sum(logs)))
+            return replace(super().whitened(one), log_determinant=float(np.sum(one.logarithms)))
 
-    def cost(self, values: Mapping[str, float], unknowns: Unknowns, noise: StateSpaceNoise | None = None) -> float:
+    def cost(self, values: Mapping[str, float], unknowns: Unknowns) -> float:
         """Return twice the negative log-likelihood."""
-        return sum(one.cost() for one in self.innovations(values, unknowns, noise))
+        return sum(one.cost() for one in self.innovations(values, unknowns))
 
 
 def is_simulated(noise: StateSpaceNoise, trials: Sequence[Trial]) -> bool:
     """Return whether there is no process noise: one-step predictions are then a free simulation."""
     return not noise.processes and all(t.kind != IMPOSED for t in trials)
-
-
-def unknown_names(model: Model, noise: StateSpaceNoise, trials: Sequence[Trial]) -> tuple[str, ...]:
-    """Return the unknowns of each trial by name: of its initial state, where that is fitted, and of effects."""
-    begins = [n for t in trials for n in model.rig.unknowns(t.kind)] if is_simulated(noise, trials) else []
-    return (*dict.fromkeys(begins), *model.own_unknowns())
 
 
 def _added(part: Linearized, at: Sequence[int], factors: np.ndarray) -> Linearized:
@@ -319,7 +288,7 @@ def _added(part: Linearized, at: Sequence[int], factors: np.ndarray) -> Lineariz
 def _joined(run: Sequence[PredictedTrial]) -> Evaluation:
     return Evaluation(
         float(sum(one.cost() for one in run)),
-        np.concatenate([one.whitened[0] for one in run]),
+        np.concatenate([one.whitened for one in run]),
         np.concatenate([one.seen_variances for one in run]),
         np.concatenate([one.repeated_noise for one in run]),
         np.concatenate([one.readings.again for one in run]),

@@ -11,8 +11,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from fes_pin.data.trial import Trial, derived_trial
-from fes_pin.identify.likelihood import LikelihoodProblem, unknown_names
+from fes_pin.identify.likelihood import LikelihoodProblem, is_simulated
 from fes_pin.identify.likelihood_fit import LikelihoodFit
+from fes_pin.identify.problem import unknown_names
 from fes_pin.identify.process_noise import spread_of_start
 from fes_pin.infer.noise import NoiseModel
 from fes_pin.infer.problem import Linearized, normal_equations
@@ -107,7 +108,7 @@ def amplitude(fitted: LikelihoodFit, effect: Effect) -> tuple[float, float]:
     The mean is over the trials of the first kind in which the effect acts, as a motion and a force have no common unit.
     The variance of the single estimates is subtracted from their squares.
     """
-    names = unknown_names(fitted.model, fitted.noise, fitted.trials)
+    names = unknown_names(fitted.model, fitted.trials, is_simulated(fitted.noise, fitted.trials))
     own = np.array([names.index(f"{effect.name}.{n}") for n in effect.unknowns()])
     slopes = [slope for _, slope in normal_equations(fitted.parts).eliminated]
     squares, spread, kind = [], [], None

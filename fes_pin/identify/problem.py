@@ -1,20 +1,20 @@
-"""Whitened residuals and sensitivities of a free simulation of trials."""
+"""A model simulated freely on trials: whitened residuals with sensitivities, and the bounds of its parameters."""
 
-import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
 from fes_pin.infer import problem as infer
-from fes_pin.infer.noise import NoiseModel, thinning
+from fes_pin.infer.noise import NoiseModel
 from fes_pin.infer.problem import Linearized, Unknowns
-from fes_pin.models.least_squares import least_squares
+from fes_pin.models.free_run import FreeRun
 from fes_pin.models.model import Model
 from fes_pin.models.parameters import ParameterInfo
-from fes_pin.models.simulate import Simulated, SimulatedBatch, Simulator
+from fes_pin.models.predictions import PredictedTrial
 from fes_pin.workers import check_limit
 
 NEXT_TO = 1e-6
@@ -23,19 +23,24 @@ resolve."""
 
 
 class Problem(infer.Problem):
-    """A model structure on trials, with the noise that weights their residuals.
+    """A model structure on trials, simulated freely, with the noise that weights their residuals.
 
     Parameters
     ----------
     model
         Its structure; values are given to the methods.
     trials
-        Measured trials.
+        Measured trials; NaN where nothing was measured.
     noise
         Noise by output column; a column without noise has no weight.
     free
-        The parameters of the sensitivities; by default the fitted ones of the model.
+        The free parameters; by default the fitted ones of the model.
+    starts
+        Trials whose first samples give the initial states, where those of `trials` are not all measured.
     """
+
+    is_simulated = True
+    """Whether trials are simulated freely, from initial states that are fitted."""
 
     def __init__(
         self,
@@ -43,14 +48,20 @@ class Problem(infer.Problem):
         trials: Sequence[Trial],
         noise: NoiseModel,
         free: tuple[str, ...] | None = None,
+        starts: Sequence[Trial] | None = None,
     ) -> None:
         self.model, self.trials, self.noise = model, tuple(trials), noise
         self.free = model.fitted_parameters() if free is None else free
         self.limits = limits_of(model, self.trials)
-        initial = dict.fromkeys(n for t in self.trials for n in model.rig.unknowns(t.kind))
-        self.unknown_names = (*initial, *model.own_unknowns()) if self.trials else ()
-        self.simulator = Simulator(model, self.trials, (*self.free, *self.unknown_names))
-        self._read: dict[tuple[int, ...], np.ndarray] = {}
+        self.unknown_names = unknown_names(model, self.trials, self.is_simulated)
+        self.begins = [model.rig.initial_unknowns(t) for t in starts or self.trials]
+        self._simulated: FreeRun | None = None
+
+    def on(self, trials: Sequence[Trial]) -> Self:
+        """Return the same problem on other trials."""
+        made = type(self)(self.model, trials, self.noise, self.free)
+        made.limits = self.limits
+        return made
 
     @cached_property
     def products(self) -> list[tuple[int, int]]:
@@ -58,83 +69,41 @@ class Problem(infer.Problem):
         return products_of(self.free, self.model.parameter_info())
 
     def start_unknowns(self) -> Unknowns:
-        """Return start values of the unknowns of each trial, from its first samples."""
-        return [self.model.initial_unknowns(t) for t in self.trials]
+        """Return start values of the unknowns: initial states from first samples, effects at their null."""
+        own = self.model.own_nulls()
+        return [{**begin, **own} if self.is_simulated else dict(own) for begin in self.begins]
 
-    def residuals(self, values: Mapping[str, float], unknowns: Unknowns) -> list[dict[str, np.ndarray]]:
-        """Return measured minus simulated, for each trial by output column; not whitened."""
-        run = self.simulator.run(values, unknowns)
-        return [self._left(trial, simulated) for trial, simulated in zip(self.trials, run, strict=True)]
+    def begun(self, unknowns: Unknowns) -> Unknowns:
+        """Return the unknowns of each trial with its initial state, where that is none of them."""
+        return [{**begin, **u} for begin, u in zip(self.begins, unknowns, strict=True)]
 
-    def _left(self, trial: Trial, simulated: Simulated) -> dict[str, np.ndarray]:
-        names = self.model.rig.outputs(trial.kind)
-        return {n: trial[n] - simulated.readings[:, k] for k, n in enumerate(names) if n in trial.columns}
+    def innovations(self, values: Mapping[str, float], unknowns: Unknowns) -> list[PredictedTrial]:
+        """Return every trial as predicted, with sensitivities to `free` and the unknowns; stops at a limit of time."""
+        check_limit()
+        with np.errstate(all="ignore"):
+            return self._run(values, self.begun(unknowns))
 
-    def settled(self, values: Mapping[str, float], unknowns: Unknowns) -> list[dict[str, np.ndarray]]:
-        """Return the residuals after a least-squares step of each trial's initial state."""
-        rig, out = self.model.rig, []
-        for trial, simulated in zip(self.trials, self.simulator.run(values, unknowns), strict=True):
-            left = self._left(trial, simulated)
-            own = [self.simulator.columns.index(n) for n in rig.unknowns(trial.kind)]
-            if own:
-                scale = {n: self.noise[n].std if n in self.noise else math.inf for n in left}
-                outputs = rig.outputs(trial.kind)
-                moved = {n: simulated.sensitivities[:, outputs.index(n), own] for n in left}
-                joined = np.concatenate([moved[n] / scale[n] for n in left])
-                step = least_squares(joined, np.concatenate([left[n] / scale[n] for n in left]))
-                left = {n: left[n] - moved[n] @ step for n in left} if step.any() else left
-            out.append(left)
-        return out
+    def _run(self, values: Mapping[str, float], unknowns: Unknowns) -> list[PredictedTrial]:
+        if self._simulated is None:
+            self._simulated = FreeRun(self.model, self.trials, (*self.free, *self.unknown_names), self.noise)
+        return self._simulated.run(values, self.noise, unknowns)
 
     def linearize(self, values: Mapping[str, float], unknowns: Unknowns) -> list[Linearized]:
-        """Return whitened residuals and sensitivities at a parameter value; stops at a limit of time."""
-        check_limit()
-        out: list[Linearized | None] = [None] * len(self.trials)
-        for block in self.simulator.run_batches(values, unknowns):
-            for i, part in zip(block.trials, self._whitened(block), strict=True):
-                out[i] = part
-        return [p for p in out if p is not None]
+        """Return whitened residuals and their sensitivities at a parameter value."""
+        return [self.whitened(one) for one in self.innovations(values, unknowns)]
 
-    def _whitened(self, block: SimulatedBatch) -> Iterator[Linearized]:
-        """Yield the trials of a simulated batch, whitened as a batch."""
-        trials = [self.trials[i] for i in block.trials]
-        pieces: list[list[tuple[np.ndarray, np.ndarray]]] = [[] for _ in trials]
-        missed = self._measured(block) - block.readings
-        for k, name in enumerate(self.model.rig.outputs(trials[0].kind)):
-            if name not in self.noise:
-                continue
-            noise = self.noise[name]
-            counts = [thinning(t.dt, noise.step_s) for t in trials]
-            for count in dict.fromkeys(counts):
-                dt = trials[counts.index(count)].dt
-                residuals, moved = noise.whiten(missed[:, k], dt), noise.whiten(block.sensitivities[:, k], dt)
-                for lane, trial in enumerate(trials):
-                    if counts[lane] == count and name in trial.columns:
-                        rows = noise.innovations(len(trial), dt)
-                        pieces[lane].append((residuals[:rows, lane], moved[:rows, :, lane]))
-        return (self._linearized(own, block.columns) for own in pieces)
-
-    def _measured(self, block: SimulatedBatch) -> np.ndarray:
-        """Return the measured outputs of the trials of a batch, in its layout; zero where nothing was measured."""
-        if block.trials not in self._read:
-            out = np.zeros(block.readings.shape)
-            for lane, trial in enumerate(self.trials[i] for i in block.trials):
-                for k, name in enumerate(self.model.rig.outputs(trial.kind)):
-                    if name in trial.columns:
-                        out[: len(trial), k, lane] = trial[name]
-            self._read[block.trials] = out
-        return self._read[block.trials]
-
-    def _linearized(self, pieces: Sequence[tuple[np.ndarray, np.ndarray]], columns: Sequence[int]) -> Linearized:
-        """Return one trial from the whitened residuals of its channels and their sensitivities to some columns."""
+    def whitened(self, one: PredictedTrial) -> Linearized:
+        """Return a trial's standardised innovations and their sensitivities."""
+        with np.errstate(all="ignore"):
+            residual, moved = one.whitened, one.over_deviations(one.sensitivities)
         split = len(self.free)
-        count, width = sum(len(r) for r, _ in pieces), split + len(self.unknown_names)
-        residual, rows, at = np.empty(count), np.zeros((count, width)), 0
-        places = slice(None) if len(columns) == width else list(columns)
-        for own, moved in pieces:
-            here = slice(at, at + len(own))
-            residual[here], rows[here, places], at = own, moved, here.stop
-        return Linearized(residual, rows[:, :split], rows[:, split:])
+        return Linearized(residual, moved[:, :split], moved[:, split:])
+
+
+def unknown_names(model: Model, trials: Sequence[Trial], is_simulated: bool) -> tuple[str, ...]:
+    """Return the unknowns of each trial by name: of its initial state, where that is fitted, and of effects."""
+    begins = [n for t in trials for n in model.rig.unknowns(t.kind)] if is_simulated else []
+    return (*dict.fromkeys(begins), *model.own_unknowns())
 
 
 def products_of(names: Sequence[str], info: Mapping[str, ParameterInfo]) -> list[tuple[int, int]]:

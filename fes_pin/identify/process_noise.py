@@ -16,9 +16,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from fes_pin.data.trial import Trial, derived_trial
+from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import rough_noise
-from fes_pin.infer.noise import Noise
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import StateSpaceNoise
 
@@ -59,19 +58,11 @@ def driving_size(model: Model, trials: Sequence[Trial]) -> dict[str, float]:
 
 def first_guess(model: Model, trials: Sequence[Trial], correlation_s: float = 0.0) -> StateSpaceNoise:
     """Return start values of noise: measurement noise from second differences, and small process noise."""
-    white = {n: noise.std for n, noise in _rough_noise(model, trials, correlation_s).items()}
+    white = {n: noise.std for n, noise in rough_noise(model, trials, correlation_s).items()}
     sizes = driving_size(model, trials)
     return StateSpaceNoise(
         white, {n: FIRST_SHARE * v for n, v in sizes.items()}, dict.fromkeys(sizes, FIRST_TIME_S), correlation_s
     )
-
-
-def _rough_noise(model: Model, trials: Sequence[Trial], correlation_s: float) -> dict[str, Noise]:
-    """Return white measurement noise from readings a correlation time apart."""
-    steps = [slice(None, None, max(1, round(correlation_s / t.dt))) for t in trials]
-    columns = [{n: v[own] for n, v in t.columns.items()} for t, own in zip(trials, steps, strict=True)]
-    apart = [derived_trial(t, columns=c, time=t.time[own]) for t, c, own in zip(trials, columns, steps, strict=True)]
-    return rough_noise(model, apart)
 
 
 def stilled(model: Model, trials: Sequence[Trial], noise: StateSpaceNoise) -> StateSpaceNoise:
@@ -96,7 +87,7 @@ def noise_limits(model: Model, trials: Sequence[Trial], correlation_s: float = 0
     """Return bounds of every parameter of the noise, by name."""
     step, longest = max(t.dt for t in trials), max(t.duration for t in trials)
     out: dict[str, tuple[float, float]] = {}
-    for name, noise in _rough_noise(model, trials, correlation_s).items():
+    for name, noise in rough_noise(model, trials, correlation_s).items():
         values = np.concatenate([t[name] for t in trials if name in t.columns])
         spread = max(float(np.nanmax(values) - np.nanmin(values)), 1e-9)
         out[f"white.{name}"] = (min(SMALLEST * spread, noise.std), spread)

@@ -17,6 +17,7 @@ from fes_pin.data.trial import Trial, derived_trial
 from fes_pin.identify.fit import Fit, fit_multistart, fit_problem, noise_of, rough_noise
 from fes_pin.identify.problem import Problem
 from fes_pin.infer.levels import SMALL_SHARE, SMOOTH
+from fes_pin.infer.noise import thinning
 from fes_pin.models.model import Model
 
 PERIODS, MOST = 10.0, 0.2
@@ -52,7 +53,7 @@ def low_pass_of(model: Model, trials: Sequence[Trial]) -> float | None:
     if any(t.kind == IMPOSED for t in trials) or PERIODS / shortest >= MOST / dt:
         return None
     rough = rough_noise(model, trials)
-    begun = fit_multistart(Problem(model, trials, rough), model.parameters())
+    begun = fit_multistart(Problem(model, trials, rough))
     left = noise_of(begun)
     if any(rough[n].std > SMOOTH * left[n].std for n in left):
         return None
@@ -83,7 +84,7 @@ def improves(passed: Fit, recorded: Fit) -> bool:
 def _cost(fitted: Fit) -> float:
     """Return twice the negative log-likelihood of a fit's residuals under their autoregressive noise."""
     noise, trials = noise_of(fitted), fitted.trials
-    counts = {n: sum(one.innovations(len(t), t.dt) for t in trials if n in t) for n, one in noise.items()}
+    counts = {n: sum(len(t) // thinning(t.dt, one.step_s) for t in trials if n in t) for n, one in noise.items()}
     return float(sum(2.0 * count * math.log(noise[n].innovation_std) for n, count in counts.items()))
 
 

@@ -41,32 +41,6 @@ class Noise:
     def __post_init__(self) -> None:
         object.__setattr__(self, "ar", tuple(self.ar))
 
-    def whiten(self, values: np.ndarray, dt: float) -> np.ndarray:
-        """Return innovations in units of their standard deviation.
-
-        Parameters
-        ----------
-        values
-            Shape (n, ...): residuals, or their sensitivities.
-        dt
-            Their time step, s.
-
-        Returns
-        -------
-        ndarray
-            Shape (n / thinning - p, ...): the first p samples only start the filter.
-        """
-        values = thin(values, thinning(dt, self.step_s))
-        out = np.array(values, dtype=float)
-        with np.errstate(invalid="ignore"):  # a simulation that did not stay finite
-            for k, a in enumerate(self.ar, 1):
-                out[k:] -= a * values[:-k]
-        return out[len(self.ar) :] / self.innovation_std
-
-    def innovations(self, samples: int, dt: float) -> int:
-        """Return the number of innovations of `samples` samples: see `whiten`."""
-        return max(samples // thinning(dt, self.step_s) - len(self.ar), 0)
-
 
 def estimate_noise(
     residuals: Sequence[np.ndarray],
@@ -76,7 +50,7 @@ def estimate_noise(
     longest: int = ORDERS[-1],
     least: int = 0,
 ) -> Noise:
-    """Fit autoregressive noise to the residuals of one channel, by least squares.
+    """Fit autoregressive noise to the residuals of one channel; see `likeliest_autoregression`.
 
     Parameters
     ----------
@@ -96,42 +70,14 @@ def estimate_noise(
     FloatingPointError
         For residuals whose squares are not finite.
     """
-    orders = _orders(min(len(r) for r in residuals), longest, least)
-    gram, count = _gram(residuals, orders[-1])
-    if not np.isfinite(gram).all():
+    shortest, total = min(map(len, residuals)), sum(map(len, residuals))
+    own = math.sqrt(sum(float(r @ r) for r in residuals) / max(total - used, 1))
+    if not math.isfinite(own):
         raise FloatingPointError("residuals whose squares are not finite")
-    if not gram[0, 0] > 0.0:  # a channel that is fitted exactly
-        orders = [0]
-    fits = {p: _autoregression(gram, p) for p in orders}
-    best = min(orders, key=lambda p: count * np.log(fits[p][1] / count) + PARAMETER_PENALTY * p)
-    ar, rss = fits[best]
-    innovation = float(np.sqrt(rss / max(count - best - used, 1)))
-    total = sum(len(r) for r in residuals)
-    own = float(np.sqrt(sum(float(r @ r) for r in residuals) / max(total - used, 1)))
-    return Noise(max(innovation, 1e-12), tuple(float(a) for a in ar), own if std is None else std, step_s)
-
-
-def _orders(shortest: int, longest: int, least: int) -> list[int]:
-    """Return the orders that are tried for trials of at least `shortest` samples."""
     possible = [p for p in ORDERS if p <= min(longest, shortest // SAMPLES_EACH)]
-    return [p for p in possible if p >= least] or possible[-1:]
-
-
-def _gram(residuals: Sequence[np.ndarray], order: int) -> tuple[np.ndarray, int]:
-    """Return inner products of the residual and its past, shape (order + 1, order + 1), and the samples they hold.
-
-    If all trials are too short for the order, they are those of the residual with itself.
-    """
-    lagged = [_lags(r, order) for r in residuals if len(r) > 2 * order + 2] or [_lags(r, 0) for r in residuals]
-    return np.asarray(np.sum([m.T @ m for m in lagged], axis=0)), max(sum(len(m) for m in lagged), 1)
-
-
-def _autoregression(gram: np.ndarray, p: int) -> tuple[np.ndarray, float]:
-    """Return coefficients of an order and their residual sum of squares, with some white noise: `WHITE_SHARE`."""
-    around = gram[1 : p + 1, 1 : p + 1] + WHITE_SHARE * gram[0, 0] * np.eye(p)
-    ar = scipy.linalg.solve(around, gram[1 : p + 1, 0], assume_a="pos") if p else np.zeros(0)
-    power = (1.0 + WHITE_SHARE) * gram[0, 0]
-    return ar, max(float(power - 2.0 * gram[0, 1 : p + 1] @ ar + ar @ around @ ar), 1e-300)
+    ar, power = likeliest_autoregression(residuals, [p for p in possible if p >= least] or possible[-1:], WHITE_SHARE)
+    innovation = math.sqrt(power * total / max(total - len(ar) - used, 1))
+    return Noise(max(innovation, 1e-12), ar, own if std is None else std, step_s)
 
 
 FASTEST_S = 4e-3
@@ -168,55 +114,55 @@ def thin(values: np.ndarray, count: int) -> np.ndarray:
     return total
 
 
-def _lags(residual: np.ndarray, order: int) -> np.ndarray:
-    """Return the residual and its past, shape (n - order, order + 1)."""
-    n = len(residual)
-    return np.stack([residual[order - k : n - k] for k in range(order + 1)], axis=1)
-
-
-def likeliest_autoregression(pieces: Sequence[np.ndarray], orders: Sequence[int]) -> tuple[float, ...]:
-    """Return the autoregression of several pieces, each of shape (n,), by Burg's method and of lowest criterion.
+def likeliest_autoregression(
+    pieces: Sequence[np.ndarray], orders: Sequence[int], white: float = 0.0
+) -> tuple[tuple[float, ...], float]:
+    """Return the autoregression of several pieces by Burg's method, of lowest criterion, and its innovations' variance.
 
     Such an autoregression is always stationary.
 
     Source: Burg, Maximum entropy spectral analysis, PhD thesis, Stanford 1975; Brockwell and Davis, Time Series: Theory
     and Methods, 2nd ed., section 8.2.
+
+    Parameters
+    ----------
+    pieces
+        Each of shape (n,).
+    orders
+        Orders that are tried; the criterion has `PARAMETER_PENALTY` for each coefficient.
+    white
+        Share of the variance of the pieces by which white noise is assumed to add to it.
     """
     count, least = sum(map(len, pieces)), math.inf
-    best: tuple[float, ...] = ()
-    for p, (ar, power) in enumerate(_burg(pieces, max(orders))):
+    best: tuple[tuple[float, ...], float] = (), 0.0
+    for p, (ar, power) in enumerate(_burg(pieces, max(orders), white)):
         cost = count * math.log(power) + PARAMETER_PENALTY * p
         if p in orders and cost < least:
-            best, least = ar, cost
+            best, least = (ar, power), cost
     return best
 
 
-def _burg(pieces: Sequence[np.ndarray], most: int) -> Iterator[tuple[tuple[float, ...], float]]:
+def _burg(pieces: Sequence[np.ndarray], most: int, white: float) -> Iterator[tuple[tuple[float, ...], float]]:
     """Yield autoregressions of every order up to the highest, and the power of the residual of each.
 
     With f the residual of an order forwards and b backwards, the next has the last coefficient
-    2 sum f_t b_(t-1) / sum (f_t^2 + b_(t-1)^2), over all trials.
+    2 sum f_t b_(t-1) / sum (f_t^2 + b_(t-1)^2), over all trials, and both sums with their expectations for the white
+    noise that is assumed.
     """
     ar, power = np.zeros(0), float(np.sum([x @ x for x in pieces])) / max(sum(map(len, pieces)), 1)
+    added, power = white * power, (1.0 + white) * power
     ahead, back = list(pieces), list(pieces)
     while math.isfinite(power) and power > 0.0:
         yield tuple(float(a) for a in ar), power
         if len(ar) == most:
             return
         ahead, back = [f[1:] for f in ahead], [b[:-1] for b in back]
-        both = sum(float(f @ f + b @ b) for f, b in zip(ahead, back, strict=True))
-        last = 2.0 * sum(float(f @ b) for f, b in zip(ahead, back, strict=True)) / max(both, 1e-300)
-        ahead, back = (
-            [f - last * b for f, b in zip(ahead, back, strict=True)],
-            [b - last * f for f, b in zip(ahead, back, strict=True)],
-        )
+        noise, pairs = added * sum(map(len, ahead)), list(zip(ahead, back, strict=True))
+        both = sum(float(f @ f + b @ b) for f, b in pairs) + 2.0 * noise * (1.0 + float(ar @ ar))
+        last = 2.0 * (sum(float(f @ b) for f, b in pairs) + noise * float(ar @ ar[::-1])) / max(both, 1e-300)
+        ahead, back = [f - last * b for f, b in pairs], [b - last * f for f, b in pairs]
         ar, power = np.append(ar - last * ar[::-1], last), power * (1.0 - last**2)
 
 
 NoiseModel = Mapping[str, Noise]
 """Noise by output column."""
-
-
-def as_white(noise: NoiseModel) -> dict[str, Noise]:
-    """Return white noise with the same variance of a sample."""
-    return {n: Noise(max(m.std, 1e-12), (), m.std, m.step_s) for n, m in noise.items()}

@@ -76,12 +76,12 @@ class Projection:
         partly = self._without_locals(columns)
         return np.asarray(partly - self.shared @ (self.shared.T @ partly))
 
-    def taken(self, rows: slice) -> list[np.ndarray]:
+    def taken(self, rows: np.ndarray) -> list[np.ndarray]:
         """Return the orthonormal vectors, cut to rows of one trial, that are projected off columns of that trial."""
         own = [
-            basis[rows.start - where.start : rows.stop - where.start]
+            basis[rows - where.start]
             for basis, where in zip(self._own, self.trials, strict=True)
-            if where.start <= rows.start and rows.stop <= where.stop
+            if where.start <= rows[0] < where.stop
         ]
         return [*own, self.shared[rows]]
 

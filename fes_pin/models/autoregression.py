@@ -22,7 +22,7 @@ REACH = 400
 
 
 def innovations_of(x: np.ndarray, ar: tuple[float, ...]) -> np.ndarray:
-    """Return innovations of autoregressive noise, or their sensitivities from those of the noise; shape (n, ...)."""
+    """Return innovations of autoregressive noise, or their sensitivities from those of the noise: (n,) or (n, k)."""
     if x.ndim == 1:
         out = np.convolve(x, [1.0, *(-a for a in ar)])[: len(x)]
     else:
@@ -30,7 +30,7 @@ def innovations_of(x: np.ndarray, ar: tuple[float, ...]) -> np.ndarray:
         for i, a in enumerate(ar, 1):
             out[i:] -= a * x[:-i]
     first = _first(ar)[: len(x), : len(x)]
-    out[: len(first)] = np.tensordot(first, x[: len(first)], 1)
+    out[: len(first)] = first @ x[: len(first)]
     return out
 
 

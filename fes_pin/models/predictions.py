@@ -70,7 +70,7 @@ class PredictedTrial:
     variances
         Shape (n, outputs): variances of the innovations.
     sensitivities
-        Shape (n, outputs, columns): derivatives of `values` at constant filter gains.
+        Shape (n, outputs, columns): derivatives of the predictions, minus those of `values`, at constant filter gains.
     white
         Standard deviation of the measurement noise of each output.
     ar
@@ -117,12 +117,16 @@ class PredictedTrial:
 
     def costs(self) -> np.ndarray:
         """Return the cost of every seen reading, shape (m,)."""
-        residual, logs = self.whitened
-        return np.asarray(residual**2 + logs)
+        return np.asarray(self.whitened**2 + self.logarithms)
 
     @cached_property
-    def whitened(self) -> tuple[np.ndarray, np.ndarray]:
-        """Standardised innovations and logarithms of variances of the seen readings.
+    def whitened(self) -> np.ndarray:
+        """Standardised innovations of the seen readings, shape (m,)."""
+        return self.over_deviations(self.values)
+
+    @cached_property
+    def logarithms(self) -> np.ndarray:
+        """Logarithms of the variances of the seen readings, shape (m,).
 
         n equal readings have one error, and the determinant has its logarithm n times: the repeated ones are
         subtracted.
@@ -132,7 +136,7 @@ class PredictedTrial:
             logs += self.of_seen(self._growth())
         at = self.readings.repeated
         logs[at] -= self.readings.again[at] * np.log(self.repeated_noise)
-        return self.over_deviations(self.values), logs
+        return logs
 
     def _growth(self) -> np.ndarray:
         """Return logarithms of variances of the first innovations, predicted from fewer samples: (n, outputs)."""
@@ -144,16 +148,13 @@ class PredictedTrial:
 
     def over_deviations(self, array: np.ndarray) -> np.ndarray:
         """Return the seen entries of an array (n, outputs, ...), standardised and whitened by autoregressive noise."""
-        if not any(self.ar):
-            deviations = self._deviations.reshape(-1, *[1] * (array.ndim - 2))
-            return np.asarray(self.of_seen(array) / deviations)
-        scale = np.where(self.seen, 1.0 / np.sqrt(self.variances), 0.0)
-        out = array * scale.reshape(*scale.shape, *[1] * (array.ndim - 2))
+        out = array * self._scale.reshape(*self.seen.shape, *[1] * (array.ndim - 2))
         for k, ar in enumerate(self.ar):
             if ar:
                 out[:, k] = innovations_of(out[:, k], ar)
         return self.of_seen(out)
 
     @cached_property
-    def _deviations(self) -> np.ndarray:
-        return np.sqrt(self.seen_variances)
+    def _scale(self) -> np.ndarray:
+        scale = 1.0 / np.sqrt(self.variances)
+        return scale if self.readings.all_seen else np.where(self.seen, scale, 0.0)

@@ -188,15 +188,22 @@ class ReadColumns(NamedTuple):
     readings: Readings
 
 
-def read_columns(rig: Rig, trial: Trial, outputs: tuple[str, ...], correlation_s: float) -> ReadColumns:
-    """Return the measured outputs of a trial, at a correlation time of measurement noise."""
+def read_columns(rig: Rig, trial: Trial, outputs: tuple[str, ...], correlation_s: float | None) -> ReadColumns:
+    """Return the measured outputs of a trial, at a correlation time of measurement noise.
+
+    Without one, every sample is a reading, also of equal counts in a row and of counts that hunt.
+    """
     columns = np.column_stack([trial[name] for name in outputs])
+    followed = np.isfinite(columns) & (rig.follows(trial) & are_news(trial, correlation_s or 0.0))[:, None]
+    measured = np.where(followed, columns, 0.0)
+    if correlation_s is None:
+        once = np.ones(columns.shape)
+        return ReadColumns(followed, measured, once, Readings(outputs, followed, once))
     hunting = np.column_stack([hunts(trial[name]) for name in outputs])
     often = np.column_stack([repeated(c, h) for c, h in zip(columns.T, hunting.T, strict=True)])
-    followed = np.isfinite(columns) & (rig.follows(trial) & are_news(trial, correlation_s))[:, None]
-    in_counts = np.array([count_of(c) > 0.0 for c in columns.T])
-    readings = Readings(outputs, followed & ~hunting, np.where(in_counts, often, 1.0))
-    return ReadColumns(followed, np.where(followed, columns, 0.0), often, readings)
+    counted = np.array([count_of(c) > 0.0 for c in columns.T])
+    readings = Readings(outputs, followed & ~hunting, np.where(counted, often, 1.0))
+    return ReadColumns(followed, measured, often, readings)
 
 
 def measured_outputs(model: Model, trial: Trial) -> tuple[str, ...]:
@@ -230,13 +237,13 @@ class _Prediction(Block):
     def run(self, values: Values, noises: EachTrial, unknowns: EachTrial) -> tuple[np.ndarray, np.ndarray]:
         """Run the program of all lanes; see `Program`. Arguments are those of all trials."""
         known = {n: [noises[i][n] for i in self.lanes] for n in self.noise_names}
-        return self._run(values, unknowns, **known)
+        return self.run_all(values, unknowns, **known)
 
     def innovations(
         self, y: np.ndarray, s: np.ndarray, width: int, noises: Sequence[StateSpaceNoise]
     ) -> Iterator[PredictedTrial]:
         """Yield the innovations of each lane at its noise, with sensitivities to `width` columns."""
-        k, rows, by_lane = len(self.outputs), _lanes_first(y), _lanes_first(s)
+        k, rows, by_lane = len(self.outputs), _lanes_first(y), -_lanes_first(s)
         for lane, readings in enumerate(self.readings):
             n = len(readings.seen)
             sensitivities = spread(by_lane[lane, :n], self.places, width)

@@ -49,28 +49,6 @@ class Simulated:
     sensitivities: np.ndarray
 
 
-@dataclass(frozen=True)
-class SimulatedBatch:
-    """Trials of one kind that were simulated in one batch, each in its lane.
-
-    Attributes
-    ----------
-    trials
-        Their places among the simulator's trials, lane by lane; further lanes are unused.
-    columns
-        Places of the sensitivities among the columns of the simulator; the others are zero.
-    readings
-        Shape (n, outputs, lanes); zero after the end of a shorter trial.
-    sensitivities
-        Shape (n, outputs, len(columns), lanes).
-    """
-
-    trials: tuple[int, ...]
-    columns: tuple[int, ...]
-    readings: np.ndarray
-    sensitivities: np.ndarray
-
-
 class OnTrials:
     """A model structure on trials, which run in batches of trials that can share a program.
 
@@ -120,7 +98,7 @@ class Simulator(OnTrials):
         self, model: Model, trials: Sequence[Trial], columns: tuple[str, ...] = (), max_step_s: float | None = None
     ) -> None:
         super().__init__(model, trials, columns, max_step(model) if max_step_s is None else max_step_s)
-        self._blocks = [_Simulation(self, lanes, model) for lanes in self.side_by_side()]
+        self._blocks = [Block(self, lanes, model) for lanes in self.side_by_side()]
         self._fixed = {n: value for block in self._blocks for n, value in block.layout.fixed}
 
     def run(self, values: Values, unknowns: EachTrial | None = None) -> list[Simulated]:
@@ -142,21 +120,17 @@ class Simulator(OnTrials):
         out: list[Simulated | None] = [None] * len(self.trials)
         if unknowns is None:
             unknowns = self.start(values if isinstance(values, Mapping) else values[0])
-        for block in self.run_batches(values, unknowns):
-            for lane, i in enumerate(block.trials):
-                n = len(self.trials[i])
-                own = spread(block.sensitivities[:n, ..., lane], block.columns, len(self.columns))
-                out[i] = Simulated(block.readings[:n, :, lane], own)
-        return [s for s in out if s is not None]
-
-    def run_batches(self, values: Values, unknowns: EachTrial) -> Iterator[SimulatedBatch]:
-        """Simulate every trial as `run` does; yield the batches."""
         for own in [values] if isinstance(values, Mapping) else values:
             for name, value in self._fixed.items():
                 if own[name] != value:
                     raise ValueError(f"{name} is {value:g} in the model that this simulator is for, not {own[name]:g}")
         for block in self._blocks:
-            yield block.run(values, unknowns)
+            y, s = block.run_all(values, unknowns)
+            pass_as_stored(block.trials, (y, s))
+            for lane, i in enumerate(block.lanes):
+                n = len(self.trials[i])
+                out[i] = Simulated(y[:n, :, lane], spread(s[:n, ..., lane], block.places, len(self.columns)))
+        return [s for s in out if s is not None]
 
     def start(self, values: Mapping[str, float]) -> list[dict[str, float]]:
         """Return start values of each trial's unknowns from its first samples.
@@ -259,7 +233,7 @@ class Block:
         """Write a constant of each lane; unused lanes equal the last trial."""
         constants[self.layout.constants.index(name)] = [*values, *[values[-1]] * (self.width - len(values))]
 
-    def _run(self, values: Values, unknowns: EachTrial, **known: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
+    def run_all(self, values: Values, unknowns: EachTrial, **known: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
         """Run the program of all lanes, and return its results; see `Program`.
 
         Parameters
@@ -276,18 +250,6 @@ class Block:
         for name, each in {**known, "shift": shift}.items():
             self._set(constants, name, each)
         return self.program.run(self._latest(shift), p, constants, self.guess, self.substeps)
-
-
-class _Simulation(Block):
-    """A block without measurements."""
-
-    def run(self, values: Values, unknowns: EachTrial) -> SimulatedBatch:
-        y, s = self._run(values, unknowns)
-        for lane, trial in enumerate(self.trials):
-            if len(trial) < self.count:
-                y[len(trial) :, :, lane] = s[len(trial) :, ..., lane] = 0.0
-        pass_as_stored(self.trials, (y, s))
-        return SimulatedBatch(tuple(self.lanes), self.places, y, s)
 
 
 def spread(sensitivities: np.ndarray, places: tuple[int, ...], width: int) -> np.ndarray:

@@ -20,8 +20,7 @@ def pass_as_stored(trials: Sequence[Trial], results: Sequence[np.ndarray]) -> No
     trials
         Trials by lane.
     results
-        Readings and their sensitivities, shape (n, ..., lanes) each; zero after the end of a shorter trial. Results
-        that are not finite are not filtered.
+        Readings and their sensitivities, shape (n, ..., lanes) each. Results that are not finite are not filtered.
     """
     if all(t.low_pass_hz is None for t in trials):
         return

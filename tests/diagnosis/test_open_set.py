@@ -15,14 +15,14 @@ from fes_pin.diagnosis.remainder import lack_of_fit as tests_of_fit
 from fes_pin.diagnosis.remainder import open_set
 from fes_pin.diagnosis.remainder.bursts import burst_p_value
 from fes_pin.diagnosis.remainder.heteroscedastic import heteroscedastic_p_value
-from fes_pin.diagnosis.remainder.innovations import Innovations, channels, under_own_noise
+from fes_pin.diagnosis.remainder.innovations import Innovations, channels
 from fes_pin.diagnosis.remainder.lack_of_fit import lack_of_fit
 from fes_pin.diagnosis.remainder.lines import line_p_value
 from fes_pin.diagnosis.remainder.play import play_p_value
 from fes_pin.diagnosis.remainder.repeated import repeated_p_value
 from fes_pin.diagnosis.remainder.slips import slip_p_value
 from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
-from fes_pin.identify.fit import fit
+from fes_pin.identify.fit import fit, under_own_noise
 from fes_pin.infer.levels import CLAIM_LEVEL, FULL_NOISE
 from fes_pin.infer.noise import Noise, estimate_noise
 from fes_pin.infer.projection import Projection

@@ -50,10 +50,7 @@ def by_scipy(problem, start):
         here = values | dict(zip(names, x[:size], strict=True))
         own = x[size:].reshape(len(problem.trials), len(unknown))
         unknowns = [dict(zip(unknown, row, strict=True)) for row in own]
-        parts = []
-        for one, made in zip(problem.trials, problem.residuals(here, unknowns), strict=True):
-            parts += [problem.noise[n].whiten(r, one.dt) for n, r in made.items()]
-        return np.concatenate(parts)
+        return np.concatenate([p.residual for p in problem.linearize(here, unknowns)])
 
     x0 = np.array([start[n] for n in names] + [u[n] for u in first for n in unknown])
     limits = [problem.limits[n] for n in names] + [(-np.inf, np.inf)] * (len(x0) - size)

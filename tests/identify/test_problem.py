@@ -4,11 +4,14 @@ import numpy as np
 import pytest
 from identify.rigs import measured
 from models.cases import RIGS, trial
+from scipy.linalg import solve_triangular, toeplitz
+from scipy.signal import lfilter
 
 from fes_pin.identify.problem import Problem
-from fes_pin.infer.noise import Noise
+from fes_pin.infer.noise import Noise, thin
 from fes_pin.models.effects import effect_named
 from fes_pin.models.model import Model
+from fes_pin.models.simulate import Simulator
 
 NOISE = {"position": Noise(2e-3, (0.5, 0.2), 3e-3, 4e-3), "velocity": Noise(2e-2, (0.3,), 3e-2, 4e-3)}
 
@@ -45,11 +48,21 @@ def test_each_is_as_if_it_were_alone(name):
         assert part.local == pytest.approx(expected.local, rel=1e-9, abs=1e-9)
 
 
+def whitened(noise, x):
+    """Noise of unit variance, by the factor of the covariance of as many samples of the autoregression."""
+    shape = lfilter([1.0], [1.0, *(-a for a in noise.ar)], np.eye(1, 4000)[0])
+    covariance = toeplitz([shape[k:] @ shape[: 4000 - k] for k in range(len(x))])
+    return solve_triangular(np.linalg.cholesky(covariance), x, lower=True) / noise.innovation_std
+
+
 def test_a_residual_is_what_its_own_samples_whiten_to():
     model, trials = mixed(np.random.default_rng(1))
     problem = Problem(model, trials, NOISE)
     unknowns = problem.start_unknowns()
     parts = problem.linearize(model.parameters(), unknowns)
-    for one, left, part in zip(trials, problem.residuals(model.parameters(), unknowns), parts, strict=True):
-        expected = np.concatenate([NOISE[n].whiten(left[n], one.dt) for n in left])
-        assert part.residual == pytest.approx(expected, rel=1e-9, abs=1e-9)
+    simulated = Simulator(model, trials).run(model.parameters(), unknowns)
+    for one, run, part in zip(trials, simulated, parts, strict=True):
+        names = [n for n in ("position", "velocity") if n in one]
+        left = [thin(one[n] - run.readings[:, k], round(4e-3 / one.dt)) for k, n in enumerate(names)]
+        expected = np.stack([whitened(NOISE[n], x) for n, x in zip(names, left, strict=True)], axis=1)
+        assert part.residual == pytest.approx(expected.ravel(), rel=1e-6, abs=1e-6)

@@ -8,7 +8,8 @@ import scipy.signal
 import scipy.stats
 
 from fes_pin.infer.levels import WHITE_SHARE
-from fes_pin.infer.noise import ORDERS, Noise, estimate_noise, first_order_low_pass, noise_step, thin, thinning
+from fes_pin.infer.noise import ORDERS, estimate_noise, first_order_low_pass, noise_step, thin, thinning
+from fes_pin.models.autoregression import innovations_of
 
 TRUE = {0: (), 1: (0.6,), 2: (1.2, -0.5), 3: (0.5, -0.3, 0.4)}
 
@@ -58,7 +59,7 @@ def test_what_is_whitened_is_white(kind, seed):
             ar, ma = {"white": ((), ()), "ar1": ((0.8,), ()), "arma": ((0.9,), (-0.5,))}[kind]
             trials.append(coloured(rng, 1600, ar, ma))
     noise = estimate_noise(trials)
-    whitened = [noise.whiten(r, 5e-3) for r in trials]
+    whitened = [innovations_of(r, noise.ar) / noise.innovation_std for r in trials]
     assert whiteness(whitened) > 1e-3
     assert np.concatenate(whitened).std() == pytest.approx(1.0, abs=0.03)
     assert noise.std == pytest.approx(math.sqrt(np.mean(np.square(trials))), rel=1e-3)
@@ -80,18 +81,6 @@ def test_samples_taken_by_a_fit_are_counted():
     residual = rng.standard_normal(100)
     without, using = estimate_noise([residual]), estimate_noise([residual], used=50)
     assert using.std == pytest.approx(without.std * math.sqrt(2.0))
-
-
-def test_whitening_is_the_same_for_residuals_and_columns():
-    rng = np.random.default_rng(2)
-    noise = Noise(0.5, (0.4, 0.2), 0.6)
-    columns = rng.standard_normal((50, 3))
-    together = noise.whiten(columns, 1e-2)
-    assert together.shape == (48, 3)
-    for k in range(3):
-        np.testing.assert_allclose(together[:, k], noise.whiten(columns[:, k], 1e-2), rtol=1e-12, atol=1e-14)
-        by_hand = (columns[2:, k] - 0.4 * columns[1:-1, k] - 0.2 * columns[:-2, k]) / 0.5
-        assert np.allclose(together[:, k], by_hand, rtol=1e-12)
 
 
 def test_fast_samples_are_averaged():
@@ -118,16 +107,6 @@ def test_white_noise_stays_white_and_smaller_when_averaged():
     noise = estimate_noise([thin(fast, thinning(1e-3, step))], std=1.0, step_s=step)
     assert noise.innovation_std == pytest.approx(0.5, rel=0.1)
     assert noise.std == 1.0
-    assert len(noise.whiten(fast, 1e-3)) == 2000 - len(noise.ar)
-
-
-@pytest.mark.parametrize("length", [5, 20, 33, 200])
-@pytest.mark.parametrize("order", [0, 1, 4])
-def test_whitening_is_the_filter_of_the_coefficients(length, order):
-    rng = np.random.default_rng(length)
-    values, ar = rng.standard_normal((length, 3)), tuple(rng.uniform(-0.3, 0.3, order))
-    plain = scipy.signal.lfilter([1.0, *(-a for a in ar)], [0.1], values, axis=0)[order:]
-    np.testing.assert_allclose(Noise(0.1, ar).whiten(values[:, ::-1], 0.01), plain[:, ::-1], rtol=1e-11, atol=1e-11)
 
 
 def test_a_low_pass_is_the_recursion():

@@ -136,7 +136,7 @@ def test_sensitivities_are_derivatives_where_the_gains_do_not_move():
     for k, name in enumerate(columns):
         ends = [model.with_parameters({**values, name: values[name] + s * step}) for s in (1.0, -1.0)]
         up, down = (predicted(one, [trial])[0].values for one in ends)
-        assert np.allclose(found.sensitivities[:, :, k], (up - down) / (2.0 * step), rtol=0.0, atol=1e-7)
+        assert np.allclose(found.sensitivities[:, :, k], (down - up) / (2.0 * step), rtol=0.0, atol=1e-7)
 
 
 def test_lags_shorter_than_a_step_do_not_blow_up():

@@ -1,16 +1,17 @@
 """Innovations of a fit by channel, under the noise of its residuals, for the tests of lack of fit."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.fft
 import scipy.special
 
 from fes_pin.data.trial import Trial
-from fes_pin.identify.fit import Fit, noise_of
-from fes_pin.identify.problem import Problem
-from fes_pin.infer.noise import ORDERS, Noise, first_order_low_pass, thin, thinning
+from fes_pin.identify.fit import Fit
+from fes_pin.infer.noise import Noise, first_order_low_pass, thin, thinning
+from fes_pin.models.autoregression import innovations_of
+from fes_pin.models.free_run import MeasuredOutputs
 
 CLIP = 4.0
 """Innovations are limited to this, in standard deviations."""
@@ -46,6 +47,8 @@ class Stretch:
     ----------
     number, output
         Of the trial, and of the channel among the trial's outputs.
+    rows
+        Places of its readings, in their order.
     dt
         Time step of the innovations, s.
     """
@@ -54,30 +57,27 @@ class Stretch:
     number: int
     channel: str
     output: int
-    rows: slice
+    rows: np.ndarray
     noise: Noise
     dt: float
 
-
-def under_own_noise(fitted: Fit, longest: int = ORDERS[-1], least: int = 0) -> Fit:
-    """Return the same fit, linearized under the noise of its residuals, of orders as in `noise_of`."""
-    noise = noise_of(fitted, longest, least)
-    parts = Problem(fitted.model, fitted.trials, noise, fitted.free).linearize(fitted.values, fitted.unknowns)
-    return replace(fitted, noise=noise, parts=tuple(parts))
+    def whitened(self, values: np.ndarray) -> np.ndarray:
+        """Return the innovations of values of all samples, shape (n, ...): of residuals, or of their sensitivities."""
+        return innovations_of(thin(values, thinning(self.trial.dt, self.noise.step_s)), self.noise.ar) / (
+            self.noise.innovation_std
+        )
 
 
 def stretches(fitted: Fit) -> list[Stretch]:
     """Return each channel of each trial, in the order of the whitened residuals."""
     out, at = [], 0
     for number, trial in enumerate(fitted.trials):
-        for output, name in enumerate(fitted.model.rig.outputs(trial.kind)):
-            if name not in trial.columns or name not in fitted.noise:
-                continue
-            noise = fitted.noise[name]
-            count = thinning(trial.dt, noise.step_s)
-            rows = slice(at, at + max(len(trial) // count - len(noise.ar), 0))
-            at = rows.stop
-            out.append(Stretch(trial, number, name, output, rows, noise, round(trial.dt * count, 9)))
+        read = MeasuredOutputs(fitted.model, trial, fitted.noise)
+        channel = read.readings.of_seen(np.broadcast_to(read.places, read.readings.seen.shape))
+        for output, name in zip(read.places, read.readings.outputs, strict=True):
+            rows, dt = at + np.flatnonzero(channel == output), round(trial.dt * read.count, 9)
+            out.append(Stretch(trial, number, name, output, rows, fitted.noise[name], dt))
+        at += len(channel)
     return out
 
 

@@ -122,7 +122,7 @@ class _Featured:
         self._problem = LikelihoodProblem(self._model, fitted.trials, fitted.noise, free)
         self.can_keep = not self._problem.is_final
         run = self._problem.innovations(self._model.parameters(), fitted.unknowns)
-        columns = [-i.over_deviations(i.sensitivities[..., : len(free)]) for i in run]
+        columns = [i.over_deviations(i.sensitivities[..., : len(free)]) for i in run]
         self.columns = np.nan_to_num(np.concatenate(columns))
 
     def gained(self, amplitudes: np.ndarray) -> float:

@@ -10,12 +10,12 @@ import numpy as np
 from fes_pin.diagnosis.remainder.bursts import burst_p_value
 from fes_pin.diagnosis.remainder.detents import detent_p_value
 from fes_pin.diagnosis.remainder.heteroscedastic import heteroscedastic_p_value
-from fes_pin.diagnosis.remainder.innovations import channels, driven, under_own_noise
+from fes_pin.diagnosis.remainder.innovations import channels, driven
 from fes_pin.diagnosis.remainder.lines import LONGEST_NOISE, line_p_value
 from fes_pin.diagnosis.remainder.play import play_p_value
 from fes_pin.diagnosis.remainder.repeated import repeated_p_value
 from fes_pin.diagnosis.remainder.slips import slip_p_value
-from fes_pin.identify.fit import Fit
+from fes_pin.identify.fit import Fit, under_own_noise
 from fes_pin.infer.levels import FULL_NOISE, SHORT_NOISE
 from fes_pin.infer.projection import Projection
 

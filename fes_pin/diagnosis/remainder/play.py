@@ -1,7 +1,5 @@
 """Test for play in a sensor: a reading that depends on the side from which it was reached."""
 
-import itertools
-
 import numpy as np
 
 from fes_pin.diagnosis.remainder.innovations import Stretch, stretches
@@ -41,7 +39,7 @@ def play_p_value(fitted: Fit, projection: Projection) -> float:
         readings = [simulated[s.number].readings[:, s.output] for s in group]
         columns = np.zeros((len(projection.residual), len(WIDTHS)))
         for one, deviation in zip(group, _deviations(readings), strict=True):
-            columns[one.rows] = one.noise.whiten(deviation, one.trial.dt)
+            columns[one.rows] = one.whitened(deviation)
         left = projection(columns)
         felt = np.linalg.norm(left, axis=0) > IDENTIFIABLE_SHARE * np.linalg.norm(columns, axis=0)
         found += [_one(c, projection, group) for c in left.T[felt]]
@@ -82,8 +80,7 @@ def _one(column: np.ndarray, projection: Projection, group: list[Stretch]) -> fl
     return f_tail(float(amplitude * x.sum()) / max(spread, 1e-12), 1, degrees)
 
 
-def _pieces(group: list[Stretch]) -> list[slice]:
+def _pieces(group: list[Stretch]) -> list[np.ndarray]:
     """Return the rows of each trial, cut into equal pieces."""
     count = -(-UNITS // len(group))
-    edges = [np.linspace(s.rows.start, s.rows.stop, count + 1).round().astype(int) for s in group]
-    return [slice(a, b) for one in edges for a, b in itertools.pairwise(one.tolist())]
+    return [rows for s in group for rows in np.array_split(s.rows, count)]

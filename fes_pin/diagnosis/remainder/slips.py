@@ -70,7 +70,7 @@ class _Scan:
 
     def __init__(self, one: Stretch, projection: Projection) -> None:
         self.rows, self.noise = one.rows, one.noise
-        count = one.rows.stop - one.rows.start
+        count = len(one.rows)
         edge = math.ceil(TRIM * count)
         self.inside = slice(edge, max(count - edge, edge))
         taps = np.cumsum(_filter(one.noise))

@@ -8,7 +8,7 @@ import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.search.starts import STARTS
-from fes_pin.identify.fit import GROSS, grown_start
+from fes_pin.identify.fit import GROSS, from_beginnings
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit, fit_of, maximise
 from fes_pin.identify.problem import limits_of
@@ -16,7 +16,7 @@ from fes_pin.identify.process_noise import first_guess
 from fes_pin.infer.covariance import moved_with
 from fes_pin.infer.levels import PARAMETER_PENALTY
 from fes_pin.infer.maximise import ROUNDS
-from fes_pin.infer.optimum import MAX_ITERATIONS, minimise
+from fes_pin.infer.optimum import minimise
 from fes_pin.infer.problem import completed
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import StateSpaceNoise
@@ -52,11 +52,9 @@ class LikelihoodMaxima:
         plain, rough = self.from_start(model, noise), LikelihoodProblem(model, self.trials, noise)
         if not rough.is_simulated or _reduced(rough, plain) < GROSS:
             return plain
-        values, unknowns = grown_start(
-            lambda trials: LikelihoodProblem(model, trials, noise), self.trials, model.parameters(), MAX_ITERATIONS
+        return from_beginnings(
+            rough, plain, lambda values, own: self.from_start(model.with_parameters(values), noise, own)
         )
-        grown = self.from_start(model.with_parameters(values), noise, unknowns)
-        return grown if grown.sse < plain.sse or not math.isfinite(plain.sse) else plain
 
     def process_noises(self, calm: LikelihoodFit, scales: Sequence[float]) -> list[StateSpaceNoise]:
         """Return start values of noise, with several sizes of process noise, for a fit without any.
