@@ -20,11 +20,9 @@ from fes_pin.diagnosis.search.likelihood_screen import LikelihoodScreen
 from fes_pin.diagnosis.search.score import Scores
 from fes_pin.identify.feedback import is_fed_back
 from fes_pin.identify.fit import Fit, residuals_of, rough_fit
-from fes_pin.identify.likelihood import LikelihoodProblem
-from fes_pin.identify.likelihood_fit import LikelihoodFit, fit_of
+from fes_pin.identify.likelihood_fit import at_noise
 from fes_pin.identify.process_noise import first_guess
 from fes_pin.infer.levels import ALIKE_COSINE, IDENTIFIABLE_SHARE, LEAST_SHIFT_S, REVERSED_LEAVES, SMALL_SHARE
-from fes_pin.infer.optimum import minimise
 from fes_pin.models.catalogue import Catalogue, installed
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
@@ -84,7 +82,8 @@ def testable_causes(study: Study, catalogue: Catalogue | None = None) -> Testabl
             if not math.isfinite(fitted.sse):
                 return "the nominal model diverges when it is simulated from its start values"
             library = Library(nominal, trials, effects)
-            scores = LikelihoodScreen(library).scores(_by_likelihood(fitted))
+            white = replace(first_guess(nominal, trials), std={}, time={})
+            scores = LikelihoodScreen(library).scores(at_noise(fitted, white))
             warnings = _given_away(nominal, trials, fitted)
         except (ArithmeticError, np.linalg.LinAlgError) as problem:
             return f"the nominal model cannot be fitted ({problem})"
@@ -125,13 +124,6 @@ def _given_away(model: Model, trials: Sequence[Trial], fitted: Fit) -> list[str]
 def _to_fit(study: Study) -> tuple[Model, Sequence[Trial]]:
     trials = [t for t in study.trials if t.role != "held_out"] or list(study.trials)
     return nominal_model(study), searched_part(trials, study.schema)[0]
-
-
-def _by_likelihood(fitted: Fit) -> LikelihoodFit:
-    """The same values as a fit by the likelihood without process noise, in white measurement noise."""
-    white = replace(first_guess(fitted.model, fitted.trials), std={}, time={})
-    problem = LikelihoodProblem(fitted.model, fitted.trials, white)
-    return fit_of(problem, minimise(problem, fitted.values, fitted.unknowns, 0))
 
 
 def _unexplained(fitted: Fit) -> float:

@@ -28,9 +28,6 @@ from fes_pin.models.predictions import PredictedOutput
 from fes_pin.models.predictor import StateSpaceNoise, masked
 from fes_pin.models.simulate import Simulator
 
-Random = StateSpaceNoise | NoiseModel
-"""Noise of a rig: process and measurement noise, or measurement noise alone."""
-
 STRIDE = 0.25
 """Share of the horizon by which the newest sample that a prediction uses may be older than the horizon."""
 SEEN_AGAIN = 3
@@ -69,7 +66,7 @@ def forecast(residual: np.ndarray, noise: Noise, dt: float, ahead_s: float) -> n
     return np.pad(out, (0, len(residual) - len(out)), mode="edge") if len(out) else np.zeros(len(residual))
 
 
-def predict_ahead(model: Model, trial: Trial, random: Random, horizon_s: float) -> dict[str, np.ndarray]:
+def predict_ahead(model: Model, trial: Trial, random: NoiseModel, horizon_s: float) -> dict[str, np.ndarray]:
     """Predict each sample of a trial from readings that are older by `horizon_s` or more.
 
     Parameters

@@ -23,7 +23,8 @@ def autoregressions(run: Sequence[PredictedTrial], orders: Mapping[str, Sequence
     """Return the likeliest autoregression of each measured output, of one of its orders."""
     out = {}
     for name, own in orders.items():
-        left = [_left(one, name) for one in run if name in one.outputs]
+        with np.errstate(all="ignore"):
+            left = [one.standardised(one.values)[:, one.outputs.index(name)] for one in run if name in one.outputs]
         if left:
             most = min(MOST, min(map(len, left)) // SAMPLES_EACH)
             out[name], _ = likeliest_autoregression(left, [p for p in own if p <= most] or [0])
@@ -46,10 +47,3 @@ def residual_powers(run: Sequence[PredictedTrial]) -> dict[str, float]:
         if 0.0 < squares < math.inf:
             out[name] = squares / count
     return out
-
-
-def _left(one: PredictedTrial, name: str) -> np.ndarray:
-    """Return the standardised innovations of an output, shape (n,); 0 where nothing was measured."""
-    k = one.outputs.index(name)
-    with np.errstate(all="ignore"):
-        return np.where(one.seen[:, k], one.values[:, k] / np.sqrt(one.variances[:, k]), 0.0)

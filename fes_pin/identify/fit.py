@@ -202,7 +202,8 @@ class Fit(Optimum, Saveable):
     @property
     def reduced(self) -> float:
         """Sum of squares over degrees of freedom: 1 where the noise model is right and the model adequate."""
-        return self.sse / max(self.samples - self.degrees, 1)
+        squares = sum(float(p.residual @ p.residual) for p in self.parts) if math.isfinite(self.sse) else math.inf
+        return squares / max(self.samples - self.degrees, 1)
 
     @property
     def degrees(self) -> int:

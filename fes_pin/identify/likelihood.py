@@ -180,44 +180,38 @@ class LikelihoodProblem(Problem, NoisyProblem):
     def noise_step(self, values: Mapping[str, float], unknowns: Unknowns) -> float:
         """Improve the noise, in place; return by how much the cost falls."""
         if self.is_simulated:
-            return self._simulated_noise_step(values, unknowns)
+            return self.renew(values, unknowns)
         reached = fisher_scoring(self, values, unknowns, {}, NOISE_STEPS)
         self.set_noise(reached.noise)
-        return reached.gained + self.renew(values, unknowns)
+        return reached.gained + (self.renew(values, unknowns) if any(self.noise.ar.values()) else 0.0)
 
     def renew(self, values: Mapping[str, float], unknowns: Unknowns) -> float:
-        """Estimate the autoregressions of noise again, in place; return by how much the cost falls."""
-        if not any(self.noise.ar.values()):
-            return 0.0
-        (run,) = self._runs([(values, unknowns, self.noise)])
-        return self._adopted(run, self._with_autoregressions(run))
+        """Estimate measurement noise again from the innovations, in place; return by how much the cost falls.
 
-    def _with_autoregressions(self, run: Sequence[PredictedTrial]) -> StateSpaceNoise:
-        """Return the noise with autoregressions of its orders, from the innovations of a run."""
-        orders = {n: (len(ar),) for n, ar in self.noise.ar.items()}
-        return replace(self.noise, ar={**self.noise.ar, **autoregressions(run, orders)})
-
-    def _adopted(self, run: Sequence[PredictedTrial], found: StateSpaceNoise) -> float:
-        """Take another measurement noise, in place, if that lowers the cost of a run; return by how much."""
+        Its autoregressions keep their orders. The variance of its innovations is estimated where there is no other
+        noise.
+        """
+        run = self.residual_run(values, unknowns)
+        found, limits = self._with_autoregressions(run), self.noise_limits
+        if self.is_simulated:
+            powers = residual_powers([with_noise(one, found) for one in run])
+            white = {f"white.{n}": found.white[n] * math.sqrt(power) for n, power in powers.items()}
+            found = found.with_values({n: float(np.clip(v, *limits[n])) for n, v in white.items()})
         before, after = (sum(one.cost() for one in some) for some in (run, [with_noise(one, found) for one in run]))
         if not after < before:
             return 0.0
         self.noise = found
         return before - after
 
+    def _with_autoregressions(self, run: Sequence[PredictedTrial]) -> StateSpaceNoise:
+        """Return the noise with autoregressions of its orders, from the innovations of a run."""
+        orders = {n: (len(ar),) for n, ar in self.noise.ar.items()}
+        return replace(self.noise, ar={**self.noise.ar, **autoregressions(run, orders)})
+
     def residual_run(self, values: Mapping[str, float], unknowns: Unknowns) -> list[PredictedTrial]:
         """Return every trial as predicted, of which the noise of simulated trials is estimated."""
         (run,) = self._runs([(values, unknowns, self.noise)])
         return run
-
-    def _simulated_noise_step(self, values: Mapping[str, float], unknowns: Unknowns) -> float:
-        """Set the measurement noise, in place, to the residuals of a simulation; return by how much the cost falls."""
-        run = self.residual_run(values, unknowns)
-        found, limits = self._with_autoregressions(run), self.noise_limits
-        powers = residual_powers([with_noise(one, found) for one in run])
-        white = {n: found.white[n] * math.sqrt(power) for n, power in powers.items()}
-        found = found.with_values({f"white.{n}": float(np.clip(v, *limits[f"white.{n}"])) for n, v in white.items()})
-        return self._adopted(run, found)
 
     def with_orders(self, values: Mapping[str, float], unknowns: Unknowns) -> StateSpaceNoise:
         """Return the noise with autoregressions of the orders that the innovations support."""

@@ -9,8 +9,8 @@ from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.process_noise import without_memory
 from fes_pin.infer.levels import PARAMETER_PENALTY
 from fes_pin.infer.maximise import ROUNDS, alternate, together
-from fes_pin.infer.optimum import Optimum
-from fes_pin.infer.problem import Unknowns
+from fes_pin.infer.optimum import Optimum, minimise
+from fes_pin.infer.problem import Unknowns, completed
 from fes_pin.models.predictor import StateSpaceNoise
 
 
@@ -38,6 +38,13 @@ class LikelihoodFit(Fit):
 def fit_of(problem: LikelihoodProblem, found: Optimum) -> LikelihoodFit:
     """Return the fit of a problem at its optimum, with the noise of the problem."""
     return LikelihoodFit(**ended(problem.model, found), trials=problem.trials, noise=problem.noise)
+
+
+def at_noise(fitted: Fit, noise: StateSpaceNoise) -> LikelihoodFit:
+    """Return a fit, with its parameters, at another noise."""
+    problem = LikelihoodProblem(fitted.model, fitted.trials, noise)
+    unknowns = completed(problem.start_unknowns(), fitted.unknowns)
+    return fit_of(problem, minimise(problem, fitted.values, unknowns, 0))
 
 
 def maximise(

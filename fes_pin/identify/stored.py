@@ -12,9 +12,8 @@ from typing import Any
 from fes_pin.data.log import Log
 from fes_pin.data.schema import NumberKey
 from fes_pin.data.toml import Document, read_toml
-from fes_pin.identify.ahead import Random
 from fes_pin.identify.likelihood_fit import LikelihoodFit
-from fes_pin.infer.noise import Noise
+from fes_pin.infer.noise import Noise, NoiseModel
 from fes_pin.models.predictor import StateSpaceNoise
 
 KEY = "random"
@@ -61,7 +60,7 @@ def _random_table(noise: StateSpaceNoise) -> dict[str, Any]:
     return {**({"correlation_s": lag} if lag else {}), **parts, **({"ar": ar} if ar else {})}
 
 
-def load_random(path: str | Path) -> Random | None:
+def load_random(path: str | Path) -> NoiseModel | None:
     """Read the noise of a rig, as `diagnose` estimated it; None of a model that was saved without it.
 
     Raises

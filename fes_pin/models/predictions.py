@@ -148,11 +148,15 @@ class PredictedTrial:
 
     def over_deviations(self, array: np.ndarray) -> np.ndarray:
         """Return the seen entries of an array (n, outputs, ...), standardised and whitened by autoregressive noise."""
-        out = array * self._scale.reshape(*self.seen.shape, *[1] * (array.ndim - 2))
+        out = self.standardised(array)
         for k, ar in enumerate(self.ar):
             if ar:
                 out[:, k] = innovations_of(out[:, k], ar)
         return self.of_seen(out)
+
+    def standardised(self, array: np.ndarray) -> np.ndarray:
+        """Return an array (n, outputs, ...) in units of the deviations of the innovations; 0 where none is seen."""
+        return np.asarray(array * self._scale.reshape(*self.seen.shape, *[1] * (array.ndim - 2)))
 
     @cached_property
     def _scale(self) -> np.ndarray:

@@ -15,7 +15,7 @@ from fes_pin.diagnosis.remainder import lack_of_fit as tests_of_fit
 from fes_pin.diagnosis.remainder import open_set
 from fes_pin.diagnosis.remainder.bursts import burst_p_value
 from fes_pin.diagnosis.remainder.heteroscedastic import heteroscedastic_p_value
-from fes_pin.diagnosis.remainder.innovations import Innovations, channels
+from fes_pin.diagnosis.remainder.innovations import channels
 from fes_pin.diagnosis.remainder.lack_of_fit import lack_of_fit
 from fes_pin.diagnosis.remainder.lines import line_p_value
 from fes_pin.diagnosis.remainder.play import play_p_value
@@ -74,7 +74,7 @@ def test_nothing_is_left_of_a_muscles_noise(colour):
 def test_eight_tests_together_keep_the_level(monkeypatch):
     """Uniform p-values, of two channels where a test looks at each: 20 000 remainders, with a deviation of 0.07 %."""
     rng = np.random.default_rng(43)
-    one = (WHITE, [SimpleNamespace(values=None, dt=DT)])
+    one = [SimpleNamespace(values=None, noise=WHITE, dt=DT)]
     for name in ("burst", "detent", "repeated", "heteroscedastic", "slip", "play"):
         monkeypatch.setattr(open_set, f"{name}_p_value", lambda *_: rng.uniform())
     monkeypatch.setattr(open_set, "line_p_value", lambda _: (rng.uniform(), "time"))
@@ -249,8 +249,8 @@ def test_detents_are_seen_in_the_angle(rig, monkeypatch):
 def test_innovations_are_what_the_fit_was_whitened_to():
     study = study_of("ankle", seed=49)
     own = under_own_noise(fit(nominal_model(study), study.trials))
-    pieces = [e.values for _, group in channels(own) for e in group]
-    assert {len(group) for _, group in channels(own)} == {4, 2}
+    pieces = [e.values for group in channels(own) for e in group]
+    assert {len(group) for group in channels(own)} == {4, 2}
     assert sum(len(e) for e in pieces) == sum(len(p.residual) for p in own.parts)
     assert np.concatenate(pieces).std() == pytest.approx(1.0, abs=0.03)
 
@@ -258,4 +258,4 @@ def test_innovations_are_what_the_fit_was_whitened_to():
 def test_a_trial_of_which_noise_of_a_long_order_leaves_nothing_has_no_lines():
     time = np.arange(8) * DT
     trial = Trial("short", "motion", {"effort": np.ones(8), "position": time}, time)
-    assert line_p_value([Innovations(trial, np.empty(0), DT, ("effort",))]) == (1.0, "time")
+    assert line_p_value([SimpleNamespace(trial=trial, values=np.empty(0), dt=DT, inputs=("effort",))]) == (1.0, "time")

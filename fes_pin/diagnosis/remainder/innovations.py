@@ -21,10 +21,14 @@ ACTIVATION_S = 0.05
 
 @dataclass(frozen=True)
 class Innovations:
-    """One channel of one trial.
+    """Innovations of one channel of one trial, under the noise of a fit.
 
     Attributes
     ----------
+    number, output
+        Of the trial, and of the channel among the trial's outputs.
+    rows
+        Places among the whitened residuals of all trials, end to end.
     values
         Shape (n,), of unit variance.
     dt
@@ -34,61 +38,41 @@ class Innovations:
     """
 
     trial: Trial
-    values: np.ndarray
-    dt: float
-    inputs: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Stretch:
-    """Place of one channel of one trial among the whitened residuals of all, end to end.
-
-    Attributes
-    ----------
-    number, output
-        Of the trial, and of the channel among the trial's outputs.
-    rows
-        Places of its readings, in their order.
-    dt
-        Time step of the innovations, s.
-    """
-
-    trial: Trial
     number: int
     channel: str
     output: int
     rows: np.ndarray
+    values: np.ndarray
     noise: Noise
     dt: float
+    inputs: tuple[str, ...]
 
     def whitened(self, values: np.ndarray) -> np.ndarray:
         """Return the innovations of values of all samples, shape (n, ...): of residuals, or of their sensitivities."""
-        return innovations_of(thin(values, thinning(self.trial.dt, self.noise.step_s)), self.noise.ar) / (
-            self.noise.innovation_std
-        )
+        short = thin(values, thinning(self.trial.dt, self.noise.step_s))
+        return innovations_of(short, self.noise.ar) / self.noise.innovation_std
 
 
-def stretches(fitted: Fit) -> list[Stretch]:
-    """Return each channel of each trial, in the order of the whitened residuals."""
+def each_channel(fitted: Fit) -> list[Innovations]:
+    """Return the innovations of each channel of each trial."""
     out, at = [], 0
-    for number, trial in enumerate(fitted.trials):
-        read = MeasuredOutputs(fitted.model, trial, fitted.noise)
+    for number, (trial, part) in enumerate(zip(fitted.trials, fitted.parts, strict=True)):
+        read, inputs = MeasuredOutputs(fitted.model, trial, fitted.noise), fitted.model.rig.input_columns(trial)
         channel = read.readings.of_seen(np.broadcast_to(read.places, read.readings.seen.shape))
         for output, name in zip(read.places, read.readings.outputs, strict=True):
-            rows, dt = at + np.flatnonzero(channel == output), round(trial.dt * read.count, 9)
-            out.append(Stretch(trial, number, name, output, rows, fitted.noise[name], dt))
+            own, dt = np.flatnonzero(channel == output), round(trial.dt * read.count, 9)
+            values, noise = part.residual[own], fitted.noise[name]
+            out.append(Innovations(trial, number, name, output, at + own, values, noise, dt, inputs))
         at += len(channel)
     return out
 
 
-def channels(fitted: Fit) -> list[tuple[Noise, list[Innovations]]]:
-    """Return innovations by channel and time step, with the noise that whitened them."""
-    values = np.concatenate([p.residual for p in fitted.parts])
+def channels(fitted: Fit) -> list[list[Innovations]]:
+    """Return the innovations by channel and time step."""
     found: dict[tuple[str, float], list[Innovations]] = {}
-    for one in stretches(fitted):
-        inputs = fitted.model.rig.input_columns(one.trial)
-        found.setdefault((one.channel, one.dt), []).append(Innovations(one.trial, values[one.rows], one.dt, inputs))
-    return [(fitted.noise[name], pieces) for (name, _), pieces in found.items()]
+    for one in each_channel(fitted):
+        found.setdefault((one.channel, one.dt), []).append(one)
+    return list(found.values())
 
 
 def driven(one: Innovations) -> np.ndarray:

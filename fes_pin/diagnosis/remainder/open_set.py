@@ -27,13 +27,13 @@ def residual_tests(fitted: Fit, seed: int) -> list[tuple[float, str]]:
     projection = Projection(full.parts)
     short = channels(under_own_noise(fitted, SHORT_NOISE))
     count = len(short)
-    bursts = min(burst_p_value([e.values for e in pieces], noise, pieces[0].dt) for noise, pieces in short)
-    line, where = min(line_p_value(pieces) for _, pieces in channels(under_own_noise(fitted, LONGEST_NOISE)))
+    bursts = min(burst_p_value([e.values for e in pieces], pieces[0].noise, pieces[0].dt) for pieces in short)
+    line, where = min(line_p_value(pieces) for pieces in channels(under_own_noise(fitted, LONGEST_NOISE)))
     detents = detent_p_value(own, Projection(own.parts))
-    repeated = min(repeated_p_value([e.values for e in pieces], pieces[0].dt) for _, pieces in short)
+    repeated = min(repeated_p_value([e.values for e in pieces], pieces[0].dt) for pieces in short)
     heteroscedastic = min(
         heteroscedastic_p_value([e.values for e in pieces], [np.abs(driven(e)) for e in pieces], pieces[0].dt)
-        for _, pieces in short
+        for pieces in short
     )
     return [
         (count * bursts, "time"),

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fes_pin.diagnosis.remainder.innovations import Stretch, stretches
+from fes_pin.diagnosis.remainder.innovations import Innovations, each_channel
 from fes_pin.identify.fit import Fit
 from fes_pin.infer.distributions import f_tail
 from fes_pin.infer.levels import IDENTIFIABLE_SHARE, UNFELT
@@ -31,8 +31,8 @@ def play_p_value(fitted: Fit, projection: Projection) -> float:
     Source of the operator: Krasnosel'skii and Pokrovskii, Systems with Hysteresis, Springer 1989.
     """
     simulated = Simulator(fitted.model, fitted.trials).run(fitted.values, fitted.unknowns)
-    groups: dict[str, list[Stretch]] = {}
-    for one in stretches(fitted):
+    groups: dict[str, list[Innovations]] = {}
+    for one in each_channel(fitted):
         groups.setdefault(one.channel, []).append(one)
     found: list[float] = []
     for group in groups.values():
@@ -62,7 +62,7 @@ def _deviations(readings: list[np.ndarray]) -> list[np.ndarray]:
     return [out[: len(one), k] for k, one in enumerate(readings)]
 
 
-def _one(column: np.ndarray, projection: Projection, group: list[Stretch]) -> float:
+def _one(column: np.ndarray, projection: Projection, group: list[Innovations]) -> float:
     """Return the p-value of one width in one channel."""
     units = []
     for rows in _pieces(group):
@@ -80,7 +80,7 @@ def _one(column: np.ndarray, projection: Projection, group: list[Stretch]) -> fl
     return f_tail(float(amplitude * x.sum()) / max(spread, 1e-12), 1, degrees)
 
 
-def _pieces(group: list[Stretch]) -> list[np.ndarray]:
+def _pieces(group: list[Innovations]) -> list[np.ndarray]:
     """Return the rows of each trial, cut into equal pieces."""
     count = -(-UNITS // len(group))
     return [rows for s in group for rows in np.array_split(s.rows, count)]

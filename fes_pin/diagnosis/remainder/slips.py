@@ -7,7 +7,7 @@ import math
 import numpy as np
 import scipy.fft
 
-from fes_pin.diagnosis.remainder.innovations import CLIP, Stretch, stretches
+from fes_pin.diagnosis.remainder.innovations import CLIP, Innovations, each_channel
 from fes_pin.identify.fit import Fit
 from fes_pin.infer.distributions import pearson3_tail
 from fes_pin.infer.levels import IDENTIFIABLE_SHARE
@@ -38,7 +38,7 @@ def slip_p_value(fitted: Fit, projection: Projection, seed: int = 0) -> float:
     Source: Basseville and Nikiforov, Detection of Abrupt Changes, Prentice Hall 1993, section 2.4.3.
     """
     groups: dict[str, list[_Scan]] = {}
-    for one in stretches(fitted):
+    for one in each_channel(fitted):
         scan = _Scan(one, projection)
         if scan.felt.any():
             groups.setdefault(one.channel, []).append(scan)
@@ -68,7 +68,7 @@ class _Scan:
     sum from t on of what the filter's adjoint makes of v.
     """
 
-    def __init__(self, one: Stretch, projection: Projection) -> None:
+    def __init__(self, one: Innovations, projection: Projection) -> None:
         self.rows, self.noise = one.rows, one.noise
         count = len(one.rows)
         edge = math.ceil(TRIM * count)

@@ -18,7 +18,7 @@ from fes_pin.diagnosis.search.score import Scored, best_by_effect, best_pairs
 from fes_pin.diagnosis.search.starts import STARTS, from_afar, refinements, started
 from fes_pin.identify.correlation_time import with_new_noise
 from fes_pin.identify.likelihood import LikelihoodProblem
-from fes_pin.identify.likelihood_fit import LikelihoodFit
+from fes_pin.identify.likelihood_fit import LikelihoodFit, at_noise
 from fes_pin.identify.process_noise import first_guess, stilled, without_memory
 from fes_pin.infer.covariance import step_gain
 from fes_pin.infer.fits import Candidate, FittedSets
@@ -206,7 +206,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
 
     def under_noise_of(self, other: LikelihoodFit, fits: Sequence[LikelihoodFit]) -> list[LikelihoodFit]:
         """Return fits, with their parameters, under the noise of another fit of the same trials."""
-        return in_parallel(lambda f: self._maxima.under_noise_of(other, f), fits)
+        return in_parallel(lambda f: at_noise(f, other.noise), fits)
 
     def step_gain(self, fitted: LikelihoodFit) -> float:
         """Return the gain of a further step of a fit by its slope and curvature; 0 where it has converged."""

@@ -1,6 +1,5 @@
 """Maximum of the likelihood of one model on the trials of a search: from start values, from a fit, in a few steps."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -10,7 +9,7 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.search.starts import STARTS
 from fes_pin.identify.fit import GROSS, from_beginnings
 from fes_pin.identify.likelihood import LikelihoodProblem
-from fes_pin.identify.likelihood_fit import LikelihoodFit, fit_of, maximise
+from fes_pin.identify.likelihood_fit import LikelihoodFit, at_noise, fit_of, maximise
 from fes_pin.identify.problem import limits_of
 from fes_pin.identify.process_noise import first_guess
 from fes_pin.infer.covariance import moved_with
@@ -50,7 +49,7 @@ class LikelihoodMaxima:
         With process noise no misfit is gross: a filter follows the state even of a wrong model.
         """
         plain, rough = self.from_start(model, noise), LikelihoodProblem(model, self.trials, noise)
-        if not rough.is_simulated or _reduced(rough, plain) < GROSS:
+        if not rough.is_simulated or at_noise(plain, noise).reduced < GROSS:
             return plain
         return from_beginnings(
             rough, plain, lambda values, own: self.from_start(model.with_parameters(values), noise, own)
@@ -93,12 +92,6 @@ class LikelihoodMaxima:
         found = minimise(problem, start.parameters(), base.unknowns, SCREEN_ITERATIONS)
         return replace(fit_of(problem, found), together=base.together)
 
-    def under_noise_of(self, other: LikelihoodFit, fitted: LikelihoodFit) -> LikelihoodFit:
-        """Return a fit, with its parameters, under the noise of another fit."""
-        problem = LikelihoodProblem(fitted.model, self.trials, other.noise)
-        unknowns = completed(problem.start_unknowns(), fitted.unknowns)
-        return fit_of(problem, minimise(problem, fitted.values, unknowns, 0))
-
     def better(self, starts: Sequence[Model], base: LikelihoodFit, criterion: float) -> LikelihoodFit | None:
         """Return the best fit from some starts; None where none has a criterion below the given one.
 
@@ -130,11 +123,3 @@ class LikelihoodMaxima:
         moved = left.with_parameters({n: v for n, v in values.items() if n in left.fitted_parameters()})
         costs = problem.costs([(one.parameters(), unknowns) for one in (left, moved)])
         return moved if costs[1] < costs[0] else left
-
-
-def _reduced(problem: LikelihoodProblem, fitted: LikelihoodFit) -> float:
-    """Return the mean square of a fit's whitened residuals under the noise of a problem; infinite where it diverges."""
-    residuals = [p.residual for p in problem.linearize(fitted.values, fitted.unknowns)]
-    with np.errstate(all="ignore"):
-        mean = float(sum(r @ r for r in residuals)) / max(sum(map(len, residuals)), 1)
-    return mean if math.isfinite(mean) else math.inf
