@@ -300,7 +300,7 @@ def _of_group(parameters: Mapping[str, float], group: str) -> dict[str, float]:
     return {name: v for (name, _, g), v in split if g == group}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Grouped:
     """A fitted grouped model.
 

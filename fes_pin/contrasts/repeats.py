@@ -78,7 +78,7 @@ class RepeatedProblem(LikelihoodProblem):
     def scattered(self, plain: Sequence[Linearized]) -> list[Linearized]:
         """Return trials whitened by the scatter of parameters, from trials without."""
         shrinks = self.shrinks(plain) if self.deviations else []
-        return [s.shrunk(p) for p, s in zip(plain, shrinks, strict=True)] if shrinks else list(plain)
+        return [s.whitened(p) for p, s in zip(plain, shrinks, strict=True)] if shrinks else list(plain)
 
     def plain(self, values: Mapping[str, float], unknowns: Unknowns) -> list[Linearized]:
         """Return the trials without scatter."""
@@ -133,13 +133,14 @@ class Shrink:
         felt = powers > 1e-12 * max(powers.max(initial=0.0), 1e-300)
         return cls(along @ vectors[:, felt] / np.sqrt(powers[felt]), powers[felt])
 
-    def shrunk(self, part: Linearized) -> Linearized:
-        factors, more = 1.0 / np.sqrt(1.0 + self.powers), float(np.log1p(self.powers).sum())
+    def shrunk(self, x: np.ndarray) -> np.ndarray:
+        """Return rows of the trial, shape (m, ...), whitened."""
+        return np.asarray(x + (self.basis * (1.0 / np.sqrt(1.0 + self.powers) - 1.0)) @ (self.basis.T @ x))
 
-        def scaled(x: np.ndarray) -> np.ndarray:
-            return x + (self.basis * (factors - 1.0)) @ (self.basis.T @ x)
-
-        return Linearized(scaled(part.residual), scaled(part.jacobian), scaled(part.local), part.log_determinant + more)
+    def whitened(self, part: Linearized) -> Linearized:
+        """Return the trial, whitened."""
+        residual, jacobian, local = (self.shrunk(x) for x in (part.residual, part.jacobian, part.local))
+        return Linearized(residual, jacobian, local, part.log_determinant + float(np.log1p(self.powers).sum()))
 
     def leaning(self, moved: np.ndarray) -> float:
         """Return the slope of the whitened squares of a trial's change in the logarithm of s^2, with opposite sign.

@@ -1,8 +1,9 @@
 """Score tests of every item by which a grouped model may be extended."""
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -10,19 +11,19 @@ import numpy as np
 from fes_pin.contrasts.grouped import Grouped, Item, by_group
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.search.library import Library
+from fes_pin.diagnosis.search.likelihood_screen import LikelihoodScreen
+from fes_pin.diagnosis.search.score import bounded_step
 from fes_pin.diagnosis.search.starts import near_null, started
-from fes_pin.identify.likelihood import LikelihoodProblem, is_simulated
+from fes_pin.infer.covariance import covariance_of
 from fes_pin.infer.family import Family
 from fes_pin.infer.levels import PARAMETER_PENALTY
-from fes_pin.infer.problem import Linearized, Unknowns, completed
+from fes_pin.infer.problem import Unknowns
 from fes_pin.infer.projection import Projection, slices
 from fes_pin.infer.spread import ByUnit, Spread, usual_spread
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
 from fes_pin.workers import in_parallel
 
-FEWEST_TRIALS = 6
-"""Number of trials that estimate the differences between repeats by themselves; fewer trials are cut into pieces."""
 FITTED = 2
 """Parameters that are fitted along an item: the mean of all trials, and that of one group."""
 LEAST_KEPT = 1e-6
@@ -125,17 +126,12 @@ class Screen:
 
     def __init__(self, nominal: Model, trials: Mapping[str, Sequence[Trial]], library: Library) -> None:
         self._nominal, self._trials, self._library = nominal, trials, library
-        self._kept: dict[int, tuple[Grouped, ItemScores]] = {}
         self._effects = [e for e in library.effects if library.felt(e)]
-        self._problems: dict[tuple[Any, ...], LikelihoodProblem] = {}
-
-    def scores(self, base: Grouped) -> ItemScores:
-        """Return the scores of every item that a set does not have."""
-        if id(base) not in self._kept:
-            self._kept[id(base)] = (base, self._scores(base))
-        return self._kept[id(base)][1]
+        self._by_group = {g: LikelihoodScreen(Library(nominal, own, library.effects)) for g, own in trials.items()}
+        self.scores = cache(self._scores)
 
     def _scores(self, base: Grouped) -> ItemScores:
+        """Return the scores of every item that a set does not have."""
         projection, made = Projection(base.fit.parts), list(self._columns(base))
         left = np.concatenate([projection(np.nan_to_num(c.columns)) for c in made], axis=1)
         gram, along = left.T @ left, left.T @ projection.residual
@@ -148,7 +144,8 @@ class Screen:
 
     def _columns(self, base: Grouped) -> Iterator[_Column]:
         """Yield every item that a set does not have."""
-        rows = _rows(base.fit.parts, self._trials)
+        ends = slices(sum(len(p.residual) for p in own) for own in by_group(base.fit.parts, self._trials).values())
+        rows = dict(zip(self._trials, ends, strict=True))
         for item in self._differing(base):
             yield _own(base, item, rows[str(item.group)])
         unknowns = by_group(base.fit.unknowns, self._trials)
@@ -177,42 +174,24 @@ class Screen:
         """
         has = [g for g in rows if Item(kind.name, g) in base.items]
         lacks = [g for g in rows if g not in has]
-        forms = [_at_null(base.model.models[has[0]], kind)] if has else self._library.grid(kind)
         wanted: list[tuple[Item, list[str]]] = [(Item(kind.name), lacks)]
         wanted += [(Item(kind.name, g), [g]) for g in lacks if len(lacks) > 1]
-        pieces = {g: self._linearized(base, g, forms, unknowns[g]) for g in lacks}
-        for k, one in enumerate(forms):
+        for one in [_at_null(base.model.models[has[0]], kind)] if has else self._library.grid(kind):
+            pieces = {g: self._sensitivities(one, base, g, unknowns[g]) for g in lacks}
             info = one.parameters()
             amplitudes = {n: (float(info[n].null or 0.0), info[n].lower, info[n].upper) for n in one.amplitudes()}
             for item, groups in wanted:
                 columns = np.zeros((max(r.stop for r in rows.values()), len(amplitudes)))
                 for g in groups:
-                    columns[rows[g]] = pieces[g][k]
+                    columns[rows[g]] = pieces[g]
                 yield _Column(item, one, amplitudes, columns)
 
-    def _linearized(self, base: Grouped, group: str, forms: Sequence[Effect], unknowns: Unknowns) -> list[np.ndarray]:
-        """Return sensitivities of the trials of a group to the amplitudes of each form of a cause."""
-        bare, noise, out = Model(base.model.models[group].rig), base.weights[group].noise, []
-        trials, shrinks = self._trials[group], by_group(base.shrinks, self._trials)[group]
-        simulated = is_simulated(noise, trials)  # predictions share the program of a fit, which moves all parameters
-        for one in forms:
-            names = tuple(f"{one.name}.{n}" for n in one.amplitudes())
-            key = (group, simulated, one.name, *one.unused().items())  # unused ones are compiled in, with values
-            if key not in self._problems:
-                self._problems[key] = LikelihoodProblem(bare + one, trials, noise, names if simulated else None)
-            problem = self._problems[key]
-            problem.noise = noise
-            at = [problem.free.index(n) for n in names]
-            parts = problem.linearize((bare + one).parameters(), completed(problem.start_unknowns(), unknowns))
-            parts = [s.shrunk(p) for p, s in zip(parts, shrinks, strict=True)] if shrinks else parts
-            out.append(np.concatenate([p.jacobian[:, at] for p in parts]))
-        return out
-
-
-def _rows(parts: Sequence[Linearized], trials: Mapping[str, Sequence[Trial]]) -> dict[str, slice]:
-    """Return the rows of each group, all trials end to end."""
-    rows = slices(sum(len(p.residual) for p in own) for own in by_group(parts, trials).values())
-    return dict(zip(trials, rows, strict=True))
+    def _sensitivities(self, one: Effect, base: Grouped, group: str, unknowns: Unknowns) -> np.ndarray:
+        """Return sensitivities of the trials of a group to the amplitudes of a cause, whitened as in a fit."""
+        at = (base.model.models[group], base.weights[group].noise, unknowns)
+        parts = self._by_group[group].sensitivities(one, *at)
+        shrinks = by_group(base.shrinks, self._trials)[group]
+        return np.concatenate([s.shrunk(p) for s, p in zip(shrinks, parts, strict=True)] if shrinks else parts)
 
 
 def _at_null(model: Model, kind: type[Effect]) -> Effect:
@@ -253,12 +232,9 @@ def _score(one: _Column, gram: np.ndarray, along: np.ndarray, spread: Spread) ->
     degrees = len(one.amplitudes) if one.effect is None else len(one.effect.fitted_parameters())
     if kept < LEAST_KEPT:
         return ItemScore(one.item, one.effect, 0.0, degrees, 0.0, np.inf, {}, spread)
-    scale = 1.0 / np.maximum(size, 1e-300)
-    inverse = np.linalg.pinv(gram * np.outer(scale, scale), rcond=1e-10, hermitian=True)
     nulls, low, high = np.array(list(one.amplitudes.values())).T
-    step = np.clip(scale * (inverse @ (along * scale)), low - nulls, high - nulls)
-    gain = float(2.0 * along @ step - step @ gram @ step)
-    deviation = float(scale[0] * np.sqrt(max(inverse[0, 0], 0.0)))
+    step, gain = bounded_step(gram, along, low - nulls, high - nulls)
+    deviation = math.sqrt(covariance_of(gram, np.ones(len(step), dtype=bool))[0, 0])
     values = dict(zip(one.amplitudes, (nulls + step).tolist(), strict=True))
     if one.effect is not None:
         return ItemScore(one.item, started(one.effect, values), gain, degrees, kept, deviation, {}, spread)

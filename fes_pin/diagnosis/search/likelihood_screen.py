@@ -1,6 +1,7 @@
 """Score tests of every cause in a fit by the likelihood, from one linearization of each cause."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -9,8 +10,9 @@ from fes_pin.diagnosis.search.library import Library, Probe
 from fes_pin.diagnosis.search.score import Scores, score_test
 from fes_pin.identify.likelihood import LikelihoodProblem, is_simulated
 from fes_pin.identify.likelihood_fit import LikelihoodFit
-from fes_pin.infer.problem import completed
+from fes_pin.infer.problem import Unknowns, completed
 from fes_pin.models.model import Model
+from fes_pin.models.predictor import StateSpaceNoise
 from fes_pin.models.stage import Effect
 from fes_pin.workers import in_parallel
 
@@ -34,21 +36,24 @@ class LikelihoodScreen:
         return self._scores[id(base)][1]
 
     def _probes(self, effect: type[Effect], base: LikelihoodFit) -> list[Probe]:
-        """Return the effect with every choice of its shapes, linearized at the nominal parameters of a fit.
+        """Return the effect with every choice of its shapes, linearized at the nominal parameters of a fit."""
+        forms, at = self._library.grid(effect), (base.model, base.noise, base.unknowns)
+        return [Probe(one, np.nan_to_num(np.concatenate(self.sensitivities(one, *at)))) for one in forms]
 
-        Causes of the fit are left out, except those of `screened_with`: the predictor follows the readings with or
+    def sensitivities(
+        self, one: Effect, model: Model, noise: StateSpaceNoise, unknowns: Unknowns
+    ) -> Sequence[np.ndarray]:
+        """Return the whitened sensitivities of each trial to the amplitudes of a cause, shape (m, amplitudes).
+
+        Causes of the model are left out, except those of `screened_with`: the predictor follows the readings with or
         without them.
         """
-        nominal = Model(base.model.rig, tuple(e for e in base.model.effects if e.name in effect.screened_with))
-        out, simulated = [], is_simulated(base.noise, self._library.trials)
-        for one in self._library.grid(effect):
-            key = (*(nominal + one).structure(), *(nominal + one).unused_parameters().items(), simulated)
-            if key not in self._probing:  # its columns are those of a fit, which shares the program
-                self._probing[key] = LikelihoodProblem(nominal + one, self._library.trials, base.noise)
-            problem = self._probing[key]
-            places = [problem.free.index(f"{effect.name}.{n}") for n in effect.amplitudes()]
-            problem.noise = base.noise
-            unknowns = completed(problem.start_unknowns(), base.unknowns)
-            parts = problem.linearize((nominal + one).parameters(), unknowns)
-            out.append(Probe(one, np.nan_to_num(np.concatenate([p.jacobian[:, places] for p in parts]))))
-        return out
+        extended = Model(model.rig, tuple(e for e in model.effects if e.name in one.screened_with)) + one
+        key = (*extended.structure(), *extended.unused_parameters().items(), is_simulated(noise, self._library.trials))
+        if key not in self._probing:  # its columns are those of a fit, which shares the program
+            self._probing[key] = LikelihoodProblem(extended, self._library.trials, noise)
+        problem = self._probing[key]
+        places = [problem.free.index(f"{one.name}.{n}") for n in one.amplitudes()]
+        problem.noise = noise
+        parts = problem.linearize(extended.parameters(), completed(problem.start_unknowns(), unknowns))
+        return [p.jacobian[:, places] for p in parts]

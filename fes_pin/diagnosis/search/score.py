@@ -121,10 +121,15 @@ def _score(probe: Probe, gram: np.ndarray, along: np.ndarray, before: float) -> 
         return Scored(probe, 0.0, {n: probe.effect.nulls()[n] for n in names}, 0.0)
     nulls = np.array([probe.effect.nulls()[n] for n in names])
     lower, upper = np.array([[info[n].lower, info[n].upper] for n in names]).T
-    amplitudes = np.clip(least_squares_step(gram, along), lower - nulls, upper - nulls)
-    gain = float(2.0 * along @ amplitudes - amplitudes @ gram @ amplitudes)
+    amplitudes, gain = bounded_step(gram, along, lower - nulls, upper - nulls)
     values = dict(zip(names, (float(a) for a in amplitudes + nulls), strict=True))
     return Scored(probe, gain, values, float(np.sqrt(after / before)))
+
+
+def bounded_step(gram: np.ndarray, along: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> tuple[np.ndarray, float]:
+    """Return the step of amplitudes within bounds that a linear estimate gives, and its gain."""
+    step = np.clip(least_squares_step(gram, along), lower, upper)
+    return step, float(2.0 * along @ step - step @ gram @ step)
 
 
 def best_by_effect(scored: Sequence[Scored]) -> Mapping[str, list[Scored]]:
