@@ -204,8 +204,8 @@ def _provenance(study: Study, after: Study | None, seed: int) -> Provenance:
 
 
 def _smoothed(best: Grouped) -> tuple[str, ...]:
-    """Return warnings about smoothed readings of a driven rig, whose noise has one correlation time in all groups."""
-    noise = next(iter(best.weights.values())).noise
+    """Return warnings about smoothed readings of a driven rig."""
+    noise = max((w.noise for w in best.weights.values()), key=lambda n: n.correlation_s)
     return words_of_reading(noise, best.model.rig, best.fit.trials)
 
 

@@ -2,17 +2,15 @@
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from functools import partial
 
 from fes_pin.contrasts.grouped import Grouped, GroupedModel, GroupedProblem, Item, by_group
 from fes_pin.contrasts.repeats import Repeats
 from fes_pin.data.errors import InputError
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.search.likelihood_fits import FIRST_NOISE_SCALES, MEASUREMENT, LikelihoodFits
+from fes_pin.diagnosis.search.likelihood_fits import FIRST_NOISE_SCALES, MEASUREMENT, PROCESS, LikelihoodFits
 from fes_pin.diagnosis.search.likelihood_maxima import LikelihoodMaxima
-from fes_pin.identify.correlation_time import with_new_noise
 from fes_pin.identify.likelihood import LikelihoodProblem
-from fes_pin.identify.likelihood_fit import LikelihoodFit, fit_of, maximise
+from fes_pin.identify.likelihood_fit import LikelihoodFit, fit_of
 from fes_pin.identify.process_noise import first_guess
 from fes_pin.infer.maximise import alternate
 from fes_pin.infer.optimum import minimise
@@ -54,7 +52,7 @@ class GroupedFits:
         InputError
             If the nominal model predicts nothing finite.
         """
-        alone = self._alone() if self.driven else in_parallel(self._simulated, self.trials)
+        alone = in_parallel(self._alone, self.trials)
         if not all(math.isfinite(f.sse) for f in alone):
             raise InputError("the nominal model predicts nothing finite from its start values on")
         noises = dict(zip(self.trials, (Repeats(f.noise) for f in alone), strict=True))
@@ -74,21 +72,10 @@ class GroupedFits:
         problem.noise_step(model.parameters(), unknowns)
         return problem.weights
 
-    def _simulated(self, group: str) -> LikelihoodFit:
-        """Return the nominal fit of a group alone without process noise."""
-        return LikelihoodFits(self.nominal, self.trials[group], (), answered=False, noise=MEASUREMENT).nominal()
-
-    def _alone(self) -> list[LikelihoodFit]:
-        """Return the nominal fit of each group alone, with one correlation time of measurement noise in all groups."""
-
-        def fitted(group: str, correlation_s: float) -> LikelihoodFit:
-            trials = self.trials[group]
-            problem = LikelihoodProblem(self.nominal, trials, first_guess(self.nominal, trials, correlation_s))
-            return maximise(problem, self.nominal.parameters())
-
-        each = {g: with_new_noise(t, partial(fitted, g)) for g, t in self.trials.items()}
-        longest = max(f.noise.correlation_s for f in each.values())
-        return [f if f.noise.correlation_s == longest else fitted(g, longest) for g, f in each.items()]
+    def _alone(self, group: str) -> LikelihoodFit:
+        """Return the nominal fit of a group alone."""
+        noise = PROCESS if self.driven else MEASUREMENT
+        return LikelihoodFits(self.nominal, self.trials[group], (), self.driven, noise).nominal()
 
     def converged(
         self,

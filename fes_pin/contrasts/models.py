@@ -109,21 +109,6 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
         """First fits again, under the noise of another fit of the same trials."""
         return in_parallel(lambda f: self.maxima.weighed_as(f, other), fits)
 
-    def near(self, size: int, without: Sequence[Names] = ()) -> list[Names]:
-        """Return the sets of a size near the best; after some that were not accepted, those that may be."""
-        near = super().near(size, without)[: self.converged_sets]
-        return [n for n in near if self._may_be_accepted(n)] if without else near
-
-    def converge(self, size: int, without: Sequence[Names] = ()) -> None:
-        """Fit the best sets of a size until they converge, except some, unless no other can be accepted."""
-        if not without or self.near(size, without):
-            super().converge(size, without)
-
-    def _may_be_accepted(self, names: Names) -> bool:
-        """Return whether the gain of a set over the best smaller one is significant against the noise."""
-        larger, smaller = self.fits[names], self.fits[self.ranked(len(names) - 1)[0]]
-        return self.noise_p_value(smaller.sse - larger.sse, more_degrees(larger, smaller)) < CLAIM_LEVEL
-
     def form_of(self, fitted: Grouped) -> frozenset[tuple[str, str, tuple[str, ...]]]:
         """Return for each cause of each group its name and its refinements."""
         models = fitted.model.models.items()
