@@ -7,7 +7,8 @@ from fes_pin.contrasts.grouped import Grouped
 from fes_pin.contrasts.left import left_in_groups
 from fes_pin.contrasts.models import ContrastModels, ContrastSearch, Found
 from fes_pin.data.trial import Trial
-from fes_pin.infer.held_out import FOLDS, deal, marginal_cost
+from fes_pin.diagnosis.held_out import folds_of
+from fes_pin.infer.held_out import FOLDS, marginal_cost
 from fes_pin.infer.result import FITTED, Evidence, Gain, Remainder
 from fes_pin.infer.verdict import State, Verdict, Weighed
 from fes_pin.workers import in_parallel
@@ -15,7 +16,7 @@ from fes_pin.workers import in_parallel
 
 @dataclass(frozen=True)
 class ContrastWeighed(Weighed):
-    """Evidence of trials on a set; gains are shares of the set's gain in the likelihood of held-out trials.
+    """Evidence of trials on a set; gains are those in twice the log-likelihood.
 
     Attributes
     ----------
@@ -42,15 +43,14 @@ class ContrastVerdict(Verdict[Grouped, ContrastModels, ContrastWeighed]):
     def __init__(self, search: ContrastSearch) -> None:
         super().__init__(search)
         self.claims = (self.drop_unsupported, self.settle)
-        self._costs: dict[int, tuple[Grouped, float]] = {}
+        self._costs: dict[Grouped, float] = {}
 
     def weigh(self, found: Found) -> ContrastWeighed:
         """Return the evidence of held-out trials and of the tests of lack of fit on a set."""
         models = self.search.models
         evidence = {} if self.search.was_stopped else self._evidence(found)
-        whole = evidence.pop("", Evidence(found.nominal.sse - found.best.sse, 0.0, FITTED)).added
-        added = {n: evidence.get(n, Evidence(f.sse - found.best.sse, 0.0, FITTED)) for n, f in found.without.items()}
-        gains = {n: _share(one, whole) for n, one in added.items()}
+        fitted = {n: Evidence(f.sse - found.best.sse, 0.0, FITTED) for n, f in found.without.items()}
+        gains = {n: Gain(one.added, one.low, one.high, on=one.on) for n, one in {**fitted, **evidence}.items()}
         left, said = left_in_groups(models, found.best, models.seed)
         return ContrastWeighed(gains, evidence, left, said)
 
@@ -60,37 +60,29 @@ class ContrastVerdict(Verdict[Grouped, ContrastModels, ContrastWeighed]):
         return [str(i) for i in state.found.best.changes if evidence and not evidence[str(i)].low > 0.0]
 
     def _evidence(self, found: Found) -> dict[str, Evidence]:
-        """Return the evidence for each item, and for all together (""), in held-out trials; empty without these."""
-        folds = folds_of(self.search.models.trials)
+        """Return the evidence for each item in held-out trials; empty without these."""
+        folds = folds_of_groups(self.search.models.trials)
         if not found.without or not folds:
             return {}
-        sets = {"": found.nominal, **found.without}
-        costs = in_parallel(lambda one: self._cost_of_held(one, folds), [found.best, *sets.values()])
-        return {n: Evidence.of(cost - costs[0]) for n, cost in zip(sets, costs[1:], strict=True)}
+        costs = in_parallel(lambda one: self._cost_of_held(one, folds), [found.best, *found.without.values()])
+        return {n: Evidence.of(cost - costs[0]) for n, cost in zip(found.without, costs[1:], strict=True)}
 
     def _cost_of_held(self, one: Grouped, folds: Sequence[Sequence[int]]) -> float:
         """Return twice the negative log-likelihood of folds by fits to the others, with the noise of all trials."""
-        if id(one) not in self._costs:
+        if one not in self._costs:
             parts = [self.search.models.maxima.refitted(one, held) for held in folds]
-            self._costs[id(one)] = one, sum(_cost(one) - _cost(part) for part in parts)
-        return self._costs[id(one)][1]
+            self._costs[one] = sum(_cost(one) - _cost(part) for part in parts)
+        return self._costs[one]
 
 
-def folds_of(trials: Mapping[str, Sequence[Trial]]) -> list[list[int]]:
+def folds_of_groups(trials: Mapping[str, Sequence[Trial]]) -> list[list[int]]:
     """Return the trials of each fold, by their numbers, all groups end to end; none where a group has one trial.
 
     Each fold holds out trials of every group, and keeps some of every group.
     """
     every, least = [(g, t) for g, many in trials.items() for t in many], min(map(len, trials.values()))
-    order = sorted(range(len(every)), key=lambda i: (every[i][1].kind, sorted(every[i][1].conditions.items()), i))
-    return deal(order, [g for g, _ in every], min(FOLDS, least)) if least > 1 else []
+    return folds_of([t for _, t in every], [g for g, _ in every], min(FOLDS, least)) if least > 1 else []
 
 
 def _cost(one: Grouped) -> float:
     return marginal_cost(one.fit, {n: info.scale for n, info in one.model.parameter_info().items()})
-
-
-def _share(one: Evidence, whole: float) -> Gain:
-    """Return the gain of an item in log-likelihood, in percent of that of all items."""
-    percent = 100.0 / max(whole, 1e-9)
-    return Gain(percent * one.added, percent * one.low, percent * (2.0 * one.added - one.low), on=one.on)

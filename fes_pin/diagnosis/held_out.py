@@ -7,7 +7,7 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.errors_ahead import Ahead, errors_ahead, squared_errors
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit, fit_of, maximise
-from fes_pin.infer.held_out import Errors, deal, held_out_gain, marginal_cost
+from fes_pin.infer.held_out import FOLDS, Errors, deal, held_out_gain, marginal_cost
 from fes_pin.infer.maximise import together
 from fes_pin.infer.optimum import minimise
 from fes_pin.infer.problem import Unknowns
@@ -19,9 +19,10 @@ Found = SearchResult[LikelihoodFit]
 """Result of a search among causes."""
 
 
-def folds_of(trials: Sequence[Trial]) -> list[list[int]]:
+def folds_of(trials: Sequence[Trial], groups: Sequence[str] | None = None, count: int = FOLDS) -> list[list[int]]:
     """Return the trials of each fold, in which every kind and load is spread evenly; none where there is one trial."""
-    return deal(sorted(range(len(trials)), key=lambda i: (trials[i].kind, sorted(trials[i].conditions.items()), i)))
+    order = sorted(range(len(trials)), key=lambda i: (trials[i].kind, sorted(trials[i].conditions.items()), i))
+    return deal(order, groups, count)
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import pytest
 from contrast_pairs.free import free_pair
 
 import fes_pin as fp
-from fes_pin.contrasts.verdict import ContrastVerdict, folds_of
+from fes_pin.contrasts.verdict import ContrastVerdict, folds_of_groups
 
 
 @pytest.fixture(scope="module")
@@ -17,7 +17,7 @@ def study(tmp_path_factory):
 @pytest.mark.parametrize("sizes", [(2, 2), (2, 5), (7, 3), (12, 12)])
 def test_every_fold_holds_out_and_keeps_trials_of_every_group(study, sizes):
     trials = {g: list(study.trials[:1]) * n for g, n in zip("ab", sizes, strict=True)}
-    folds = folds_of(trials)
+    folds = folds_of_groups(trials)
     assert len(folds) == min(5, *sizes)
     assert sorted(i for out in folds for i in out) == list(range(sum(sizes)))
     first = sizes[0]
@@ -27,7 +27,7 @@ def test_every_fold_holds_out_and_keeps_trials_of_every_group(study, sizes):
 
 
 def test_one_trial_of_a_group_is_never_held_out(study):
-    assert folds_of({"a": list(study.trials[:1]), "b": list(study.trials[:4])}) == []
+    assert folds_of_groups({"a": list(study.trials[:1]), "b": list(study.trials[:4])}) == []
 
 
 def test_held_out_trials_confirm_a_change(study):
