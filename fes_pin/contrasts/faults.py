@@ -41,7 +41,7 @@ class GroupConditions(Conditions[Grouped, ContrastModels]):
         """Return the fall of the criterion, with the noise of the restated trials."""
         best, after = searched.best, made.searched.best
         fits = GroupedFits(self.nominal, in_groups(trials), best.is_driven)
-        return fits.converged(best.model, best.items, after.weights, best.fit.unknowns).criterion - after.criterion
+        return fits.again(best, after.weights).criterion - after.criterion
 
 
 def late_in_groups(models: ContrastModels, found: Found) -> float | None:

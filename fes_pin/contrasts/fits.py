@@ -3,7 +3,7 @@
 import math
 from collections.abc import Collection, Mapping, Sequence
 
-from fes_pin.contrasts.grouped import Grouped, GroupedModel, GroupedProblem, Item, by_group
+from fes_pin.contrasts.grouped import Grouped, GroupedModel, GroupedProblem, by_group
 from fes_pin.contrasts.repeats import Repeats
 from fes_pin.data.errors import InputError
 from fes_pin.data.trial import Trial
@@ -60,9 +60,9 @@ class GroupedFits:
         if self.driven:
             little = {g: first_guess(self.nominal, t, noises[g].noise.correlation_s) for g, t in self.trials.items()}
             self._begun = [{g: Repeats(n) for g, n in little.items()}, noises]
-            return self.converged(model, (), noises, None)
+            return self.fitted(model, noises)
         starts = [noises, self._without_scatter(model, noises, [u for f in alone for u in f.unknowns])]
-        return min((self.converged(model, (), w, None) for w in starts), key=lambda f: f.criterion)
+        return min((self.fitted(model, w) for w in starts), key=lambda f: f.criterion)
 
     def _without_scatter(self, model: GroupedModel, noises: Weights, unknowns: Unknowns) -> dict[str, Repeats]:
         """Return the noise of each group without the part that nominal values of each trial's own explain."""
@@ -77,41 +77,23 @@ class GroupedFits:
         noise = PROCESS if self.driven else MEASUREMENT
         return LikelihoodFits(self.nominal, self.trials[group], (), self.driven, noise).nominal()
 
-    def converged(
-        self,
-        model: GroupedModel,
-        items: Collection[Item],
-        weights: Weights,
-        unknowns: Unknowns | None,
-        rounds: int = ROUNDS,
+    def fitted(
+        self, model: GroupedModel, weights: Weights, unknowns: Unknowns | None = None, rounds: int = ROUNDS
     ) -> Grouped:
-        """Fit a grouped model and its noise by alternating maximisation."""
+        """Fit a grouped model and, in some rounds of alternating maximisation, its noise."""
         problem = GroupedProblem(model, self.trials, weights)
-        return Grouped.of(items, problem, alternate(problem, model.parameters(), unknowns, rounds, LOOK))
+        return Grouped.of(problem, alternate(problem, model.parameters(), unknowns, rounds, LOOK))
+
+    def again(self, one: Grouped, weights: Weights | None = None, rounds: int = ROUNDS) -> Grouped:
+        """Fit a set from its own values; without rounds, with given weights, so that residuals have their unit."""
+        return self.fitted(one.model, weights or one.weights, one.fit.unknowns, rounds)
 
     def go_on(self, one: Grouped) -> Grouped:
         """Fit a set until it converges, also from little process noise and from that of each group alone.
 
         The process noise of a smaller set explains its error, and may keep doing so: a likelihood can have two maxima.
         """
-        starts = [one.weights, *self._begun]
-        return min(
-            (self.converged(one.model, one.items, w, one.fit.unknowns) for w in starts), key=lambda f: f.criterion
-        )
-
-    def look(self, model: GroupedModel, items: Collection[Item], base: Grouped) -> Grouped:
-        """Return a first fit of a model with the weights of another set."""
-        return self._looked(model, items, base.weights, base.fit.unknowns)
-
-    def weighed_as(self, one: Grouped, other: Grouped) -> Grouped:
-        """Return the set with the weights of another, so that the residuals of both have one unit."""
-        return self._looked(one.model, one.items, other.weights, one.fit.unknowns)
-
-    def _looked(
-        self, model: GroupedModel, items: Collection[Item], weights: Weights, unknowns: Unknowns | None
-    ) -> Grouped:
-        problem = GroupedProblem(model, self.trials, weights)
-        return Grouped.of(items, problem, minimise(problem, model.parameters(), unknowns, LOOK))
+        return min((self.again(one, w) for w in (one.weights, *self._begun)), key=lambda f: f.criterion)
 
     def refitted(self, one: Grouped, held: Collection[int]) -> Grouped:
         """Return the set fitted without some trials, by their numbers, with its own weights."""
@@ -119,7 +101,7 @@ class GroupedFits:
         trials = {g: [t for k, t in many if k not in held] for g, many in kept.items()}
         problem = GroupedProblem(one.model, trials, one.weights)
         unknowns = [u for k, u in enumerate(one.fit.unknowns) if k not in held]
-        return Grouped.of(one.items, problem, minimise(problem, one.fit.values, unknowns))
+        return Grouped.of(problem, minimise(problem, one.fit.values, unknowns))
 
     def part(self, one: Grouped, group: str, alone: int | None = None) -> LikelihoodFit:
         """Return a group's part of a fit as a fit of that group, to its own trials or to one of them `alone`."""
@@ -135,7 +117,7 @@ class GroupedFits:
         if not all(begun.values()):
             return None
         weights = {g: Repeats(LikelihoodMaxima(f.trials).likeliest(f, begun[g])) for g, f in parts.items()}
-        found = self.converged(one.model, one.items, weights, one.fit.unknowns)
+        found = self.again(one, weights)
         if not found.criterion < one.criterion:
             return None
         self._begun = [weights]

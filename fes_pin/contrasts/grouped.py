@@ -66,10 +66,13 @@ class GroupedModel:
         By group, in order.
     own
         Pairs of path and group.
+    items
+        Its causes and changes in addition to the nominal model.
     """
 
     models: Mapping[str, Model]
     own: frozenset[tuple[str, str]] = frozenset()
+    items: frozenset[Item] = frozenset()
 
     @property
     def rig(self) -> Rig:
@@ -104,7 +107,9 @@ class GroupedModel:
     def with_parameters(self, values: Mapping[str, float]) -> GroupedModel:
         """Return the same model with other values."""
         full = {**self.parameters(), **values}
-        return GroupedModel({g: m.with_parameters(self.of(g, full)) for g, m in self.models.items()}, self.own)
+        return dataclasses.replace(
+            self, models={g: m.with_parameters(self.of(g, full)) for g, m in self.models.items()}
+        )
 
     def structure(self) -> tuple[str, ...]:
         """The rig, and the effects of each group."""
@@ -128,7 +133,7 @@ class GroupedModel:
             known += [e for e in new if e.name in wanted and e.name not in {k.name for k in known}]
             models[group] = Model(model.rig, tuple(known))
             own |= {(n, group) for i in items if i.group == group for n in _differing(i, known, Item(i.name) in items)}
-        return _agreed(GroupedModel(models, frozenset(own)))
+        return _agreed(GroupedModel(models, frozenset(own), frozenset(items)))
 
 
 def _differing(item: Item, effects: Sequence[Effect], is_common: bool) -> list[str]:
@@ -306,8 +311,6 @@ class Grouped:
 
     Attributes
     ----------
-    items
-        Its causes and changes in addition to the nominal model.
     model
         The fitted model.
     fit
@@ -318,19 +321,23 @@ class Grouped:
         Whitening of each trial by the scatter of repeats, all groups end to end; empty where nothing scatters.
     """
 
-    items: frozenset[Item]
     model: GroupedModel
     fit: Fit
     weights: Mapping[str, Repeats]
     shrinks: Sequence[Shrink]
 
     @classmethod
-    def of(cls, items: Collection[Item], problem: GroupedProblem, found: Optimum) -> Grouped:
+    def of(cls, problem: GroupedProblem, found: Optimum) -> Grouped:
         """Return the fit of a grouped problem at its optimum."""
         model, shrinks = problem.model.with_parameters(found.values), problem.shrinks(found.values, found.unknowns)
         ended = {**vars(found), "model": model, "parameters": model.parameters()}
         fit = Fit(**ended, trials=problem.trials, noise=problem.noise)
-        return cls(frozenset(items), model, fit, problem.weights, shrinks)
+        return cls(model, fit, problem.weights, shrinks)
+
+    @property
+    def items(self) -> frozenset[Item]:
+        """Its causes and changes in addition to the nominal model."""
+        return self.model.items
 
     @property
     def sse(self) -> float:

@@ -95,11 +95,10 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
         """Return a first fit of a set, with one round of its own noise: that of the smaller set explains its items."""
         out = []
         for one in scores:
-            items = base.items | {one.item}
-            model = base.model.having(items, () if one.effect is None else (one.effect,)).with_parameters(one.start)
-            out.append(self.maxima.look(model, items, base))
-        best = min(out, key=lambda f: f.criterion)
-        return self.maxima.converged(best.model, best.items, best.weights, best.fit.unknowns, rounds=1)
+            new = () if one.effect is None else (one.effect,)
+            model = base.model.having(base.items | {one.item}, new).with_parameters(one.start)
+            out.append(self.maxima.fitted(model, base.weights, base.fit.unknowns, 0))
+        return self.maxima.again(min(out, key=lambda f: f.criterion), rounds=1)
 
     def converged(self, fits: Sequence[Grouped]) -> list[Grouped]:
         """Return the converged fits."""
@@ -107,7 +106,7 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
 
     def under_noise_of(self, other: Grouped, fits: Sequence[Grouped]) -> list[Grouped]:
         """First fits again, under the noise of another fit of the same trials."""
-        return in_parallel(lambda f: self.maxima.weighed_as(f, other), fits)
+        return in_parallel(lambda f: self.maxima.again(f, other.weights, 0), fits)
 
     def form_of(self, fitted: Grouped) -> frozenset[tuple[str, str, tuple[str, ...]]]:
         """Return for each cause of each group its name and its refinements."""
@@ -118,8 +117,8 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
         """Return the fit of a set without one item, from the values of the set where that is better."""
         rest, whole = tuple(n for n in names if n != name), self.fits[names]
         if self._compared.get((names, name)) is not whole:
-            items = whole.items - {Item.of(name)}
-            own = self.maxima.converged(whole.model.having(items), items, whole.weights, whole.fit.unknowns)
+            model = whole.model.having(whole.items - {Item.of(name)})
+            own = self.maxima.fitted(model, whole.weights, whole.fit.unknowns)
             if rest not in self.fits or own.criterion < self.fits[rest].criterion:
                 self.fits[rest] = own
             self._converged.add(rest)
@@ -139,13 +138,13 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
         noise = super().p_value(larger, smaller, gain)
         if not set(larger.changes) - set(smaller.changes) or not noise < CLAIM_LEVEL:
             return noise
-        weighed = self.maxima.weighed_as(smaller, larger)
+        weighed = self.maxima.again(smaller, larger.weights, 0)
         between = self._spread(larger, weighed).p_value(weighed.sse - larger.sse, more_degrees(larger, smaller))
         return max(noise, self.family.adjusted(between))
 
     def spread(self, larger: Grouped, smaller: Grouped) -> Spread:
         """Return the spread between trials of the gain of a larger set; see `infer.spread`."""
-        return self._spread(larger, self.maxima.weighed_as(smaller, larger))
+        return self._spread(larger, self.maxima.again(smaller, larger.weights, 0))
 
     def _spread(self, larger: Grouped, smaller: Grouped) -> Spread:
         """Return the same for sets with the same weights; the mean of all trials and that of one group are fitted.
@@ -182,7 +181,7 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
             own = fitted.model.models[group]
             tried += number_of_forms(own, [effect])
             starts += [_moved(fitted.model, group, m) for m in refinements(own, effect, self._library.measured)]
-        looks = in_parallel(lambda start: self.maxima.look(start, fitted.items, fitted), starts)
+        looks = in_parallel(lambda start: self.maxima.fitted(start, fitted.weights, fitted.fit.unknowns, 0), starts)
         return demanded_form(fitted, looks, DRIVEN_LEVEL / max(tried, 1), self.converged)
 
     def begin_again(self, names: Names) -> bool:
@@ -191,9 +190,7 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
         if acting is None:
             return False
         kept = {k: self.fits[k] for k in ((), names)}
-        self.fits = {
-            k: self.maxima.converged(f.model, f.items, acting.weights, f.fit.unknowns) for k, f in kept.items()
-        }
+        self.fits = {k: self.maxima.again(f, acting.weights) for k, f in kept.items()}
         self.family = self.screen.scores(self.fits[()]).family(self.seed)
         self._converged, self._begun, self._compared = set(self.fits), set(), {}
         for name in names:
