@@ -4,14 +4,12 @@ import math
 
 from fes_pin.contrasts.grouped import Grouped, Item
 from fes_pin.contrasts.models import ContrastModels, Found
-from fes_pin.contrasts.screen import ItemScore
 from fes_pin.contrasts.words import of_cause, of_nominal
 from fes_pin.diagnosis.misread import NAME, Misread
 from fes_pin.infer.distributions import normal_quantile
 from fes_pin.infer.levels import CLAIM_LEVEL, IDENTIFIABLE_SHARE, SEEN_POWER, SEPARABLE
 from fes_pin.infer.result import Change, Evidence, ParameterEstimate
 from fes_pin.models.catalogue import Catalogue
-from fes_pin.models.stage import Effect
 
 
 def change_of(
@@ -20,7 +18,7 @@ def change_of(
     """Return one change of the result: its size in each group, in words, and its equivalents."""
     best, model, groups = found.best, found.best.model, tuple(found.best.model.models)
     assert item.group is not None
-    wider = math.sqrt(max(1.0, models.spread(best, found.without[str(item)]).phi))
+    wider = math.sqrt(max(1.0, models.spread(best, *models.under_noise_of(best, [found.without[str(item)]])).phi))
     nominal = item.name in found.nominal.model.free
     parameters = _by_group(best, item, groups, nominal, wider)
     first = next(iter(parameters.values()))
@@ -90,34 +88,18 @@ def not_changed(
         the names of parameters and causes whose change is not testable.
     """
     single = 1.0 - (1.0 - CLAIM_LEVEL) ** (1.0 / models.family.tests)
-    reach, changed = normal_quantile(1.0 - 0.5 * single) + normal_quantile(SEEN_POWER), {i.name for i in best.items}
-    others = [s for s in models.screen.scores(best).scored if s.item.group is not None and s.item.name not in changed]
-    sizes = [(s, reach * s.deviation * math.sqrt(max(s.spread.phi, 1.0))) for s in others]
-    shares = _largest([(s, size / abs(v)) for s, size in sizes if s.effect is None and (v := _value(best, s))])
-    largest = _largest([(s, size) for s, size in sizes if s.effect is not None])
-    units = {s.item.name: _unit(best, s.effect) for s in others if s.effect is not None}
-    felt = {s.item.name for s in others if s.kept >= IDENTIFIABLE_SHARE}
-    excluded = {n: ParameterEstimate(v, 0.0, units[n]) for n, v in largest.items() if n in felt and math.isfinite(v)}
-    unchanged = {n: v for n, v in shares.items() if v < 1.0}
-    return unchanged, excluded, tuple(sorted({*largest, *shares} - {*excluded, *unchanged}))
-
-
-def _largest(sizes: list[tuple[ItemScore, float]]) -> dict[str, float]:
-    """Return the largest size of each name."""
-    out: dict[str, float] = {}
-    for one, size in sizes:
-        out[one.item.name] = max(out.get(one.item.name, size), size)
-    return out
-
-
-def _value(best: Grouped, one: ItemScore) -> float:
-    """Return the value of a parameter in groups that share it."""
-    return best.model.parameters()[one.item.name]
-
-
-def _unit(best: Grouped, effect: Effect) -> str:
-    """Return the unit of the first amplitude of a cause."""
-    return effect.parameters()[effect.amplitudes()[0]].in_units(best.model.rig.units()).unit
+    reach, named = normal_quantile(1.0 - 0.5 * single) + normal_quantile(SEEN_POWER), {i.name for i in best.items}
+    values, units, largest, seen = best.model.parameters(), best.model.rig.units(), dict[str, float](), dict[str, str]()
+    for one in models.screen.scores(best).scored:
+        name, size = one.item.name, reach * one.deviation * math.sqrt(max(one.spread.phi, 1.0))
+        if one.item.group is None or name in named or not values.get(name, 1.0):
+            continue
+        largest[name] = max(largest.get(name, 0.0), size / abs(values.get(name, 1.0)))
+        if one.effect is not None and one.kept >= IDENTIFIABLE_SHARE:
+            seen[name] = one.effect.parameters()[one.effect.amplitudes()[0]].in_units(units).unit
+    unchanged = {n: v for n, v in largest.items() if n in values and v < 1.0}
+    excluded = {n: ParameterEstimate(largest[n], 0.0, unit) for n, unit in seen.items() if math.isfinite(largest[n])}
+    return unchanged, excluded, tuple(sorted({*largest} - {*excluded, *unchanged}))
 
 
 def misread_change(models: ContrastModels, misread: Misread) -> Change:

@@ -138,17 +138,14 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
         noise = super().p_value(larger, smaller, gain)
         if not set(larger.changes) - set(smaller.changes) or not noise < CLAIM_LEVEL:
             return noise
-        weighed = self.maxima.again(smaller, larger.weights, 0)
-        between = self._spread(larger, weighed).p_value(weighed.sse - larger.sse, more_degrees(larger, smaller))
+        (weighed,) = self.under_noise_of(larger, [smaller])
+        between = self.spread(larger, weighed).p_value(weighed.sse - larger.sse, more_degrees(larger, smaller))
         return max(noise, self.family.adjusted(between))
 
     def spread(self, larger: Grouped, smaller: Grouped) -> Spread:
-        """Return the spread between trials of the gain of a larger set; see `infer.spread`."""
-        return self._spread(larger, self.maxima.again(smaller, larger.weights, 0))
+        """Return the spread between trials of the gain of a larger set over one under its noise; see `infer.spread`.
 
-    def _spread(self, larger: Grouped, smaller: Grouped) -> Spread:
-        """Return the same for sets with the same weights; the mean of all trials and that of one group are fitted.
-
+        The mean of all trials and that of one group are fitted.
         Few trials estimate the scatter of repeats poorly. Where a share q of the gain depends on it, f degrees of
         freedom are reduced to 1 / (1 / f + q^2 / f0), with f0 those of the trials. Source: Satterthwaite, Biometrics
         Bulletin 2 (1946).
@@ -199,14 +196,10 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
 
 
 def _causes(fitted: Grouped) -> list[tuple[str, Effect]]:
-    """Return the causes of a set, each once for all groups that share it, with a group that has it."""
-    models = fitted.model.models
-    out: dict[tuple[str, str | None], tuple[str, Effect]] = {}
-    for group, model in models.items():
-        for effect in model.effects:
-            alone = None if Item(effect.name) in fitted.items else group
-            out.setdefault((effect.name, alone), (group, effect))
-    return list(out.values())
+    """Return the causes of a set, each once for all groups that share it, with the first group that has it."""
+    each = [(g, e) for g, m in fitted.model.models.items() for e in m.effects]
+    shared = {i.name for i in fitted.items if i.group is None}
+    return list({(e.name, "" if e.name in shared else g): (g, e) for g, e in reversed(each)}.values())
 
 
 def _moved(model: GroupedModel, group: str, own: Model) -> GroupedModel:
