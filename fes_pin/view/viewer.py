@@ -11,7 +11,10 @@ import html
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from importlib import resources
 from pathlib import Path
+from string import Template
+from types import SimpleNamespace
 
 import numpy as np
 import pinocchio as pin
@@ -104,7 +107,9 @@ class BodyScene:
 
         if not self.frames:
             self.pose("neutral")
-        page, animation = meshcat.Visualizer(window=(kept := _Kept())), Animation(default_framerate=self.fps)
+        commands: list = []
+        window = SimpleNamespace(send=commands.append)  # replaces a browser: what is sent to it is kept
+        page, animation = meshcat.Visualizer(window=window), Animation(default_framerate=self.fps)
         for hidden in ("/Grid", "/Axes"):
             page[hidden].set_property("visible", False)
         page["/Background"].set_property("top_color", [0.93, 0.95, 0.97])
@@ -128,7 +133,7 @@ class BodyScene:
             draw_arrow(arrow, page[f"arrow/{k}"], animation)
         if len(self.frames) > 1:
             page.set_animation(animation, play=True, repetitions=1_000_000)
-        return kept.commands
+        return commands
 
     def _body_on(self, page):
         """Pinocchio's viewer of the body, which is drawn on a page."""
@@ -150,7 +155,8 @@ class BodyScene:
         packed = ",\n".join(
             f'"{base64.b64encode(umsgpack.packb(command.lower())).decode()}"' for command in self.commands()
         )
-        return _PAGE.format(script=script, commands=packed, caption=html.escape(self.caption))
+        page = Template(resources.files("fes_pin.view").joinpath("viewer.html").read_text(encoding="utf-8"))
+        return page.substitute(script=script, commands=packed, caption=html.escape(self.caption))
 
     def write(self, path: str | Path) -> Path:
         """Write the page to a file, into a folder that is there; raises as `write_text`."""
@@ -300,11 +306,8 @@ def _centre(body: Body, joint: str, posture: Mapping[str, float]) -> np.ndarray:
     first = next(j.revolutes[0] for j in JOINTS if j.name == joint)
     data = body.model.createData()
     pin.forwardKinematics(body.model, data, body.angles(posture, check=False))
-    return data.oMi[body.model.getJointId(first)].translation + np.array([0.0, _outside(joint), 0.0])
-
-
-def _outside(joint: str) -> float:
-    return {"left": 0.09, "right": -0.09}.get(joint.split("_", maxsplit=1)[0], -0.16)
+    outside = {"left": 0.09, "right": -0.09}.get(joint.split("_", maxsplit=1)[0], -0.16)
+    return data.oMi[body.model.getJointId(first)].translation + np.array([0.0, outside, 0.0])
 
 
 def _red(share: float) -> int:
@@ -314,9 +317,7 @@ def _red(share: float) -> int:
 
 
 def _moved(translation: Sequence[float] | np.ndarray) -> np.ndarray:
-    matrix = np.eye(4)
-    matrix[:3, 3] = translation
-    return matrix
+    return pin.SE3(np.eye(3), np.asarray(translation)).homogeneous
 
 
 def import_meshcat():
@@ -325,41 +326,3 @@ def import_meshcat():
         warnings.simplefilter("ignore", DeprecationWarning)
         import meshcat  # noqa: PLC0415
     return meshcat
-
-
-class _Kept:
-    """A replacement of a browser, which keeps what is sent."""
-
-    def __init__(self) -> None:
-        self.commands: list = []
-
-    def send(self, command) -> None:
-        """Keep a drawing command."""
-        self.commands.append(command)
-
-
-_PAGE = """<!DOCTYPE html>
-<html lang="en">
-<head><meta charset="utf-8"><title>{caption}</title>
-<style>
-body {{ margin: 0; font: 16px system-ui, sans-serif; }}
-#meshcat-pane {{ width: 100vw; height: 100vh; overflow: hidden; }}
-#caption {{ position: absolute; left: 1em; top: 1em; max-width: 60%; padding: .5em .8em; border-radius: .4em;
-  background: rgba(255, 255, 255, .85); color: #222; }}
-</style></head>
-<body>
-<div id="meshcat-pane"></div><div id="caption">{caption}</div>
-<script>{script}</script>
-<script>
-const viewer = new MeshCat.Viewer(document.getElementById("meshcat-pane"));
-const commands = [{commands}];
-for (const command of commands) {{
-  viewer.handle_command_bytearray(Uint8Array.from(atob(command), c => c.charCodeAt(0)));
-}}
-const still = /#t=([0-9.]+)/.exec(location.hash);
-if (still) {{ viewer.animator.pause(); viewer.animator.seek(parseFloat(still[1])); }}
-document.body.dataset.ready = "yes";
-</script>
-<script id="embedded-json"></script>
-</body></html>
-"""
