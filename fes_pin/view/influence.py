@@ -8,8 +8,6 @@ import numpy as np
 from fes_pin.body.controllability import ModalControllability
 from fes_pin.data.errors import InputError
 
-ON = ("joints", "modes")
-
 
 def _matrix(result: ModalControllability, on: str) -> tuple[np.ndarray, list[str]]:
     if on == "joints":

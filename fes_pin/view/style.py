@@ -8,17 +8,10 @@ import numpy as np
 
 STAGES = {"nerve": "#0072b2", "muscle": "#d55e00", "joint": "#00855f", "rig": "#8f6800", "sensor": "#a8477f"}
 """Colour of each stage of the signal path; three are darkened, to be read as text on white."""
-MEASURED, NOMINAL, EXTENDED = "#17191c", "#8b8f96", "#56b4e9"
-INK, FAINT, BAND, STIMULUS = "#3d4248", "#c9cdd2", "#eceef1", "#6f7680"
 COLOURS = {
     **{f"stage-{name}": colour for name, colour in STAGES.items()},
-    "measured": MEASURED,
-    "nominal": NOMINAL,
-    "extended": EXTENDED,
-    "ink": INK,
-    "faint": FAINT,
-    "band": BAND,
-    "stimulus": STIMULUS,
+    **{"measured": "#17191c", "nominal": "#8b8f96", "extended": "#56b4e9", "ink": "#3d4248", "faint": "#c9cdd2"},
+    **{"band": "#eceef1", "stimulus": "#6f7680"},
 }
 """Every colour that a figure uses, by name."""
 WIDTHS = {"extended": 4.0, "nominal": 1.8, "measured": 0.9}

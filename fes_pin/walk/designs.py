@@ -6,14 +6,12 @@ import copy
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from fes_pin.body.build import GRAVITY
 from fes_pin.infer.search import Names
 from fes_pin.walk.disturb import compressed, disturbed_waves, misplaced, tissue, white
-from fes_pin.walk.effect import Form
 from fes_pin.walk.effects import walk_library
 from fes_pin.walk.likelihood import MEAN_ARM_M, MEAN_FORCE, MEAN_TWIST_NM, WalkNoise, fit_walk, rotation
 from fes_pin.walk.recording import WalkRecording
@@ -66,7 +64,7 @@ class Designs:
 
     def __init__(self, recordings: Sequence[WalkRecording], seed: int = 0) -> None:
         self.recordings, self.seed = list(recordings), seed
-        self.forms = _by_name()
+        self.forms = {form.label: form for form in walk_library()}
         self.shift = next(n for n, f in self.forms.items() if f.shifts)
         trials = [r.trial() for r in self.recordings]
         self.strides: Strides = strides_of(trials, self.recordings[0].session.cutoff_hz)
@@ -74,12 +72,6 @@ class Designs:
         self.as_read = self._design(trials, 0.0)
         self._turn(self.as_read.y)
         self.shifted = self._shifted()
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {n: v for n, v in vars(self).items() if n != "forms"}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        vars(self).update(state, forms=_by_name())  # forms hold functions, which are the library's own
 
     def _design(self, trials: list[WalkTrial], later_s: float) -> Design:
         x = {n: self.strides.mean([form.columns(s) for s in trials]) for n, form in self.forms.items()}
@@ -177,10 +169,6 @@ class Designs:
 
     def _none(self) -> np.ndarray:
         return np.zeros((*self.as_read.y.shape, 0))
-
-
-def _by_name() -> dict[str, Form]:
-    return {form.label: form for form in walk_library()}
 
 
 def _taken(trials: list[WalkTrial], strides: Strides) -> np.ndarray:

@@ -1,6 +1,6 @@
 """Signals of a walk by stride, as waves of the stride: means over strides, and differences between them."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -8,7 +8,6 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from fes_pin.body.joints import SIDES
-from fes_pin.walk.plates import Plates
 from fes_pin.walk.walk_trial import WalkTrial
 
 STILL_S = 1.2
@@ -80,57 +79,43 @@ def strides_of(trials: Sequence[WalkTrial], cutoff_hz: float) -> Strides:
 
     A record without two contacts, as of one standing still, is cut into windows of 1.2 s.
     """
-    windows, longest, whole = [], [], True
+    windows, whole = [], True
     for number, trial in enumerate(trials):
-        time = trial.motion.time
-        phase = _phase(time, trial.plates)
+        contacts = {side: _contacts(trial.motion.time, trial.plates.loaded[side]) for side in SIDES}
+        phase = _phase(trial.motion.time, contacts)
         first, last = phase[0], phase[-1] + (phase[-1] - phase[-2])
-        count = int(np.floor(last - first + 1e-6))
-        whole &= count > 0 and (_steps(time, trial.plates) or _stands(trial))
+        count, counts = int(np.floor(last - first + 1e-6)), [len(at) for at in contacts.values()]
+        steps = (
+            max(counts) > 1 or min(counts) > 0
+        )  # contacts determine a stride's length: two of a foot, or one of each
+        whole &= count > 0 and (steps or _stands(trial))
         for k in range(count):
             inside = np.flatnonzero((phase >= first + k) & (phase < first + k + 1 - 1e-9))
             rows = slice(int(inside[0]), int(inside[-1]) + 1)
             windows.append((number, rows, phase[rows] % 1.0))
-            longest.append((time[rows][-1] - time[rows][0], len(inside)))
         if not count:
-            windows.append((number, slice(0, len(time)), (phase - first) / (last - first)))
-            longest.append((time[-1] - time[0], len(time)))
-    waves = min(max(1, int(cutoff_hz * length)) for length, _ in longest)
-    waves = min(waves, *((samples - 2) // 3 for _, samples in longest))
+            windows.append((number, slice(0, len(phase)), (phase - first) / (last - first)))
+    times = [trials[number].motion.time[rows] for number, rows, _ in windows]
+    waves = min(min(max(1, int(cutoff_hz * (t[-1] - t[0]))), (len(t) - 2) // 3) for t in times)
     return Strides(windows, np.array([0, *(h for h in range(1, waves + 1) for _ in range(2))]), whole)
-
-
-def _steps(time: np.ndarray, plates: Plates) -> bool:
-    """Return whether contacts determine a stride's length: two of a foot, or one of each."""
-    counts = [len(_contacts(time, plates.loaded[side])) for side in SIDES]
-    return max(counts) > 1 or min(counts) > 0
 
 
 def _stands(trial: WalkTrial) -> bool:
     return bool(np.std(np.gradient(trial.centre, trial.dt, axis=0), axis=0).max() < STILL_MPS)
 
 
-def _phase(time: np.ndarray, plates: Plates) -> np.ndarray:
-    """Strides since the first contact: (n,)."""
-    best: np.ndarray = np.zeros(0)
-    for side, later in zip(reversed(SIDES), (0.0, 0.5), strict=True):
-        at = _contacts(time, plates.loaded[side])
-        if len(at) > len(best) and len(at) > 1:
-            best, shift = at, later
-    if len(best) < 2:
-        both = [(_contacts(time, plates.loaded[side])) for side in SIDES]
-        if all(len(at) for at in both):
-            half = abs(both[0][0] - both[1][0])
-            return (time - both[1][0]) / (2.0 * half)
-        return (time - time[0]) / min(STILL_S, time[-1] - time[0] + (time[1] - time[0]))
-    return make_interp_spline(best, np.arange(len(best)), k=1)(time) + shift
+def _phase(time: np.ndarray, contacts: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Return strides since the first contact, by the foot with more contacts: (n,)."""
+    left, right = contacts["left"], contacts["right"]
+    at, later = (left, 0.5) if len(left) > len(right) else (right, 0.0)
+    if len(at) > 1:
+        return make_interp_spline(at, np.arange(len(at)), k=1)(time) + later
+    if len(left) and len(right):
+        return (time - right[0]) / (2.0 * abs(left[0] - right[0]))
+    return (time - time[0]) / min(STILL_S, time[-1] - time[0] + (time[1] - time[0]))
 
 
 def _contacts(time: np.ndarray, loaded: np.ndarray) -> np.ndarray:
-    """Times at which a foot comes down."""
+    """Return the times at which a foot comes down."""
     at = time[1:][loaded[1:] & ~loaded[:-1]]
-    kept: list[float] = []
-    for t in at:
-        if not kept or t - kept[-1] > DEBOUNCE_S:
-            kept.append(float(t))
-    return np.array(kept)
+    return at[np.diff(at, prepend=-np.inf) > DEBOUNCE_S]
