@@ -48,7 +48,8 @@ def show_reactions(motion: Motion, plates: Plates, caption: str = "") -> BodySce
     scene = BodyScene(motion.body, f"{caption}: {words}" if caption else words, fps=round(1.0 / (every * motion.dt)))
     scene.opacity = SEEN_THROUGH
     scene.play(part.q[:, 7:])
-    scene.carry([pin.SE3(turn, place) for turn, place in _roots(part, way)])
+    places = (pin.XYZQUATToSE3(q[:7]) for q in part.q)
+    scene.carry([pin.SE3(place.rotation, place.translation - off) for place, off in zip(places, way, strict=True)])
     scene.arrows += [read, needed]
     return scene
 
@@ -60,11 +61,6 @@ def _way(motion: Motion) -> np.ndarray:
     way = line @ np.linalg.lstsq(line, centre, rcond=None)[0]
     way[:, 2] = 0.0
     return way
-
-
-def _roots(part: Motion, way: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-    places = (pin.XYZQUATToSE3(q[:7]) for q in part.q)
-    return [(place.rotation, place.translation - off) for place, off in zip(places, way, strict=True)]
 
 
 def _arrow(wrench: np.ndarray, way: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

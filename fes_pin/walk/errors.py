@@ -1,10 +1,11 @@
 """Errors of sets of causes in held-out strides: in newtons, and as evidence in units of the noise."""
 
+from functools import cache, partial
+
 import numpy as np
 
 from fes_pin.infer.held_out import Errors, added_likelihood, held_out_gain
 from fes_pin.infer.result import Evidence, Gain
-from fes_pin.infer.search import Names
 from fes_pin.walk.designs import Designs
 from fes_pin.walk.likelihood import fit_walk
 from fes_pin.walk.models import WalkFit, WalkModels
@@ -29,7 +30,7 @@ class StrideErrors:
         designs = models.designs
         height = designs.recordings[0].motion.body.height_m or 1.8
         self._scale = np.r_[np.ones(3), np.full(3, 1.0 / (ARM * height))][:, None]
-        self._residuals: dict[tuple[Names, bool], np.ndarray] = {}
+        self._residual = cache(partial(_residual_by_stride, designs))
         about_mean = designs.measured * (designs.strides.harmonics > 0)
         self._spread = np.sum((self._scale * about_mean) ** 2, axis=(1, 2))
         y, _ = designs.by_stride(())
@@ -62,11 +63,6 @@ class StrideErrors:
         before, after = (_whitened(self._residual(one, True), self.models.designs, best) for one in (without, best))
         every = [added_likelihood(*pair) for pair in zip(before, after, strict=True)]
         return Evidence(*np.mean([(e.added, e.squares) for e in every], axis=0).tolist())
-
-    def _residual(self, one: WalkFit, held_out: bool) -> np.ndarray:
-        if (one.names, held_out) not in self._residuals:
-            self._residuals[one.names, held_out] = _residual_by_stride(self.models.designs, one, held_out)
-        return self._residuals[one.names, held_out]
 
 
 def _residual_by_stride(designs: Designs, one: WalkFit, held_out: bool) -> np.ndarray:

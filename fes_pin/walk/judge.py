@@ -21,20 +21,20 @@ def other_leg(designs: Designs, one: WalkFit) -> float | None:
     along = [(trial, designs.signals(one.names, trial)) for trial in designs.design(one.names).trials]
     left = np.concatenate([trial.residual - x @ one.fitted.values for trial, x in along])
     scale = 1.0 / np.maximum(np.sqrt(np.mean(left**2, axis=0)), FLOOR_N)
-    data: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {"left": [], "right": []}
+    legs: dict[str, list[np.ndarray]] = {"left": [], "right": []}
     for trial, x in along:
+        both = scale[:, None] * np.concatenate([trial.residual[..., None], x], axis=2)
         for side, rows in trial.plates.single_supports():
-            data[side].append((trial.residual[rows] * scale, x[rows] * scale[:, None]))
-    if not all(data.values()):
+            legs[side].append(both[rows].reshape(-1, both.shape[2]))
+    if not all(legs.values()):
         return None
-    legs = {side: [np.concatenate([part[k] for part in parts]) for k in (0, 1)] for side, parts in data.items()}
+    one_leg, other = (np.concatenate(parts) for parts in legs.values())
     prior = designs.plausible(one.names)
     before, after = 0.0, 0.0
-    for fitted, tested in (("left", "right"), ("right", "left")):
-        y, x = legs[fitted]
-        values = prior * np.linalg.lstsq(x.reshape(-1, x.shape[2]) * prior, y.ravel(), rcond=None)[0]
-        y, x = legs[tested]
-        before, after = before + float(np.sum(y**2)), after + float(np.sum((y - x @ values) ** 2))
+    for fitted, tested in ((one_leg, other), (other, one_leg)):
+        values = prior * np.linalg.lstsq(fitted[:, 1:] * prior, fitted[:, 0], rcond=None)[0]
+        before += float(np.sum(tested[:, 0] ** 2))
+        after += float(np.sum((tested[:, 0] - tested[:, 1:] @ values) ** 2))
     return 100.0 * (before - after) / before
 
 

@@ -57,15 +57,14 @@ def _check_sides(motion: Motion, plates: Plates) -> None:
     if not supports:
         return
     poses = segment_poses(motion)
-    other = {"left": "right", "right": "left"}
-    own, cross = 0.0, 0.0
-    for side, rows in supports:
-        point = plates.pressure[side][rows, :2]
-        for name in (side, other[side]):
-            above = "shank" if name == motion.body.stance else "hindfoot"  # links begin at the joint towards the ground
-            ankle = poses[f"{name}_{above}"][1][rows, :2]
-            apart = float(np.sum(np.linalg.norm(ankle - point, axis=1)))
-            own, cross = (own + apart, cross) if name == side else (own, cross + apart)
+    above = {name: "shank" if name == motion.body.stance else "hindfoot" for name in SIDES}  # links begin at the joint
+    ankles = {name: poses[f"{name}_{link}"][1] for name, link in above.items()}  # towards the ground
+
+    def apart(name: str, side: str, rows: slice) -> float:
+        return float(np.sum(np.linalg.norm((ankles[name] - plates.pressure[side])[rows, :2], axis=1)))
+
+    own = sum(apart(side, side, rows) for side, rows in supports)
+    cross = sum(apart(SIDES[1 - SIDES.index(side)], side, rows) for side, rows in supports)
     if cross < NEARER * own:
         raise InputError("the right plate's centre of pressure lies under the left foot: the feet are exchanged")
 

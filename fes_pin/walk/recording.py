@@ -129,7 +129,10 @@ def _recording(trial: Trial, body: Body, hip: np.ndarray, cutoff_hz: float) -> W
     if inside.sum() < FEWEST:
         raise InputError(f"trial {trial.name} has {inside.sum()} samples of motion and reaction together", file=source)
     session = Session(cutoff_hz, trial.conditions.get("belt_speed_mps", 0.0), float(time[0]))
-    moved, read = partial(motion_of, body, hip=hip, session=session), partial(plates_of, columns=raw, session=session)
+    moved, read = (
+        partial(motion_of, body, hip=hip, session=session),
+        partial(plates_of, columns=dict(raw), session=session),
+    )
     try:
         motion = moved(time, columns).part(inside)
         plates = read(raw_time, at=motion.time)

@@ -1,6 +1,7 @@
 """The diagnosis of walking: what is hidden is named, what is not hidden is not, and all of it is said."""
 
 import json
+import pickle
 import re
 import tomllib
 from urllib.parse import unquote
@@ -56,6 +57,7 @@ def test_files_are_as_the_contract_says(heavy):
         assert set(plan["separates"]) <= {heavy.causes[0].name, *heavy.causes[0].equivalents}
         assert plan["trial"] is None or plan["trial"]["file"] in files
     assert heavy.causes[0].name in str(heavy)
+    assert pickle.loads(pickle.dumps(heavy)).files()["diagnosis.json"] == files["diagnosis.json"]
     assert set(record["provenance"]["inputs"]) >= {"study.toml", "coords.csv", "grf.csv"}
 
 
