@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from itertools import pairwise
 
 import numpy as np
-from scipy.ndimage import distance_transform_edt
+from scipy.ndimage import distance_transform_edt, find_objects, label
 
 from fes_pin.body.joints import SIDES
 from fes_pin.body.skeleton import TO_WORLD
@@ -61,14 +60,15 @@ class Plates:
 
     def single_supports(self) -> list[tuple[str, slice]]:
         """Single supports in the order of time: the foot and its samples."""
-        kind = self.support()
-        ends = np.flatnonzero(np.r_[True, kind[1:] != kind[:-1], True])
-        dt = float(self.time[-1] - self.time[0]) / (len(self.time) - 1)
-        return [
-            (str(kind[a]), slice(int(a), int(b)))
-            for a, b in pairwise(ends)
-            if kind[a] in SIDES and (b - a) * dt >= SHORTEST_S
-        ]
+        kind, dt = self.support(), float(self.time[-1] - self.time[0]) / (len(self.time) - 1)
+        found = [(side, rows) for side in SIDES for rows in stretches(kind == side)]
+        long = [(side, rows) for side, rows in found if (rows.stop - rows.start) * dt >= SHORTEST_S]
+        return sorted(long, key=lambda one: one[1].start)
+
+
+def stretches(where: np.ndarray) -> list[slice]:
+    """Return the stretches of samples in which something holds, in the order of time."""
+    return [rows for (rows,) in find_objects(label(where)[0])]
 
 
 def plates_of(

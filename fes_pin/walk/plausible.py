@@ -7,7 +7,7 @@ from fes_pin.body.joints import SIDES
 from fes_pin.data.errors import InputError
 from fes_pin.walk.dynamics import centre_of_mass, required, segment_poses
 from fes_pin.walk.motion import Motion
-from fes_pin.walk.plates import LOADED_N, Plates
+from fes_pin.walk.plates import LOADED_N, Plates, stretches
 
 FAR_M = 1.5
 """No centre of pressure lies further from the body than this, level: a long step is 1 m."""
@@ -17,7 +17,7 @@ below a third (`fits.POSSIBLE`)."""
 NEARER = 0.6
 """Share of its distance to one ankle at which a centre of pressure is the other foot's; one who stands may share it."""
 FULLY = 0.9
-"""Share of what they carry in a stretch's middle that plates carry all through it; else a foot next to them carries."""
+"""Share of what they usually carry that plates carry all through a stretch; else a foot next to them carries."""
 NEARLY_ALL = 0.95
 """Share of a trial that plates carry from which on all of it is used."""
 ENOUGH_S = 0.3
@@ -81,26 +81,18 @@ def carried_along(motion: Motion, plates: Plates) -> slice:
     """
     size = max(1, round(MEAN_S / motion.dt))
     needed, up = (uniform_filter1d(x[:, 2], size, mode="nearest") for x in (required(motion), plates.total))
-    whole = up > np.maximum(CARRIED * needed, LOADED_N)
-    whole |= needed < LOADED_N  # in the air nothing is to be carried
-    if whole.mean() > NEARLY_ALL:
-        return slice(0, len(whole))
-    ends = np.flatnonzero(np.diff(np.r_[False, whole, False].astype(int)))
-    start, stop = max(zip(ends[::2], ends[1::2], strict=True), key=lambda e: e[1] - e[0], default=(0, 0))
-    start, stop = _fully(up / np.maximum(needed, LOADED_N), start, stop)
+    share = up / np.maximum(needed, LOADED_N)
+    in_the_air = needed < LOADED_N  # where nothing is to be carried
+    carried = (share > CARRIED) & (up > LOADED_N)
+    if np.mean(carried | in_the_air) > NEARLY_ALL:
+        return slice(0, len(up))
+    fully = carried & (share > FULLY * np.median(share[carried])) if carried.any() else carried
+    longest = max(stretches(fully | in_the_air), key=lambda rows: rows.stop - rows.start, default=slice(0, 0))
+    start, stop = longest.start, longest.stop
     if (stop - start) * motion.dt < ENOUGH_S:
         raise InputError(
             f"the plates carry the whole body for {(stop - start) * motion.dt:.2f} s at a time at most, "
             f"{ENOUGH_S:g} s are needed: does a foot step next to them?",
             column="r_Fy" if plates.loaded["right"].mean() < plates.loaded["left"].mean() else "l_Fy",
         )
-    return slice(int(start), int(stop))
-
-
-def _fully(share: np.ndarray, start: int, stop: int) -> tuple[int, int]:
-    """The part of a stretch about its middle in which the share carried is as in the middle."""
-    middle, quarter = (start + stop) // 2, max((stop - start) // 4, 1)
-    usual = np.median(share[max(middle - quarter, 0) : middle + quarter]) if stop > start else 0.0
-    low = np.flatnonzero(share[start:stop] < FULLY * usual) + start
-    before, after = low[low < middle], low[low >= middle]
-    return int(before[-1]) + 1 if len(before) else start, int(after[0]) if len(after) else stop
+    return longest
