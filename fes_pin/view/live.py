@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import time
+from contextlib import AbstractContextManager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from threading import Thread
 
@@ -23,7 +24,7 @@ setInterval(async () => {{
 """A page asks which scene is shown, and is loaded again when that has changed."""
 
 
-class LiveViewer:
+class LiveViewer(AbstractContextManager["LiveViewer"]):
     """A server in a thread of this process, until `close` or the end of a `with` block.
 
     It listens on the loopback address alone, for pages are open to whoever reaches the port; what is shown reaches it
@@ -54,7 +55,8 @@ class LiveViewer:
 
     def show(self, scene: BodyScene) -> None:
         """Show a scene instead of what was there before."""
-        self._server.show(scene.html())
+        count = self._server.shown[0] + 1
+        self._server.shown = (count, scene.html() + _FOLLOW.format(count=count))
 
     def wait(self) -> None:
         """Until the server ends or the caller is interrupted."""
@@ -65,9 +67,6 @@ class LiveViewer:
         """End the server."""
         self._server.shutdown()
         self._server.server_close()
-
-    def __enter__(self) -> LiveViewer:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
@@ -94,10 +93,6 @@ class _Answer(BaseHTTPRequestHandler):
 class _Server(ThreadingHTTPServer):
     allow_reuse_address = os.name == "posix"  # elsewhere it gives one port to two servers
     shown = (0, _FOLLOW.format(count=0))
-
-    def show(self, page: str) -> None:
-        count = self.shown[0] + 1
-        self.shown = (count, page + _FOLLOW.format(count=count))
 
 
 def _server() -> _Server:
