@@ -12,12 +12,13 @@ def required(motion: Motion) -> np.ndarray:
 
     It is given by the first six rows of Pinocchio's `rnea`, the efforts of the free joint, at the world's origin.
     """
-    out = np.empty((len(motion.time), 6))
-    data = motion.model.createData()
-    for k, (q, v, a) in enumerate(zip(motion.q, motion.v, motion.a, strict=True)):
-        root = pin.Force(pin.rnea(motion.model, data, q, v, a)[:6])
-        out[k] = pin.XYZQUATToSE3(q[:7]).act(root).vector
-    return out
+    model, data = motion.model, motion.model.createData()
+    root = (pin.rnea(model, data, q, v, a)[:6] for q, v, a in zip(motion.q, motion.v, motion.a, strict=True))
+    return np.array([_root_pose(q).act(pin.Force(one)).vector for q, one in zip(motion.q, root, strict=True)])
+
+
+def _root_pose(q: np.ndarray) -> pin.SE3:
+    return pin.XYZQUATToSE3(q[:7])
 
 
 def centre_of_mass(motion: Motion) -> np.ndarray:
@@ -50,8 +51,7 @@ def segment_poses(motion: Motion) -> dict[str, tuple[np.ndarray, np.ndarray]]:
 def segment_regressors(motion: Motion) -> dict[str, np.ndarray]:
     """Return the required ground reaction per unit of each segment's mass parameters.
 
-    Pinocchio's `jointBodyRegressor`, carried to the world's origin: the root's rows of `computeJointTorqueRegressor`
-    without its columns of zeros.
+    It is given by the root's rows of Pinocchio's `computeJointTorqueRegressor`, carried to the world's origin.
 
     Returns
     -------
@@ -59,18 +59,21 @@ def segment_regressors(motion: Motion) -> dict[str, np.ndarray]:
         By segment, (n, 6, 10): columns m, m c (3), Ixx, Ixy, Iyy, Ixz, Iyz, Izz about the link's origin, in its axes.
     """
     model, data = motion.model, motion.model.createData()
-    joints = {s: model.frames[model.getFrameId(s)].parentJoint for s in SEGMENT_NAMES}
-    out = {s: np.empty((len(motion.time), 6, 10)) for s in SEGMENT_NAMES}
-    for k, (q, v, a) in enumerate(zip(motion.q, motion.v, motion.a, strict=True)):
-        pin.rnea(model, data, q, v, a)
-        pin.updateGlobalPlacements(model, data)
-        for name, joint in joints.items():
-            out[name][k] = data.oMi[joint].toDualActionMatrix() @ pin.jointBodyRegressor(model, data, joint)
-    return out
+    rows = np.array(
+        [
+            _root_pose(q).toDualActionMatrix() @ pin.computeJointTorqueRegressor(model, data, q, v, a)[:6]
+            for q, v, a in zip(motion.q, motion.v, motion.a, strict=True)
+        ]
+    )
+    return {s: rows[:, :, 10 * (j - 1) : 10 * j] for s, j in _carriers(model).items()}
 
 
 def segment_parameters(motion: Motion) -> dict[str, np.ndarray]:
     """Return each segment's ten mass parameters as believed, in the order of `segment_regressors`: (10,)."""
-    model = motion.model
-    joints = {s: model.frames[model.getFrameId(s)].parentJoint for s in SEGMENT_NAMES}
-    return {s: model.inertias[j].toDynamicParameters() for s, j in joints.items()}
+    inertias = motion.model.inertias
+    return {s: inertias[j].toDynamicParameters() for s, j in _carriers(motion.model).items()}
+
+
+def _carriers(model: pin.Model) -> dict[str, int]:
+    """Return the joint of each segment."""
+    return {s: model.frames[model.getFrameId(s)].parentJoint for s in SEGMENT_NAMES}

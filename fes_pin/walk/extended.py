@@ -47,25 +47,19 @@ def with_segments(body: Body, parameters: dict[str, np.ndarray]) -> Body:
         If a segment's mass is not positive, or its inertia is impossible.
     """
     tree = fromstring(body.urdf)
-    for link in tree.iter("link"):
-        name = link.get("name", "")
-        if name not in parameters:
-            continue
-        one = pin.Inertia.FromDynamicParameters(parameters[name])
+    for name, own in parameters.items():
+        one = pin.Inertia.FromDynamicParameters(own)
         mass, moments = one.mass, np.linalg.eigvalsh(one.inertia)
         if mass <= 0.0 or moments[0] <= 0.0 or moments[2] > (moments[0] + moments[1]) * (1.0 + ROUNDED):
             raise InputError(
                 f"no body has a {name} of {mass:.3g} kg with moments {np.round(moments, 5).tolist()} kg m2"
             )
-        inertial = link.find("inertial")
-        if inertial is None:
-            raise InputError("the link has no inertial element", column=name)
         written = {
-            "origin": {"xyz": in_full(*one.lever)},
+            "origin": {"xyz": in_full(*one.lever), "rpy": "0 0 0"},
             "mass": {"value": in_full(mass)},
             "inertia": dict(zip(MOMENTS, map(in_full, one.inertia[np.triu_indices(3)]), strict=True)),
         }
-        for child in inertial:
+        for child in tree.iterfind(f"link[@name='{name}']/inertial/*"):
             child.attrib.update(written.get(child.tag, {}))
     text = '<?xml version="1.0"?>\n' + tostring(tree, encoding="unicode") + "\n"
     return replace(body, urdf=text, label=f"{body.label}, extended")

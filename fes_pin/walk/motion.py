@@ -14,6 +14,7 @@ from fes_pin.body.gait import pelvis_turns, postures_of_walk
 from fes_pin.body.skeleton import TO_WORLD
 from fes_pin.data.errors import InputError
 from fes_pin.data.motion import OPTIONAL, REQUIRED
+from fes_pin.data.numbers import numbers
 from fes_pin.data.smooth import CUTOFF_HZ, low_pass, rates
 
 PELVIS_TO_HIP = np.array([-0.0402431, -0.0376247, 0.0475290])
@@ -104,10 +105,7 @@ def pelvis_to_hip(body: Body, table: Mapping | None = None) -> np.ndarray:
     """
     place = ((table or {}).get("joints", {}).get("hip_r", {}) or {}).get("loc_in_parent")
     if place is not None:
-        try:
-            centre = np.array(place, dtype=float)
-        except (TypeError, ValueError):
-            centre = np.zeros(0)
+        centre = numbers(place, "joints.hip_r.loc_in_parent")
         if centre.shape != PELVIS_TO_HIP.shape or not np.isfinite(centre).all():
             raise InputError("must be three finite numbers in m", column="joints.hip_r.loc_in_parent")
         return centre

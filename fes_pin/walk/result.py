@@ -79,11 +79,7 @@ class WalkDiagnosis(Result):
 
     def own_record(self) -> dict[str, Any]:
         """Return the part of `diagnosis.json` that only a walk has."""
-        parameters = {
-            f"{c.name}.{n}": {"value": shown(one.value), "std": shown(one.std)}
-            for c in self.causes
-            for n, one in c.parameters.items()
-        }
+        parameters = {f"{c.name}.{n}": one.record() for c in self.causes for n, one in c.parameters.items()}
         nominal, extended = (
             {"fit": shown(f), "held_out": shown(h)} for f, h in (self.nominal_error, self.extended_error)
         )
@@ -101,9 +97,8 @@ class WalkDiagnosis(Result):
         """Return the root mean square residual of the extended model in the mean stride, by channel: N and N m."""
         residual = self.models.designs.residual(self.best.names, self.best.fitted.values)
         size = np.sqrt(np.sum(residual[0] ** 2, axis=1))
-        return {
-            name.replace(" ", "_"): {"std": shown(float(s)), "ar": []} for name, s in zip(CHANNELS, size, strict=True)
-        }
+        names = (name.replace(" ", "_") for name in CHANNELS)
+        return {name: {"std": shown(float(s)), "ar": []} for name, s in zip(names, size, strict=True)}
 
     def effect(self, name: str) -> type[WalkEffect] | None:
         """Return the class of a cause."""
