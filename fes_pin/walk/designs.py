@@ -181,7 +181,6 @@ def _taken(trials: list[WalkTrial], strides: Strides) -> np.ndarray:
     needed = strides.mean([s.needed[:, :, None] for s in trials])[..., 0]
     waves = needed * (h > 0)
     out = np.zeros((*waves.shape, 7))
-    for channel in range(6):
-        out[:, channel, :, channel] = TAKEN * waves[:, channel]
+    out[:, range(6), :, range(6)] = TAKEN * np.moveaxis(waves, 1, 0)
     out[..., 6] = TAKEN * waves * (h / 4.0) ** 2
     return out

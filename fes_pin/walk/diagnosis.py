@@ -65,7 +65,7 @@ def diagnose_walk(
         tell(0.85, "strides held out")
         out = _judged(study, search, found, seed)
     tell(1.0, "done")
-    out = replace(out, cutoff_hz=cutoff_hz, provenance=made, wall_s=time.perf_counter() - began)
+    out = replace(out, provenance=made, wall_s=time.perf_counter() - began)
     if not stops:
         return out
     said = f"the search was stopped at its limit of {limit:g} s: best set so far"

@@ -49,11 +49,8 @@ def lack_of_fit(designs: Designs, one: WalkFit) -> tuple[float, str]:
     mean = (y - x @ one.fitted.values).mean(axis=0)
     apart = np.sum((read - read.mean(axis=0)) ** 2, axis=0) / max(n - 1, 1) / n
     spread = apart if n > 1 else by_frequency(np.mean(designs.shaken**2, axis=0), waves)
-    smooth = spread.copy()
-    for h in np.unique(waves):
-        near = np.abs(waves - h) <= 1
-        smooth[:, waves == h] = spread[:, near].mean(axis=1, keepdims=True)
-    ratio = mean**2 / (smooth + FLOOR_N**2)
+    near = np.abs(waves[:, None] - waves) <= 1
+    ratio = mean**2 / (spread @ (near / near.sum(axis=0)) + FLOOR_N**2)
     free = ratio.size - one.degrees
     p_value = f_tail(float(ratio.sum()) / free, free, ratio.size * max(n - 1, 1))
     by_wave = np.array([ratio[:, waves == h].sum(axis=1) for h in np.unique(waves)]).T

@@ -156,10 +156,8 @@ def fit_many(y: np.ndarray, x: np.ndarray, prior: np.ndarray, noise: WalkNoise, 
 
 def by_frequency(values: np.ndarray, harmonics: np.ndarray) -> np.ndarray:
     """Return values (..., k) of coefficients, each the mean over those of its frequency."""
-    out = np.array(values)
-    for h in np.unique(harmonics):
-        out[..., harmonics == h] = values[..., harmonics == h].mean(axis=-1, keepdims=True)
-    return out
+    same = harmonics[:, None] == harmonics
+    return values @ (same / same.sum(axis=0))
 
 
 class Spectra:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import math
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -22,8 +21,6 @@ POLICY = Policy(beam=4, fitted=None, pairs=0, judged=4)
 """Every form is fitted, so that no score test is needed."""
 MOST_FOR_NOISE = 2
 """Most causes in the set from whose residual the noise is estimated."""
-ALIKE = 2
-"""Number of sets of the same causes, at other sites, that the search extends."""
 TOGETHER = 64
 """Fits that are made at once: as many as fit a processor's cache."""
 
@@ -128,17 +125,6 @@ class WalkModels(FittedSets[WalkFit, None]):
     def is_possible(self, fitted: WalkFit) -> bool:
         """Return whether every size of a fit is possible."""
         return math.isfinite(fitted.criterion)
-
-    def near(self, size: int, without: Sequence[Names] = ()) -> list[Names]:
-        """Return the best sets of a size, best first, except some: at most `ALIKE` of the same causes."""
-        count: Counter[tuple[str, ...]] = Counter()
-        kept = []
-        for names in self.ranked(size):
-            causes = tuple(sorted(self.designs.forms[n].cause for n in names))
-            if names not in without and self.is_possible(self.fits[names]) and count[causes] < ALIKE:
-                count[causes] += 1
-                kept.append(names)
-        return kept
 
     def noise_p_value(self, gain: float, degrees: int) -> float:
         """Return the p-value of a gain over all forms by the simulated null; 0 before the noise is known."""

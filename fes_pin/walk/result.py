@@ -8,7 +8,6 @@ import tomli_w
 
 from fes_pin.body.build import Body
 from fes_pin.data.results import Result
-from fes_pin.data.smooth import CUTOFF_HZ
 from fes_pin.infer.result import CROSS_VALIDATED, FITTED, Cause, Explained, shown
 from fes_pin.infer.text import percent, probability
 from fes_pin.walk.effect import WalkEffect
@@ -45,13 +44,17 @@ class WalkDiagnosis(Result):
     next_experiment: NextWalk | None = None
     models: WalkModels
     best: WalkFit
-    cutoff_hz: float = CUTOFF_HZ
     MODEL: ClassVar[str] = "the walking model"
 
     @property
     def model(self) -> Body:
         """The body with the estimated masses, centres and inertias."""
         return extended_body(self.models, self.best)
+
+    @property
+    def cutoff_hz(self) -> float:
+        """Cut-off of the low pass, Hz."""
+        return self.models.designs.recordings[0].session.cutoff_hz
 
     @property
     def judged_on(self) -> str:

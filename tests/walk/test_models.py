@@ -8,7 +8,7 @@ import pytest
 from fes_pin.data.study import read_study
 from fes_pin.infer.levels import POSSIBLE_SIZES, WALK_LEVEL
 from fes_pin.walk.designs import Designs
-from fes_pin.walk.models import ALIKE, WalkModels, WalkSearch
+from fes_pin.walk.models import WalkModels, WalkSearch
 from fes_pin.walk.recording import recordings_of
 from fes_pin.walk.verdict import WalkVerdict, marker_noise
 from fes_pin.workers import OutOfTime, noting_stops, time_limit
@@ -39,14 +39,6 @@ def test_a_set_has_no_two_forms_of_one_cause_at_one_site(models):
     further = models.candidates(base)
     assert not any(forms[n].cause == "segment_com" and forms[n].site.startswith("trunk") for n in further)
     assert "segment_com (pelvis, forward)" in further and "segment_mass (trunk)" in further
-
-
-def test_few_sets_of_the_same_causes_are_extended(models):
-    near = models.near(1)
-    causes = [models.designs.forms[name].cause for (name,) in near]
-    assert max(map(causes.count, causes)) == ALIKE
-    assert near[0] == models.ranked(1)[0]
-    assert models.near(1, near[:1])[0] != near[0]
 
 
 def test_sizes_that_cannot_be_are_no_explanation(models):

@@ -37,6 +37,5 @@ class LaboratoryTilt(WalkEffect):
 def _tilted(trial: WalkTrial, axes: tuple[int, ...]) -> np.ndarray:
     mass = sum(p[0] for p in trial.parameters.values())
     out = np.zeros((len(trial.centre), 6, len(axes)))
-    for k, axis in enumerate(axes):
-        out[:, axis, k] = -mass * GRAVITY
+    out[:, axes, range(len(axes))] = -mass * GRAVITY
     return out

@@ -34,13 +34,11 @@ AXES = (0, 1, 2)
 
 
 def _scaled(trial: WalkTrial, sides: tuple[str, ...], axes: tuple[int, ...]) -> np.ndarray:
-    total = np.zeros((len(trial.centre), 6, 1))
-    for side in sides:
-        if axes == AXES:
-            total[:, :, 0] += trial.true_feet[side]
-            continue
-        force = np.zeros((len(trial.centre), 3))
-        force[:, axes] = trial.true_feet[side][:, axes]
-        arm = trial.plates.pressure[side] - trial.centre
-        total[:, :, 0] += np.hstack([force, np.cross(arm, force)])
-    return total
+    return np.sum([_part(trial, side, axes) for side in sides], axis=0)[:, :, None]
+
+
+def _part(trial: WalkTrial, side: str, axes: tuple[int, ...]) -> np.ndarray:
+    if axes == AXES:
+        return trial.true_feet[side]
+    force = trial.true_feet[side][:, :3] * np.isin(AXES, axes)
+    return np.hstack([force, np.cross(trial.plates.pressure[side] - trial.centre, force)])

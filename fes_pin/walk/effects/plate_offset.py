@@ -49,11 +49,10 @@ class PlateOffset(WalkEffect):
 
 
 def _constant(trial: WalkTrial, sides: tuple[str, ...], axis: int, loaded: bool) -> np.ndarray:
-    total = np.zeros((len(trial.centre), 6, 1))
-    for side in sides:
-        share = trial.plates.loaded[side].astype(float) if loaded else np.ones(len(trial.centre))
-        total[:, :, 0] += share[:, None] * trial.force_at(trial.plates.pressure[side], np.eye(3)[axis])
-    return total
+    unit = {side: trial.force_at(trial.plates.pressure[side], np.eye(3)[axis]) for side in sides}
+    return np.sum([w * (trial.plates.loaded[s][:, None] if loaded else 1.0) for s, w in unit.items()], axis=0)[
+        ..., None
+    ]
 
 
 def _unloaded(trial: WalkTrial, sides: tuple[str, ...], axis: int) -> tuple[np.ndarray, float] | None:
@@ -73,7 +72,5 @@ def near(loaded: np.ndarray, reach: int) -> np.ndarray:
 
 
 def _displaced(trial: WalkTrial, sides: tuple[str, ...], axis: int) -> np.ndarray:
-    total = np.zeros((len(trial.centre), 6, 1))
-    for side in sides:
-        total[:, 3:, 0] += np.cross(np.eye(3)[axis], trial.feet[side][:, :3])
-    return total
+    force = np.sum([trial.feet[side][:, :3] for side in sides], axis=0)
+    return np.hstack([0.0 * force, np.cross(np.eye(3)[axis], force)])[:, :, None]
