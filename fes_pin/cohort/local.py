@@ -5,7 +5,7 @@ import os
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, ThreadPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, ThreadPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from functools import partial
 from itertools import islice
@@ -16,12 +16,35 @@ from fes_pin.cohort.one import Answer, Work
 STUDIES_EACH = 25
 """Studies that a process diagnoses before a new one takes its place: a bound on what it may have gathered."""
 DIED = "the process that diagnosed it died: out of memory, or killed"
+DEATHS = ("BrokenProcessPool", "KilledWorker", "NoneType")
+"""Errors of a study whose process died, or whose workers died more often than a scheduler allows."""
 
 Task = tuple[Work, str]
 
 
+def as_they_come(tasks: Iterable[Task], begin: Callable[[Task], Future[Answer]], at_once: int) -> Iterator[Answer]:
+    """Yield answers as they come; at most `at_once` studies are under way, and no more answers are held.
+
+    A study whose process died is an answer as well.
+    """
+    left = iter(tasks)
+    under_way = {begin(task): task for task in islice(left, at_once)}
+    while under_way:
+        for future in wait(under_way, return_when=FIRST_COMPLETED).done:
+            yield _answer(future, *under_way.pop(future))
+            under_way |= {begin(task): task for task in islice(left, 1)}
+
+
+def _answer(future: Future[Answer], work: Work, key: str) -> Answer:
+    problem = None if (lost := future.cancelled()) else future.exception()
+    if problem is None and not lost:
+        return future.result()
+    words = DIED if type(problem).__name__ in DEATHS else f"{type(problem).__name__}: {problem}"
+    return Answer(work.name, key, {}, " ".join(words.split())[:500], again=True)
+
+
 def in_processes(tasks: Iterable[Task], workers: int, run: Callable[[Work, str], Answer]) -> Iterator[Answer]:
-    """Answers as they come; no more studies than processes are under way, and no more answers are held.
+    """Yield answers as they come.
 
     Each process is a pool of its own, so that one that dies takes its study alone with it.
     """
@@ -35,17 +58,13 @@ def in_processes(tasks: Iterable[Task], workers: int, run: Callable[[Work, str],
             return process.submit(run, *task).result()
         except BrokenProcessPool:
             process = _process()
-            return Answer(task[0].name, task[1], {}, DIED, again=True)
+            raise
         finally:
             idle.put(process)
 
-    threads, left = ThreadPoolExecutor(workers), iter(tasks)
-    under_way = {threads.submit(answer, task) for task in islice(left, workers)}
+    threads = ThreadPoolExecutor(workers)
     try:
-        while under_way:
-            done, under_way = wait(under_way, return_when=FIRST_COMPLETED)
-            under_way |= {threads.submit(answer, task) for task in islice(left, len(done))}
-            yield from (future.result() for future in done)
+        yield from as_they_come(tasks, lambda task: threads.submit(answer, task), workers)
     finally:
         threads.shutdown(wait=False, cancel_futures=True)
         while not idle.empty():
