@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from fes_pin.comparison.held_out import Parting, fits_of, left_out_errors, partings, spread_noise
-from fes_pin.comparison.literature import NOMINAL, RIGS, possible, published_model
+from fes_pin.comparison.literature import RIGS, possible, published_model
 from fes_pin.comparison.result import Apart, Compared, Comparison, apart_from
 from fes_pin.data.asked import asked
 from fes_pin.data.errors import InputError
@@ -28,6 +28,8 @@ from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.store import load_model
 from fes_pin.workers import Progress, one_thread_each
+
+FEW = "too few trials to estimate how trials differ: the first seconds of a trial do not predict its others"
 
 
 def compare(
@@ -48,7 +50,7 @@ def compare(
         Of a stimulated muscle or ankle. Trials with the role "held_out" are predicted; without such roles each trial is
         predicted by fits without it.
     models
-        Names as in `literature.LITERATURE`, and "nominal"; by default all that the study's trials allow.
+        Names as in `literature.LITERATURE`; by default all that the study's trials allow.
     extended
         Models of one's own by name, as `diagnose` finds them: from memory or `model.toml`. They are refitted without
         the trials that they predict.
@@ -103,7 +105,7 @@ def compare(
         by="role" if held else "folds",
         horizon_s=horizon,
         given_s=given_s,
-        warnings=(*noted, *_warnings(ranked, given_s)),
+        warnings=(*noted, *([FEW] if given_s is not None and any("begun" not in m.percent for m in ranked) else [])),
         wall_s=time.perf_counter() - began,
     )
 
@@ -125,12 +127,8 @@ def _chosen(
     out = []
     names = possible(trials) if models is None else instance(models, Iterable, "models")
     for name in dict.fromkeys(str(name) for name in ([names] if isinstance(names, str) else names)):
-        if name == NOMINAL:
-            out.append(_Chosen(name, nominal))
-            continue
         one = published_model(name)
-        model = one.model(nominal, trials)
-        out.append(_Chosen(name, model, one.words, one.source, one.unfelt(nominal, trials)))
+        out.append(_Chosen(name, one.model(nominal, trials), one.words, one.source, one.unfelt(nominal, trials)))
     for name, given in instance({} if extended is None else extended, Mapping, "extended").items():
         own = given if isinstance(given, Model) else load_model(given, library=library)
         if own.rig.name != nominal.rig.name:
@@ -159,7 +157,7 @@ def _compared(
     whole = fits[0] if len(parts) == 1 else fit_multistart(Problem(one.model, fitted, white))
     trials = [t for p in parts for t in p.held]
     columns = np.array([one.model.rig.output(t.kind) for t in trials])
-    weight = np.array([len(t) / floor[c].std ** 2 for t, c in zip(trials, columns, strict=True)])
+    weight = np.array([np.isfinite(t[c]).sum() / floor[c].std ** 2 for t, c in zip(trials, columns, strict=True)])
     around = weight * kinds.pop("around")
     squares = {n: len(trials) * 100.0 * weight * e / around.sum() for n, e in kinds.items()}
     return Compared(
@@ -182,15 +180,13 @@ def _compared(
 
 def _with_apart(ranked: Sequence[Compared], folds: int) -> list[Compared]:
     """The models, each held against the best by either kind of error."""
-    apart: dict[str, dict[str, Apart | None]] = {m.name: {} for m in ranked}
-    for kind in ("free", "horizon"):
-        best = min(ranked, key=lambda m: m.percent[kind])
-        for one in ranked:
-            same = one is best
-            apart[one.name][kind] = (
-                None if same else apart_from(best.squares[kind], one.squares[kind], len(ranked) - 1, folds)
-            )
-    return [replace(m, apart=apart[m.name]) for m in ranked]
+    best = {kind: min(ranked, key=lambda m: m.percent[kind]) for kind in ("free", "horizon")}
+
+    def apart(one: Compared, kind: str) -> Apart | None:
+        first = best[kind].squares[kind]
+        return None if one is best[kind] else apart_from(first, one.squares[kind], len(ranked) - 1, folds)
+
+    return [replace(m, apart={kind: apart(m, kind) for kind in best}) for m in ranked]
 
 
 def _horizon(study: Study, trials: Sequence[Trial], asked: float | None) -> float:
@@ -206,12 +202,6 @@ def _check_time(value: float, trials: Sequence[Trial], name: str) -> None:
         raise InputError(
             f"expected seconds between 0 and {shortest:.4g}, the shortest trial; found {value:g}", column=name
         )
-
-
-def _warnings(ranked: Sequence[Compared], given_s: float | None) -> list[str]:
-    if given_s is not None and any("begun" not in m.percent for m in ranked):
-        return ["too few trials to estimate how trials differ: the first seconds of a trial do not predict its others"]
-    return []
 
 
 __all__ = ["compare"]

@@ -8,10 +8,10 @@ import numpy as np
 
 from fes_pin.comparison.own_part import own_part, pairs_of, stride
 from fes_pin.data.trial import Trial
+from fes_pin.diagnosis.errors_ahead import free_residuals
 from fes_pin.diagnosis.held_out import folds_of
 from fes_pin.identify.ahead import forecast, own_noise
 from fes_pin.identify.fit import Fit, fit_multistart
-from fes_pin.identify.per_trial import predictions
 from fes_pin.identify.problem import Problem
 from fes_pin.infer.held_out import within
 from fes_pin.infer.levels import RUNAWAY
@@ -71,18 +71,14 @@ def left_out_errors(
 
 
 def _of_parting(fitted: Fit, part: Parting, horizon_s: float, given_s: float | None) -> dict[str, np.ndarray]:
-    noise, rig = own_noise(fitted), fitted.model.rig
-    free, ahead, around = [], [], []
-    for trial, readings in zip(part.held, predictions(fitted.model, part.held, fitted.noise), strict=True):
-        name = rig.output(trial.kind)
-        most = RUNAWAY * fitted.noise[name].std
-        left = within(trial[name] - readings[:, 0], most)
-        free.append(float(np.mean(left**2)))
-        predicted = forecast(left, noise[name], trial.dt, horizon_s)
-        ahead.append(float(np.mean(within(left - predicted, most) ** 2)))
-        around.append(float(np.var(trial[name])))
+    noise, rows = own_noise(fitted), []
+    for trial in part.held:
+        name = fitted.model.rig.output(trial.kind)
+        left = free_residuals(fitted.model, trial, fitted.noise)[name]
+        ahead = left - forecast(np.nan_to_num(left), noise[name], trial.dt, horizon_s)
+        rows.append([np.nanmean(left**2), np.nanmean(ahead**2), np.nanvar(trial[name])])
     begun = {} if given_s is None else _begun(fitted, part, given_s)
-    return {"free": np.array(free), "horizon": np.array(ahead), **begun, "around": np.array(around)}
+    return {**dict(zip(("free", "horizon", "around"), np.transpose(rows), strict=True)), **begun}
 
 
 def _begun(fitted: Fit, part: Parting, given_s: float) -> dict[str, np.ndarray]:

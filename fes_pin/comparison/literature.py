@@ -84,11 +84,7 @@ class Published:
             held = dict(self.fixed)
             left = tuple(n for n in rig.fitted_parameters() if n not in held)
             rig = dataclasses.replace(rig, fitted=left, **held)  # type: ignore[arg-type]
-        model = Model(rig)
-        for effect in self.effects(trials):
-            if is_felt(model, effect, trials):
-                model = model + effect
-        return model
+        return Model(rig, tuple(e for e in self.effects(trials) if is_felt(nominal, e, trials)))
 
     def unfelt(self, nominal: Model, trials: Sequence[Trial]) -> tuple[str, ...]:
         """Names of its effects that act in none of these trials."""
@@ -119,6 +115,7 @@ def _contractile(trials: Sequence[Trial]) -> tuple[Effect, ...]:
 
 
 LITERATURE: tuple[Published, ...] = (
+    Published(NOMINAL, "", "", lambda _: ()),
     Published(
         "second_order",
         "two lags in series",
@@ -163,7 +160,7 @@ LITERATURE: tuple[Published, ...] = (
         fixed=(("time_constant_s", 0.02),),
     ),
 )
-"""In the order in which they are listed."""
+"""In the order in which they are listed, the study's own first."""
 
 
 def published_model(name: str) -> Published:
@@ -174,14 +171,13 @@ def published_model(name: str) -> Published:
     InputError
         If there is none.
     """
-    for one in LITERATURE:
-        if one.name == name:
-            return one
-    known = ", ".join((NOMINAL, *(m.name for m in LITERATURE)))
-    raise InputError(f"no model {name!r}; expected some of {known}", column="models")
+    known = {m.name: m for m in LITERATURE}
+    if name not in known:
+        raise InputError(f"no model {name!r}; expected some of {', '.join(known)}", column="models")
+    return known[name]
 
 
 def possible(trials: Sequence[Trial]) -> tuple[str, ...]:
     """Names of the models that can be fitted to these trials, the nominal first."""
     pulsed = all("stim" in t for t in trials)
-    return (NOMINAL, *(m.name for m in LITERATURE if pulsed or not m.pulses))
+    return tuple(m.name for m in LITERATURE if pulsed or not m.pulses)

@@ -36,6 +36,9 @@ class Apart:
         """Whether the interval is above zero, so that the difference is significant."""
         return self.low > 0.0
 
+    def __str__(self) -> str:
+        return f"{self.more:.2g} [{self.low:.2g}, {self.high:.2g}] %{'' if self.told else ' not significant'}"
+
     def record(self) -> dict[str, Any]:
         """The difference as `compare.json` has it."""
         return {"percent": shown(self.more), "low": shown(self.low), "high": shown(self.high), "told": self.told}
@@ -130,10 +133,10 @@ class Comparison(Saveable):
         InputError
             If it was not compared.
         """
-        for one in self.models:
-            if one.name == name:
-                return one
-        raise InputError(f"no model {name!r}; there are {', '.join(m.name for m in self.models)}", column="name")
+        known = {m.name: m for m in self.models}
+        if name not in known:
+            raise InputError(f"no model {name!r}; there are {', '.join(known)}", column="name")
+        return known[name]
 
     def best(self, kind: str = "free") -> tuple[str, ...]:
         """The models whose "free" or "horizon" error is not significantly above the least, the best first."""
@@ -221,16 +224,8 @@ def _row(found: Comparison, one: Compared) -> tuple[str, ...]:
     cells = [_cell(one, ("free",)), _cell(one, ("horizon",))]
     if found.given_s is not None:
         cells.append(_cell(one, ("free_rest", "begun")) if "begun" in one.percent else "-")
-    differences = []
-    for kind, word in (("free", "free"), ("horizon", "ahead")):
-        apart = one.apart[kind]
-        if apart is None:
-            differences.append(f"{word} best")
-        else:
-            interval = f"[{apart.low:.2g}, {apart.high:.2g}]"
-            unclear = "" if apart.told else " not significant"
-            differences.append(f"{word} {apart.more:.2g} {interval} %{unclear}")
-    return one.name, str(one.parameters), *cells, "; ".join(differences)
+    apart = "; ".join(f"{word} {one.apart[kind] or 'best'}" for kind, word in (("free", "free"), ("horizon", "ahead")))
+    return one.name, str(one.parameters), *cells, apart
 
 
 def _cell(one: Compared, kinds: Sequence[str]) -> str:
