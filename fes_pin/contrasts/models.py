@@ -24,7 +24,7 @@ from fes_pin.workers import in_parallel
 FITTED, FITTED_DRIVEN = 10, 6
 """Items of largest score that are fitted with a set; on driven rigs a fit takes some five times as long."""
 
-POLICY = Policy(fitted=None, pairs=0)
+POLICY = Policy(fitted=None)
 """`candidates` are those of largest score."""
 
 Found = SearchResult[Grouped]

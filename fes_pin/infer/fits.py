@@ -77,10 +77,6 @@ class FittedSets(ABC, Generic[F, S]):
         """Return the family-wise p-value of a gain in twice the log-likelihood against the noise."""
         return self.family.p_value(gain, degrees)
 
-    def pairs(self, most: int) -> Mapping[Names, S]:
-        """Return starts of the pairs of candidates of largest joint score in the nominal model."""
-        return {}
-
     def converged(self, fits: Sequence[F]) -> list[F]:
         """Return the converged fits."""
         return list(fits)
@@ -150,10 +146,6 @@ class FittedSets(ABC, Generic[F, S]):
         missing = {k: s for k, s in starts.items() if (k, forms) not in self._begun and not self._has(k, forms)}
         self._begun.update((k, forms) for k in missing)
         self._add(fitted, missing)
-
-    def extend_by_pairs(self, most: int) -> None:
-        """Fit the pairs of candidates of largest joint score in the nominal model that are not yet fitted."""
-        self._add(self.fits[()], {k: s for k, s in self.pairs(most).items() if k not in self.fits})
 
     def _has(self, names: Names, forms: frozenset[Hashable]) -> bool:
         return names in self.fits and forms <= self.form_of(self.fits[names])

@@ -65,9 +65,6 @@ class Models(Protocol[F, M_co]):
     def extend(self, base: Names, most: int | None = None) -> None:
         """Fit a set with each further candidate, or with the `most` of largest score."""
 
-    def extend_by_pairs(self, most: int) -> None:
-        """Fit the pairs of candidates of largest joint score, for candidates that are not significant alone."""
-
     def converge(self, size: int, without: Sequence[Names] = ()) -> None:
         """Fit the best sets of a size until they converge, except some."""
 
@@ -128,8 +125,6 @@ class Policy:
     fitted
         Number of candidates of largest score that are fitted together with a set; None for all. With the nominal model
         all are fitted.
-    pairs
-        Number of pairs that the score test proposes, for candidates that are not significant alone.
     judged
         Number of sets of a size that are judged, lowest criterion first, until one is accepted.
     given
@@ -138,7 +133,6 @@ class Policy:
 
     beam: int = 3
     fitted: int | None = 8
-    pairs: int = 4
     judged: int = 3
     given: Names | None = None
 
@@ -268,11 +262,9 @@ class Search(Generic[F, M]):
         return self._sets.extension_p_value(fitted) < UNUSUAL_LEVEL or not self._sets.leaves_noise(fitted)
 
     def _extend(self, size: int) -> None:
-        """Fit sets of a size: the best smaller ones with further candidates, and pairs of largest joint score."""
+        """Fit sets of a size: the best smaller ones with further candidates."""
         for names in self._sets.near(size - 1)[: self.policy.beam]:
             self._sets.extend(names, None if size == 1 else self.policy.fitted)
-        if size == 2:
-            self._sets.extend_by_pairs(self.policy.pairs)
 
     def _first_accepted(self, size: int, best: Names) -> Names | None:
         """Return the accepted set of a size of lowest criterion; sets that are not accepted are left out in turn."""

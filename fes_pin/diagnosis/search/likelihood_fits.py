@@ -14,7 +14,7 @@ from fes_pin.diagnosis.search.likelihood_forms import LikelihoodForms
 from fes_pin.diagnosis.search.likelihood_maxima import LikelihoodMaxima
 from fes_pin.diagnosis.search.likelihood_screen import LikelihoodScreen
 from fes_pin.diagnosis.search.possible import is_possible
-from fes_pin.diagnosis.search.score import Scored, best_by_effect, best_pairs
+from fes_pin.diagnosis.search.score import Scored, best_by_effect
 from fes_pin.diagnosis.search.starts import STARTS, from_afar, refinements, started
 from fes_pin.identify.correlation_time import with_new_noise
 from fes_pin.identify.likelihood import LikelihoodProblem
@@ -44,8 +44,8 @@ RESTART_SETS = 3
 alternation the best cause of a muscle, by 20 000 in twice the log-likelihood, was not among the first eight of
 twenty."""
 
-Starts = list[tuple[Scored, ...]]
-"""Causes by which a set is extended, with their linear estimates; one cause may have several shapes, best first."""
+Starts = list[Scored]
+"""Shapes of a cause by which a set is extended, with their linear estimates, best first."""
 
 
 class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
@@ -155,16 +155,11 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
     def candidates(self, base: LikelihoodFit) -> dict[str, Candidate[Starts]]:
         """Return the causes that a fit does not have, each with its shapes of largest score."""
         by_effect = best_by_effect(self.screen.scores(base).scored)
-        return {n: Candidate(many[0].gain, [(s,) for s in _of_much(many)]) for n, many in by_effect.items()}
-
-    def pairs(self, most: int) -> dict[Names, Starts]:
-        """Return starts of the pairs of causes of largest joint score in the nominal model."""
-        found = best_pairs(self.screen.scores(self.fits[()]), most)
-        return {tuple(sorted((a.probe.name, b.probe.name))): [(a, b)] for a, b in found}
+        return {n: Candidate(many[0].gain, _of_much(many)) for n, many in by_effect.items()}
 
     def begin(self, base: LikelihoodFit, starts: Mapping[Names, Starts]) -> dict[Names, LikelihoodFit]:
         """Return the best first fit of each set: at the noise of the base, with little process noise, and from afar."""
-        begun = {k: [_extended(base.model, one) for one in many] for k, many in starts.items()}
+        begun = {k: [base.model + started(s.probe.effect, s.amplitudes) for s in many] for k, many in starts.items()}
         looks = in_parallel(lambda k: self._first_fits(base, starts[k], begun[k]), list(starts))
         restarted = {k: [f] for k, f in self.calm.items()}
         restarted = restarted or self._restarted({names: models[0] for names, models in begun.items()}, base)
@@ -172,8 +167,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         return {names: min((*fits, *restarted.get(names, ())), key=lambda f: f.criterion) for names, fits in each}
 
     def _first_fits(self, base: LikelihoodFit, starts: Starts, models: Sequence[Model]) -> list[LikelihoodFit]:
-        alone = not base.model.effects and len(starts[0]) == 1
-        others = self._elsewhere(starts[0][0].probe.effect) if alone else []
+        others = [] if base.model.effects else self._elsewhere(starts[0].probe.effect)
         return [*(self._maxima.look(one, base) for one in models), *others]
 
     def _elsewhere(self, effect: Effect) -> list[LikelihoodFit]:
@@ -256,10 +250,3 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
 def _of_much(shapes: Sequence[Scored]) -> list[Scored]:
     """Return the shapes of a cause of largest score."""
     return [s for s in shapes[:STARTS] if s.gain >= 0.5 * shapes[0].gain]
-
-
-def _extended(model: Model, scored: Sequence[Scored]) -> Model:
-    """Return a model with further causes at their linear estimates."""
-    for one in scored:
-        model = model + started(one.probe.effect, one.amplitudes)
-    return model

@@ -28,7 +28,7 @@ class LikelihoodScreen:
     def scores(self, base: LikelihoodFit) -> Scores:
         """Return score tests of every effect that a fit does not have, at its noise; none in a fit that diverges."""
         if not math.isfinite(base.sse):
-            return Scores([], np.zeros((0, 0)), np.zeros(0), [])
+            return Scores([], np.zeros((0, 0)), [])
         if id(base) not in self._scores:
             wanted = [e for e in self._library.effects if e.name not in names_of(base) and self._library.felt(e)]
             groups = in_parallel(lambda e: self._probes(e, base), wanted)

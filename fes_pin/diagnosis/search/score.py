@@ -1,4 +1,4 @@
-"""Score tests of causes in a fit, one at a time and in pairs: the gain of each if the model were linear in it.
+"""Score tests of causes in a fit: the gain of each if the model were linear in it.
 
 C. R. Rao, Math. Proc. Camb. Phil. Soc. 44:50 (1948).
 """
@@ -16,9 +16,6 @@ from fes_pin.infer.family import Family
 from fes_pin.infer.levels import PARAMETER_PENALTY
 from fes_pin.infer.problem import Linearized
 from fes_pin.infer.projection import Projection, slices
-
-RIDGE = 1e-8
-"""Ridge of the scaled Gram matrix of two probes, which may be parallel."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +45,7 @@ def score_test(parts: Sequence[Linearized], probes: Sequence[Probe]) -> Scores:
     Probes whose amplitudes can differ between trials are scored both ways.
     """
     if not probes:
-        return Scores([], np.zeros((0, 0)), np.zeros(0), [])
+        return Scores([], np.zeros((0, 0)), [])
     projection = Projection(parts)
     made = projection.products([p.columns for p in probes])
     blocks = slices(p.columns.shape[1] for p in probes)
@@ -59,7 +56,7 @@ def score_test(parts: Sequence[Linearized], probes: Sequence[Probe]) -> Scores:
     if len(parts) > 1:
         varying = [(p, b) for p, b in zip(probes, blocks, strict=True) if p.effect.varies]
         out += [_each(projection, p, [c[:, b] for c in made.by_trial], float(made.before[b].sum())) for p, b in varying]
-    return Scores(out, made.gram, made.along, blocks)
+    return Scores(out, made.gram, blocks)
 
 
 def _each(projection: Projection, probe: Probe, partly: Sequence[np.ndarray], before: float) -> Scored:
@@ -98,15 +95,12 @@ class Scores:
         One for each probe, without its columns, followed by one for each probe that can differ between trials.
     gram
         Shape (k, k): inner products of all columns, the fitted parameters projected off.
-    along
-        Shape (k,): their inner products with the residual.
     blocks
         The rows of `gram` that belong to each probe.
     """
 
     scored: list[Scored]
     gram: np.ndarray
-    along: np.ndarray
     blocks: list[slice]
 
     def family(self, seed: int) -> Family:
@@ -138,58 +132,3 @@ def best_by_effect(scored: Sequence[Scored]) -> Mapping[str, list[Scored]]:
     for s in scored:
         out.setdefault(s.probe.name, []).append(s)
     return {n: sorted(v, key=lambda s: -s.gain) for n, v in out.items()}
-
-
-def best_pairs(scores: Scores, count: int) -> list[tuple[Scored, Scored]]:
-    """Return the pairs of effects of largest joint score, best first, each pair of names once."""
-    found: dict[tuple[str, str], tuple[Scored, Scored]] = {}
-    first, second, gains = _pair_gains(scores)
-    for k in np.argsort(-gains, kind="stable"):
-        i, j = int(first[k]), int(second[k])
-        one, other = scores.scored[i], scores.scored[j]
-        key = (other.probe.name, one.probe.name)
-        if key in found or one.probe.name == other.probe.name or not (one.kept > 0 and other.kept > 0):
-            continue
-        inside = _inside(scores, i, j)
-        if inside is not None:
-            found[key] = (replace(one, amplitudes=inside[0]), replace(other, amplitudes=inside[1]))
-            if len(found) == count:
-                break
-    return list(found.values())
-
-
-def _pair_gains(scores: Scores) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return every pair of probes and its joint gain without bounds; each of shape (pairs,).
-
-    Blocks are padded to one size with rows of the identity, which gain nothing.
-    """
-    size, rows = max(b.stop - b.start for b in scores.blocks), len(scores.along)
-    gram = np.eye(rows + 2 * size)
-    gram[:rows, :rows] = scores.gram
-    along = np.concatenate([scores.along, np.zeros(2 * size)])
-    spare = [np.arange(rows + k * size, rows + (k + 1) * size) for k in range(2)]
-    where = [np.stack([np.r_[b, fill][:size] for b in scores.blocks]) for fill in spare]
-    first, second = np.tril_indices(len(scores.blocks), -1)
-    at = np.concatenate([where[0][first], where[1][second]], axis=1)
-    inner, toward = gram[at[:, :, None], at[:, None, :]], along[at]
-    scale = 1.0 / np.sqrt(np.maximum(np.einsum("kii->ki", inner), 1e-300))
-    scaled = inner * scale[:, :, None] * scale[:, None, :] + RIDGE * np.eye(2 * size)
-    x = scale * np.linalg.solve(scaled, (toward * scale)[:, :, None])[:, :, 0]
-    return first, second, 2.0 * np.einsum("ki,ki->k", toward, x) - np.einsum("ki,kij,kj->k", x, inner, x)
-
-
-def _inside(scores: Scores, i: int, j: int) -> tuple[dict[str, float], dict[str, float]] | None:
-    """Return the amplitudes at which two probes together explain most; None if they are out of bounds."""
-    rows = np.r_[scores.blocks[i], scores.blocks[j]]
-    gram, along = scores.gram[np.ix_(rows, rows)], scores.along[rows]
-    keys = [(k, n) for k in (i, j) for n in scores.scored[k].probe.effect.amplitudes()]
-    info = [scores.scored[k].probe.effect.parameters()[n] for k, n in keys]
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(gram), 1e-300))
-    scaled = gram * np.outer(scale, scale) + RIDGE * np.eye(len(rows))
-    x = scale * np.linalg.solve(scaled, along * scale)
-    nulls = np.array([f.null or 0.0 for f in info])
-    if any(not f.lower <= v + z <= f.upper for f, v, z in zip(info, x, nulls, strict=True)):
-        return None
-    values = {key: float(v + z) for key, v, z in zip(keys, x, nulls, strict=True)}
-    one, other = ({n: v for (k, n), v in values.items() if k == which} for which in (i, j))
-    return one, other
