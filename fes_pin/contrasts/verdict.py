@@ -9,7 +9,7 @@ from fes_pin.contrasts.models import ContrastModels, ContrastSearch, Found
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.held_out import folds_of
 from fes_pin.infer.held_out import FOLDS, marginal_cost
-from fes_pin.infer.result import FITTED, Evidence, Gain, Remainder
+from fes_pin.infer.result import FITTED, Evidence, Gain
 from fes_pin.infer.verdict import State, Verdict, Weighed
 from fes_pin.workers import in_parallel
 
@@ -24,7 +24,6 @@ class ContrastWeighed(Weighed):
         Warnings about the lack of fit of groups.
     """
 
-    lack_of_fit: Remainder
     said: Sequence[str]
 
 

@@ -57,7 +57,6 @@ class RigWeighed(Weighed):
         Why the error of a simulation cannot be measurement noise; None where it may be.
     """
 
-    lack_of_fit: Remainder
     folds: Sequence[Fold]
     random: tuple[RandomPart, ...]
     no_noise: str | None

@@ -9,23 +9,15 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Generic, Protocol, TypeVar
+from typing import Generic, TypeVar
 
 from fes_pin.infer.held_out import is_supported
-from fes_pin.infer.result import Evidence, Gain
+from fes_pin.infer.result import Evidence, Gain, Remainder
 from fes_pin.infer.search import Fitted, M, Search, SearchResult
 
 F = TypeVar("F", bound=Fitted)
 
 CAUSES_FOUND, UNEXPLAINED, ADEQUATE, STOPPED = "causes_found", "unexplained", "adequate", "stopped"
-
-
-class LackOfFit(Protocol):
-    """The result of the tests of lack of fit."""
-
-    @property
-    def unexplained(self) -> bool:
-        """Whether the fit leaves more than noise."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +55,7 @@ class Weighed:
 
     gains: Mapping[str, Gain]
     evidence: Mapping[str, Evidence]
-    lack_of_fit: LackOfFit
+    lack_of_fit: Remainder
 
 
 W = TypeVar("W", bound=Weighed)
@@ -139,7 +131,7 @@ class Verdict(ABC, Generic[F, M, W]):
     def weigh(self, found: SearchResult[F]) -> W:
         """Return the evidence of held-out data and of the tests of lack of fit on a set."""
 
-    def lack_of_fit(self, state: State[F, M, W]) -> LackOfFit:
+    def lack_of_fit(self, state: State[F, M, W]) -> Remainder:
         """Return the lack of fit of a set, in view of the rejected candidates."""
         return state.weighed.lack_of_fit
 
@@ -245,7 +237,7 @@ def share_in(found: SearchResult[F], name: str) -> float:
     return (found.without[name].sse - found.best.sse) / max(whole, 1e-9)
 
 
-def word_of(has_candidates: bool, lack_of_fit: LackOfFit, stopped: bool = False) -> str:
+def word_of(has_candidates: bool, lack_of_fit: Remainder, stopped: bool = False) -> str:
     """Return the verdict in a word."""
     if stopped:
         return STOPPED

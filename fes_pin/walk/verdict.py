@@ -26,7 +26,6 @@ SURELY = normal_quantile(1.0 - CLAIM_LEVEL)
 class WalkWeighed(Weighed):
     """Evidence of a walk on each form of a set; `other_leg` is its gain on the other leg, None for one leg."""
 
-    lack_of_fit: Remainder
     other_leg: Mapping[str, float | None]
 
 

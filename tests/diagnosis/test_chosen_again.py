@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from diagnosis.hidden import study_of
 from identify.rigs import as_likely
@@ -12,6 +13,7 @@ from fes_pin.identify.fit import fit, fit_problem
 from fes_pin.identify.problem import Problem
 from fes_pin.infer.distributions import chi2_tail
 from fes_pin.infer.levels import PARAMETER_PENALTY
+from fes_pin.infer.problem import normal_equations
 from fes_pin.models.effects import effect_named
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.predictor import StateSpaceNoise
@@ -60,6 +62,10 @@ def test_what_one_trial_alone_speaks_for_is_not_chosen_without_it(fits):
         along = offset.parts[odd].jacobian[:, offset.free.index("effort_offset.offset")]
         parts = [*fitted.parts]
         parts[odd] = replace(part, residual=part.residual + push * along)
+        system = normal_equations(parts)  # the fit ends at the optimum of the moved readings
+        step = np.linalg.solve(system.hessian, system.gradient)
+        ends = zip(parts, system.local_steps(step), strict=True)
+        parts = [replace(p, residual=p.residual - p.jacobian @ step - p.local @ own) for p, own in ends]
         return replace(fitted, parts=tuple(parts), sse=sum(float(p.residual @ p.residual) for p in parts))
 
     again = ChosenAgain({(): moved(nominal), ("effort_offset",): moved(offset)}, improves)
@@ -73,7 +79,7 @@ def test_without_folds_nothing_is_said():
 
 
 def test_what_all_trials_promise_together_and_no_step_has_kept_counts_for_no_fold(fits):
-    """Slopes of a filter for gains as they are promise that; those of a free simulation keep it."""
+    """Slopes of a filter for gains as they are promise that."""
     offset = fits["effort_offset",]
     k, push = offset.free.index("effort_offset.offset"), 20.0 * offset.std("effort_offset.offset")
     parts = tuple(replace(p, residual=p.residual + push * p.jacobian[:, k]) for p in offset.parts)
@@ -87,6 +93,5 @@ def test_what_all_trials_promise_together_and_no_step_has_kept_counts_for_no_fol
         return many * sum(t.cost for t in others) - again._cost((), held)
 
     for held in folds_of(offset.trials):
-        assert gained(free, held) > gained(offset, held) + 100.0
         same = gained(as_likely(offset, noise), held)
         assert gained(as_likely(free, noise), held) == pytest.approx(same, abs=1e-3)

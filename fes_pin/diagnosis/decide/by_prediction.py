@@ -17,6 +17,7 @@ from fes_pin.diagnosis.search.likelihood_models import LikelihoodSearch
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.problem import limits_of
+from fes_pin.infer.covariance import least_squares_step
 from fes_pin.infer.levels import FORM_SHARE
 from fes_pin.infer.optimum import minimise
 from fes_pin.infer.problem import normal_equations
@@ -84,9 +85,7 @@ def _without(fitted: LikelihoodFit, held: Sequence[int]) -> Model:
     """Return the model without some trials, by one Gauss-Newton step from the fit to all."""
     system = normal_equations([p for i, p in enumerate(fitted.parts) if i not in held])
     moving = [k for k, n in enumerate(fitted.free) if n not in fitted.at_bound]
-    size = np.sqrt(np.maximum(np.diag(system.hessian)[moving], 1e-300))
-    scaled = system.hessian[np.ix_(moving, moving)] / np.outer(size, size)
-    step = np.linalg.lstsq(scaled, system.gradient[moving] / size, rcond=1e-12)[0] / size
+    step = least_squares_step(system.hessian[np.ix_(moving, moving)], system.gradient[moving], rcond=1e-12)
     limits = limits_of(fitted.model, fitted.trials)
     moved = {n: fitted.values[n] + d for n, d in zip((fitted.free[k] for k in moving), step, strict=True)}
     return fitted.model.with_parameters({n: float(np.clip(v, *limits[n])) for n, v in moved.items()})

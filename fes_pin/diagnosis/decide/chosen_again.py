@@ -18,19 +18,16 @@ Giordano, Stephenson, Liu, Jordan and Broderick, A Swiss army infinitesimal jack
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Generic, TypeVar
 
 import numpy as np
 
 from fes_pin.diagnosis.search.cause_sets import Names
-from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood_fit import LikelihoodFit
+from fes_pin.infer.covariance import least_squares_step
 from fes_pin.infer.levels import PARAMETER_PENALTY
 from fes_pin.infer.problem import normal_equations
 from fes_pin.infer.scatter import at_rest
 from fes_pin.infer.scoring import LITTLE
-
-F = TypeVar("F", bound=Fit)
 
 
 @dataclass(frozen=True)
@@ -43,7 +40,7 @@ class _Trial:
     curvature: np.ndarray
 
 
-class ChosenAgain(Generic[F]):
+class ChosenAgain:
     """Choice among sets that are fitted to the same trials.
 
     Parameters
@@ -55,12 +52,16 @@ class ChosenAgain(Generic[F]):
         causes together have another gain.
     """
 
-    def __init__(self, fits: Mapping[Names, F], improves: Callable[[F, F, float, float], bool]) -> None:
+    def __init__(
+        self,
+        fits: Mapping[Names, LikelihoodFit],
+        improves: Callable[[LikelihoodFit, LikelihoodFit, float, float], bool],
+    ) -> None:
         self._fits = {n: f for n, f in fits.items() if math.isfinite(f.sse)}
         self._improves = improves
         self._trials = {n: _by_trial(f) for n, f in self._fits.items()}
 
-    def without(self, held: Sequence[int]) -> F:
+    def without(self, held: Sequence[int]) -> LikelihoodFit:
         """Return the fit to all trials of the set that is chosen without some of them."""
         costs = {n: self._cost(n, held) for n in self._fits}
         best: Names = ()
@@ -78,38 +79,34 @@ class ChosenAgain(Generic[F]):
         every = self._trials[names]
         others = [t for i, t in enumerate(every) if i not in held]
         many = sum(t.readings for t in every) / sum(t.readings for t in others)
-        slope, curvature, step = _step(others)
-        gained = float(slope @ step)
-        if isinstance(self._fits[names], LikelihoodFit):  # no step reached the gain that slopes predict of all
-            _, _, kept = _step(every)
-            gained -= float(2.0 * slope @ kept - kept @ curvature @ kept)
+        (slope, curvature, step), (_, _, kept) = _step(others), _step(every)
+        gained = float(slope @ step - 2.0 * slope @ kept + kept @ curvature @ kept)
         return many * (sum(t.cost for t in others) - gained)
 
 
 def _step(trials: Sequence[_Trial]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return slope and curvature of half the cost of some trials, and the Gauss-Newton step to subtract."""
     slope, curvature = np.sum([t.slope for t in trials], axis=0), np.sum([t.curvature for t in trials], axis=0)
-    return slope, curvature, np.linalg.lstsq(curvature, slope, rcond=1e-12)[0]
+    return slope, curvature, least_squares_step(curvature, slope, rcond=1e-12)
 
 
-def _by_trial(fitted: Fit) -> list[_Trial]:
-    """Return each trial's part, of the parameters that are not at a bound, scaled to the size of each."""
+def _by_trial(fitted: LikelihoodFit) -> list[_Trial]:
+    """Return each trial's part, of the parameters that are not at a bound."""
     moving = [k for k, n in enumerate(fitted.free) if n not in fitted.at_bound]
     has_ended = fitted.together and fitted.gradient_norm < LITTLE
     each = [(p, normal_equations([p])) for p in (at_rest(fitted.parts) if has_ended else fitted.parts)]
-    size = np.sqrt(np.maximum(sum(np.diag(e.hessian)[moving] for _, e in each), 1e-300))
     return [
         _Trial(
             len(p.residual),
             e.sse - e.local_gain + p.log_determinant,
-            e.gradient[moving] / size,
-            e.hessian[np.ix_(moving, moving)] / np.outer(size, size),
+            e.gradient[moving],
+            e.hessian[np.ix_(moving, moving)],
         )
         for p, e in each
     ]
 
 
-def share_of(chosen: Sequence[Fit], names: Sequence[str]) -> tuple[int, int] | None:
+def share_of(chosen: Sequence[LikelihoodFit], names: Sequence[str]) -> tuple[int, int] | None:
     """Return in how many folds a cause or an equivalent of it was chosen, and the number of folds; None without."""
     found = sum(any(e.name in names for e in fitted.model.effects) for fitted in chosen)
     return (found, len(chosen)) if chosen else None
