@@ -6,14 +6,18 @@ predictor these are estimated from earlier samples, so that features are indepen
 
 import dataclasses
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
+
+from fes_pin.data.trial import Trial
 from fes_pin.models.maths import cos, sin, sqrt
 from fes_pin.models.maths import tanh as smooth_sign
 from fes_pin.models.parameters import parameter
+from fes_pin.models.rigs.base import Rig
 from fes_pin.models.stage import Effect, Stage
 
 SHARP = 10.0
@@ -51,7 +55,11 @@ MOTION: Mapping[str, FeatureFunction] = {
     "activation: act t": lambda f: f.act * f.t,
 }
 WAVES = (1, 2, 4, 8)
-"""Waves over a trial, and half waves over the range of the angle."""
+"""Waves over a trial, and over the range of the angle."""
+SHORT_WAVES = tuple(float(k) for k in np.arange(3.0, 30.0, 0.75))
+"""Waves over the range of the angle of the test for detents, three quarters of what the range can resolve apart. Fewer
+waves are smooth enough for the library and the polynomials in the angle; more would be about a degree long on a joint
+that moves by half a radian."""
 
 
 def _waves() -> Iterator[tuple[str, FeatureFunction]]:
@@ -60,6 +68,12 @@ def _waves() -> Iterator[tuple[str, FeatureFunction]]:
         yield f"time: cos {k}", partial(_wave, cos, "t", 2.0 * math.pi * k)
         yield f"angle: sin {k} q", partial(_wave, sin, "q", math.pi * k)
         yield f"angle: cos {k} q", partial(_wave, cos, "q", math.pi * k)
+
+
+def _short_waves() -> Iterator[tuple[str, FeatureFunction]]:
+    for k in SHORT_WAVES:
+        yield f"angle: sin {k} waves", partial(_wave, sin, "q", math.pi * k)
+        yield f"angle: cos {k} waves", partial(_wave, cos, "q", math.pi * k)
 
 
 def _wave(function: Any, variable: str, rate: float, f: Any) -> Any:
@@ -113,3 +127,21 @@ def _made(name: str, stage: Stage, signal: str, functions: Mapping[str, FeatureF
 EffortFeatures = _made("effort_features", Stage.JOINT, "torque", EFFORTS)
 ForceFeatures = _made("force_features", Stage.MUSCLE, "force", EFFORTS)
 ReadingFeatures = _made("reading_features", Stage.SENSOR, "reading", READINGS)
+AngleWaves = _made("angle_waves", Stage.JOINT, "torque", dict(_short_waves()))
+
+
+def scaled_to(features: _Features, rig: Rig, trials: Sequence[Trial]) -> _Features:
+    """Return features whose variables run from about -1 to 1 in some trials."""
+    moved = [t[(*rig.schema.motion(t.kind), rig.output(t.kind))[0]] for t in trials]
+    low, high = float(np.nanmin(np.concatenate(moved))), float(np.nanmax(np.concatenate(moved)))
+    lag = [min(max(1, round(0.05 / t.dt)), len(t) - 1) for t in trials]
+    rates = [np.abs(q[k:] - q[:-k]) / (k * t.dt) for q, t, k in zip(moved, trials, lag, strict=True)]
+    drives = [np.abs(t[n]) for t in trials for n in rig.input_columns(t)]
+    scales: dict[str, Any] = {
+        "centre": 0.5 * (low + high),
+        "reach": max(0.5 * (high - low), 1e-9),
+        "speed": max(float(np.nanmax(np.concatenate(rates))), 1e-9),
+        "drive": max((float(np.nanmax(d)) for d in drives), default=0.0) or 1.0,
+        "duration": max(t.duration for t in trials),
+    }
+    return dataclasses.replace(features, **scales)

@@ -39,7 +39,6 @@ class Innovations:
 
     trial: Trial
     number: int
-    channel: str
     output: int
     rows: np.ndarray
     values: np.ndarray
@@ -53,25 +52,18 @@ class Innovations:
         return innovations_of(short, self.noise.ar) / self.noise.innovation_std
 
 
-def each_channel(fitted: Fit) -> list[Innovations]:
-    """Return the innovations of each channel of each trial."""
-    out, at = [], 0
+def channels(fitted: Fit) -> list[list[Innovations]]:
+    """Return the innovations of each trial by channel and time step."""
+    found: dict[tuple[str, float], list[Innovations]] = {}
+    at = 0
     for number, (trial, part) in enumerate(zip(fitted.trials, fitted.parts, strict=True)):
         read, inputs = MeasuredOutputs(fitted.model, trial, fitted.noise), fitted.model.rig.input_columns(trial)
         channel = read.readings.of_seen(np.broadcast_to(read.places, read.readings.seen.shape))
         for output, name in zip(read.places, read.readings.outputs, strict=True):
             own, dt = np.flatnonzero(channel == output), round(trial.dt * read.count, 9)
-            values, noise = part.residual[own], fitted.noise[name]
-            out.append(Innovations(trial, number, name, output, at + own, values, noise, dt, inputs))
+            one = Innovations(trial, number, output, at + own, part.residual[own], fitted.noise[name], dt, inputs)
+            found.setdefault((name, dt), []).append(one)
         at += len(channel)
-    return out
-
-
-def channels(fitted: Fit) -> list[list[Innovations]]:
-    """Return the innovations by channel and time step."""
-    found: dict[tuple[str, float], list[Innovations]] = {}
-    for one in each_channel(fitted):
-        found.setdefault((one.channel, one.dt), []).append(one)
     return list(found.values())
 
 

@@ -6,8 +6,6 @@ fitted parameters are free in these tests. Estimated process noise is part of th
 """
 
 import math
-from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -21,8 +19,7 @@ from fes_pin.infer.distributions import chi2_tail
 from fes_pin.infer.levels import UNFELT
 from fes_pin.infer.projection import Projection
 from fes_pin.infer.result import Remainder
-from fes_pin.models.features import EffortFeatures, ForceFeatures, ReadingFeatures
-from fes_pin.models.stage import Effect
+from fes_pin.models.features import EffortFeatures, ForceFeatures, ReadingFeatures, scaled_to
 
 TRIED = (1.0, 0.5, 0.25, 0.1)
 """Shares of the Gauss-Newton step at which the cost is evaluated."""
@@ -43,7 +40,7 @@ def lack_of_fit(fitted: LikelihoodFit, seed: int = 0) -> Remainder:
     """
     free = fit(fitted.model, fitted.trials) if fitted.noise.ar else None
     featured = _features_left(fitted, seed)
-    others = residual_tests(free, seed) if free is not None and math.isfinite(free.sse) else []
+    others = residual_tests(free) if free is not None and math.isfinite(free.sse) else []
     found = [(featured.p_value, featured.where), *others]
     p_value, where = min(found, key=lambda f: f[0])
     p_value = min(1.0, len(found) * p_value)
@@ -116,7 +113,7 @@ class _Featured:
         kinds += [ReadingFeatures] if "reading" in signals else []
         self.fitted, self._model = fitted, fitted.model
         for kind in kinds:
-            self._model = self._model + _scaled(kind(), fitted)
+            self._model = self._model + scaled_to(kind(), fitted.model.rig, fitted.trials)
         self.names = [n for kind in kinds for n in kind.functions]
         free = tuple(f"{kind.name}.a{k:02d}" for kind in kinds for k in range(len(kind.functions)))
         self._problem = LikelihoodProblem(self._model, fitted.trials, fitted.noise, free)
@@ -142,21 +139,3 @@ class _Featured:
         points = [({**values, **one}, fitted.unknowns) for one in tried]
         now, *costs = self._problem.costs(points)
         return max(0.0, now - min(costs))
-
-
-def _scaled(effect: Effect, fitted: LikelihoodFit) -> Effect:
-    """Return features whose variables run from about -1 to 1 in these trials."""
-    rig, trials = fitted.model.rig, fitted.trials
-    moved = [t[(*rig.schema.motion(t.kind), rig.output(t.kind))[0]] for t in trials]
-    low, high = float(np.nanmin(np.concatenate(moved))), float(np.nanmax(np.concatenate(moved)))
-    lag = [min(max(1, round(0.05 / t.dt)), len(t) - 1) for t in trials]
-    rates = [np.abs(q[k:] - q[:-k]) / (k * t.dt) for q, t, k in zip(moved, trials, lag, strict=True)]
-    drives = [np.abs(t[n]) for t in trials for n in rig.input_columns(t)]
-    scales: dict[str, Any] = {
-        "centre": 0.5 * (low + high),
-        "reach": max(0.5 * (high - low), 1e-9),
-        "speed": max(float(np.nanmax(np.concatenate(rates))), 1e-9),
-        "drive": max((float(np.nanmax(d)) for d in drives), default=0.0) or 1.0,
-        "duration": max(t.duration for t in trials),
-    }
-    return replace(effect, **scales)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fes_pin.diagnosis.remainder.innovations import Innovations, each_channel
+from fes_pin.diagnosis.remainder.innovations import Innovations, channels
 from fes_pin.identify.fit import Fit
 from fes_pin.infer.distributions import f_tail
 from fes_pin.infer.levels import IDENTIFIABLE_SHARE, UNFELT
@@ -31,11 +31,8 @@ def play_p_value(fitted: Fit, projection: Projection) -> float:
     Source of the operator: Krasnosel'skii and Pokrovskii, Systems with Hysteresis, Springer 1989.
     """
     simulated = Simulator(fitted.model, fitted.trials).run(fitted.values, fitted.unknowns)
-    groups: dict[str, list[Innovations]] = {}
-    for one in each_channel(fitted):
-        groups.setdefault(one.channel, []).append(one)
     found: list[float] = []
-    for group in groups.values():
+    for group in channels(fitted):
         readings = [simulated[s.number].readings[:, s.output] for s in group]
         columns = np.zeros((len(projection.residual), len(WIDTHS)))
         for one, deviation in zip(group, _deviations(readings), strict=True):
