@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Generic, Self, TypeVar
 
 from fes_pin.infer.family import Family
-from fes_pin.infer.levels import CLAIM_LEVEL
+from fes_pin.infer.levels import CLAIM_LEVEL, MOST_CAUSES
 from fes_pin.infer.search import Fitted, Names
 
 F = TypeVar("F", bound=Fitted)
@@ -47,7 +47,7 @@ class FittedSets(ABC, Generic[F, S]):
         Family of the tests of all candidates.
     """
 
-    most_candidates: int | None = 3
+    most_candidates: int | None = MOST_CAUSES
     converged_sets = 4
     family: Family
 

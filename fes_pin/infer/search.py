@@ -121,19 +121,17 @@ class Policy:
     Attributes
     ----------
     beam
-        Number of sets of a size that are extended. A greedy search (1) names fewer pairs exactly.
+        Number of sets of a size that are judged, lowest criterion first, until one is accepted; and that are extended
+        after. A greedy search (1) names fewer pairs exactly.
     fitted
         Number of candidates of largest score that are fitted together with a set; None for all. With the nominal model
         all are fitted.
-    judged
-        Number of sets of a size that are judged, lowest criterion first, until one is accepted.
     given
         A set that is judged without a search and without further rivals; None for a search.
     """
 
     beam: int = 3
     fitted: int | None = 8
-    judged: int = 3
     given: Names | None = None
 
 
@@ -269,7 +267,7 @@ class Search(Generic[F, M]):
     def _first_accepted(self, size: int, best: Names) -> Names | None:
         """Return the accepted set of a size of lowest criterion; sets that are not accepted are left out in turn."""
         tried: list[Names] = []
-        while len(tried) < self.policy.judged and (ranked := self._in_better_forms(size, tried, best)):
+        while len(tried) < self.policy.beam and (ranked := self._in_better_forms(size, tried, best)):
             if self._is_accepted(ranked[0], best):
                 return ranked[0]
             tried.append(ranked[0])
@@ -278,7 +276,7 @@ class Search(Generic[F, M]):
 
     def _in_better_forms(self, size: int, without: Sequence[Names], best: Names) -> list[Names]:
         """Return the best sets of a size except some, lowest criterion first, each in its significant form."""
-        most = self.policy.judged
+        most = self.policy.beam
         while rough := [n for n in self._sets.near(size, without)[:most] if self._is_rough(n, best)]:
             self._reform(rough[0])
         return self._sets.near(size, without)[:most]

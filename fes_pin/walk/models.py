@@ -17,7 +17,7 @@ from fes_pin.walk.likelihood import Fitted, fit_many
 from fes_pin.walk.nulls import Nulls, simulated_nulls
 from fes_pin.workers import check_limit
 
-POLICY = Policy(beam=4, fitted=None, judged=4)
+POLICY = Policy(beam=4, fitted=None)
 """Every form is fitted, so that no score test is needed."""
 MOST_FOR_NOISE = 2
 """Most causes in the set from whose residual the noise is estimated."""

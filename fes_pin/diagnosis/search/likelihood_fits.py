@@ -16,6 +16,7 @@ from fes_pin.diagnosis.search.likelihood_screen import LikelihoodScreen
 from fes_pin.diagnosis.search.possible import is_possible
 from fes_pin.diagnosis.search.score import Scored, best_by_effect
 from fes_pin.diagnosis.search.starts import STARTS, from_afar, refinements, started
+from fes_pin.identify.ahead import default_horizon
 from fes_pin.identify.correlation_time import with_new_noise
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit, at_noise
@@ -61,15 +62,19 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         The causes that are searched; by default all that are known for the rig.
     answered
         Whether the rig is in closed loop; a property of the trials, not of the likelihood.
+    seed
+        Of critical values.
+    horizon_s
+        Horizon of errors, s; by default as `default_horizon` says.
     noise
         Noise of the fits: `PROCESS`, `MEASUREMENT` or `WHITE`.
-    calm
-        Fits of sets to the same trials without process noise, where there are any.
 
     Attributes
     ----------
     fits
         Fits by names in alphabetical order.
+    calm
+        Fits of sets to the same trials without process noise, where there are any.
     screen
         Score tests of every cause in a fit.
     forms
@@ -82,12 +87,16 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         trials: Sequence[Trial],
         effects: Sequence[type[Effect]] | None = None,
         answered: bool = True,
+        seed: int = 0,
+        horizon_s: float | None = None,
         noise: str = PROCESS,
-        calm: Mapping[Names, LikelihoodFit] | None = None,
     ) -> None:
         super().__init__()
-        self.calm = dict(calm or {})
+        self.calm: dict[Names, LikelihoodFit] = {}
         self.model, self.trials, self.answered, self.noise = Model(model.rig), tuple(trials), answered, noise
+        self.seed, self.horizon_s = seed, horizon_s or default_horizon(self.trials)
+        if any(t.kind == IMPOSED for t in self.trials):  # imposed motion excites a rig most, and a muscle is several
+            self.most_candidates = None
         self.library = Library(self.model, trials, effects, answered)
         self._calm: StateSpaceNoise | None = None
         self._compared: dict[tuple[Names, str], LikelihoodFit] = {}
@@ -100,6 +109,13 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         other = copy.copy(self)
         other.fits = {names_of(f): f for f in fits}
         other._converged, other._begun, other._compared = set(), set(), {}
+        return other
+
+    def with_noise(self, noise: str) -> Self:
+        """Return the same trials and causes, to be fitted with another noise."""
+        other = self.begun_with(())
+        other.noise, other._calm = noise, None
+        other.calm = self.fits if (self.noise, noise) == (MEASUREMENT, PROCESS) else {}
         return other
 
     def nominal(self) -> LikelihoodFit:

@@ -3,26 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
 
 from fes_pin.data.schema import IMPOSED
-from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.decide.significance import level_of
 from fes_pin.diagnosis.errors_ahead import are_large, random_parts
 from fes_pin.diagnosis.held_out import Fold, Found, gains_of
 from fes_pin.diagnosis.remainder.lack_of_fit import lack_of_fit
-from fes_pin.diagnosis.search.cause_sets import Names
-from fes_pin.diagnosis.search.likelihood_fits import MEASUREMENT, PROCESS, WHITE, LikelihoodFits
+from fes_pin.diagnosis.search.likelihood_fits import WHITE, LikelihoodFits
 from fes_pin.diagnosis.search.score import Scored
-from fes_pin.identify.ahead import default_horizon
 from fes_pin.identify.likelihood import is_simulated
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.distributions import chi2_tail
-from fes_pin.infer.levels import FORM_SHARE, MOST_CAUSES
+from fes_pin.infer.levels import FORM_SHARE
 from fes_pin.infer.scatter import excess_scatter
 from fes_pin.infer.search import Search
-from fes_pin.models.model import Model
-from fes_pin.models.stage import Effect
 
 
 class NominalFitError(ArithmeticError):
@@ -42,44 +36,7 @@ class NominalFitError(ArithmeticError):
 
 
 class LikelihoodModels(LikelihoodFits):
-    """Fits of sets of causes to one set of trials, and the rules by which a search judges them.
-
-    Parameters
-    ----------
-    model, trials, effects, answered, noise, calm
-        As in `LikelihoodFits`.
-    seed
-        Of critical values.
-    horizon_s
-        Horizon of errors, s; by default as `default_horizon` says.
-    """
-
-    def __init__(
-        self,
-        model: Model,
-        trials: Sequence[Trial],
-        effects: Sequence[type[Effect]] | None = None,
-        answered: bool = True,
-        seed: int = 0,
-        horizon_s: float | None = None,
-        noise: str = PROCESS,
-        calm: Mapping[Names, LikelihoodFit] | None = None,
-    ) -> None:
-        super().__init__(model, trials, effects, answered, noise, calm)
-        self.seed, self._horizon_s = seed, horizon_s
-        # no bound where motion is imposed: it excites a rig most, and a muscle is a set of causes
-        self.most_candidates = None if any(t.kind == IMPOSED for t in self.trials) else MOST_CAUSES
-
-    def with_noise(self, noise: str) -> LikelihoodModels:
-        """Return the same trials and causes, to be fitted with another noise."""
-        calm = self.fits if (self.noise, noise) == (MEASUREMENT, PROCESS) else None
-        own = (self.library.effects, self.answered, self.seed, self._horizon_s, noise, calm)
-        return LikelihoodModels(self.model, self.trials, *own)
-
-    @property
-    def horizon_s(self) -> float:
-        """Horizon of errors, s."""
-        return self._horizon_s or default_horizon(self.trials)
+    """Fits of sets of causes to one set of trials, and the rules by which a search judges them."""
 
     @property
     def judged_s(self) -> float | None:
