@@ -254,7 +254,7 @@ def _shapes(time: np.ndarray) -> Sequence[np.ndarray]:
     """Return stimuli between 0 and 1: steps, a staircase, a ramp, sines, trains and a random sequence."""
     t = time / time[-1]
     held = np.repeat(np.random.default_rng(45).random(40), -(-len(time) // 40))[: len(time)]
-    on, moving = (0.1 < t) & (t < 0.6), t < 0.9
+    on, moving = (t > 0.1) & (t < 0.6), t < 0.9
     return [
         *(np.where(on, level, 0.0) for level in (0.3, 0.6, 1.0)),
         np.clip(np.floor(10.0 * t) / 8.0, 0.0, 1.0),
