@@ -75,7 +75,7 @@ class GroupedFits:
     def _alone(self, group: str) -> LikelihoodFit:
         """Return the nominal fit of a group alone."""
         noise = PROCESS if self.driven else MEASUREMENT
-        return LikelihoodFits(self.nominal, self.trials[group], (), self.driven, noise).nominal()
+        return LikelihoodFits(self.nominal, self.trials[group], (), self.driven, noise=noise).nominal()
 
     def fitted(
         self, model: GroupedModel, weights: Weights, unknowns: Unknowns | None = None, rounds: int = ROUNDS
