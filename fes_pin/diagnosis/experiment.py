@@ -254,12 +254,16 @@ def _shapes(time: np.ndarray) -> Sequence[np.ndarray]:
     """Return stimuli between 0 and 1: steps, a staircase, a ramp, sines, trains and a random sequence."""
     t = time / time[-1]
     held = np.repeat(np.random.default_rng(45).random(40), -(-len(time) // 40))[: len(time)]
-    on, moving = (t > 0.1) & (t < 0.6), t < 0.9
+    on, moving = _between(t, 0.1, 0.6), _between(t, -1.0, 0.9)
     return [
         *(np.where(on, level, 0.0) for level in (0.3, 0.6, 1.0)),
         np.clip(np.floor(10.0 * t) / 8.0, 0.0, 1.0),
         1.0 - np.abs(2.0 * t - 1.0),
         *(np.where(moving, 0.5 + k * np.sin(2.0 * np.pi * hz * time), 0.0) for k, hz in ((0.5, 0.5), (0.3, 1.5))),
-        *(np.where((time % s < 0.5 * s) & moving, level, 0.0) for s, level in ((1.0, 0.8), (0.4, 0.5))),
+        *(np.where(_between(time % s, -1.0, 0.5 * s) & moving, level, 0.0) for s, level in ((1.0, 0.8), (0.4, 0.5))),
         np.where(moving, held, 0.0),
     ]
+
+
+def _between(t: np.ndarray, low: float, high: float) -> np.ndarray:
+    return (low < t) & (t < high)
