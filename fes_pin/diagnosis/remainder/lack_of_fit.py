@@ -35,7 +35,7 @@ def lack_of_fit(fitted: LikelihoodFit, seed: int = 0) -> Remainder:
     """Test whether a fit leaves anything but noise.
 
     Where measurement noise may be autoregressive, the residuals of a free simulation are tested too, see
-    `remainder.open_set`: process noise would take bursts, detents and slips for its own. The p-value is that of the
+    `remainder.open_set`: process noise would take bursts and detents for its own. The p-value is that of the
     most significant test, times the number of tests.
     """
     free = fit(fitted.model, fitted.trials) if fitted.noise.ar else None
