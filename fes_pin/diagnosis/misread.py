@@ -26,7 +26,6 @@ from fes_pin.infer.optimum import MAX_ITERATIONS
 from fes_pin.infer.problem import Linearized
 from fes_pin.infer.projection import Projection, without_locals
 from fes_pin.models.model import Model
-from fes_pin.models.simulate import simulated_trial
 from fes_pin.workers import in_parallel
 
 NAME = "condition_misread"
@@ -39,8 +38,6 @@ DESCRIBED = f"""{NAME} (rig; rigs: ankle, joint, muscle)
 """Description for `fes-pin effects`: a misreading belongs to a trial, not to the rig, and is no effect of a model."""
 CANDIDATES = 3
 """Trials that are left out in turn: those of the largest scores."""
-UNFELT = 1e-7
-"""Change of a simulation by a step of a condition, as a share of its spread, that rounding alone may cause."""
 ENDS = 0.01
 """Step, in standard deviations of the value, at which its estimation ends."""
 STEPS = 8
@@ -110,9 +107,7 @@ def find_misread(model: Model, trials: Sequence[Trial]) -> Misread | None:
         Measured trials with their stated conditions.
     """
     sizes = _sizes(model, trials)
-    first = {(t.kind, n): t for t in reversed(trials) for n in model.rig.stated(t)}
-    felt = {key: _is_felt(model, t, key[1], sizes[key[1]]) for key, t in first.items()}
-    wanted = [(i, n) for i, t in enumerate(trials) for n in model.rig.stated(t) if felt[t.kind, n]]
+    wanted = [(i, n) for i, t in enumerate(trials) for n in model.rig.stated(t)]
     if len({i for i, _ in wanted}) < FEWEST_STATED:
         return None
     whole = rough_fit(model, trials)
@@ -145,14 +140,6 @@ def _sizes(model: Model, trials: Sequence[Trial]) -> dict[str, float]:
             moved = trial[name] if name in trial.columns else np.array([value])
             values.setdefault(name, []).extend([float(np.min(moved)), float(np.max(moved))])
     return {n: SHARE * max(float(np.ptp(v)), 0.1 * float(np.max(np.abs(v))), 1e-6) for n, v in values.items()}
-
-
-def _is_felt(model: Model, trial: Trial, name: str, size: float) -> bool:
-    """Return whether the simulation of a trial depends on a condition."""
-    moved = simulated_trial(model, model.rig.restated(trial, name, model.rig.stated(trial)[name] + size))
-    plain = simulated_trial(model, trial)
-    names = [n for n in model.rig.outputs(trial.kind) if n in trial.columns]
-    return any(np.max(np.abs(moved[n] - plain[n])) > UNFELT * max(np.ptp(plain[n]), 1e-12) for n in names)
 
 
 def _screen(

@@ -15,10 +15,9 @@ from fes_pin.diagnosis.parts import in_parts
 from fes_pin.diagnosis.remainder.lack_of_fit import lack_of_fit
 from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodModels, LikelihoodSearch
-from fes_pin.identify.fit import fit_multistart, rough_noise
+from fes_pin.identify.fit import rough_fit
 from fes_pin.identify.likelihood_fit import LikelihoodFit, maximum_from
 from fes_pin.identify.per_trial import halves
-from fes_pin.identify.problem import Problem
 from fes_pin.infer.held_out import Errors, held_out_gain
 from fes_pin.infer.result import Cause, ParameterEstimate
 from fes_pin.models.model import Model
@@ -64,13 +63,10 @@ def with_misread(
     trials, test
         Trials as stated, on which the errors of the nominal model are found.
     """
-    before, best = made.misread.whole, made.searched.best
-    if before.model.effects:
-        bare = Model(before.model.rig)
-        before = fit_multistart(Problem(bare, trials, before.noise))
-    floor = rough_noise(before.model, trials)
-    pair = (free_errors(before.model, trials, floor), free_errors(diagnosis.nominal.model, made.trials, floor))
-    cause = _cause(made, held_out_gain(pair[0], *pair, seed).percent, trials, seed)
+    before, best = rough_fit(Model(made.misread.whole.model.rig), trials), made.searched.best
+    stated = free_errors(before.model, trials, before.noise)
+    removed = held_out_gain(stated, stated, free_errors(diagnosis.nominal.model, made.trials, before.noise), seed)
+    cause = _cause(made, removed.percent, trials, seed)
     restated = replace(diagnosis, causes=(cause, *diagnosis.causes), verdict="causes_found")
     if diagnosis.ahead is None:
         return restated

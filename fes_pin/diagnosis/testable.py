@@ -19,7 +19,7 @@ from fes_pin.diagnosis.search.library import Library
 from fes_pin.diagnosis.search.likelihood_screen import LikelihoodScreen
 from fes_pin.diagnosis.search.score import Scores
 from fes_pin.identify.feedback import is_fed_back
-from fes_pin.identify.fit import Fit, residuals_of, rough_fit
+from fes_pin.identify.fit import Fit, noise_of, rough_fit
 from fes_pin.identify.likelihood_fit import at_noise
 from fes_pin.identify.process_noise import first_guess
 from fes_pin.infer.levels import ALIKE_COSINE, IDENTIFIABLE_SHARE, LEAST_SHIFT_S, REVERSED_LEAVES, SMALL_SHARE
@@ -128,13 +128,8 @@ def _to_fit(study: Study) -> tuple[Model, Sequence[Trial]]:
 
 def _unexplained(fitted: Fit) -> float:
     """Return the largest share of a column's variance that a fit leaves."""
-    left: dict[str, float] = {}
-    there: dict[str, float] = {}
-    for trial, one in zip(fitted.trials, residuals_of(fitted), strict=True):
-        for name, residual in zip(one.outputs, one.values.T, strict=True):
-            left[name] = left.get(name, 0.0) + float(residual @ residual)
-            there[name] = there.get(name, 0.0) + len(trial) * float(np.var(trial[name]))
-    return max((left[n] / max(there[n], 1e-300) for n in left), default=0.0)
+    around = {n: np.mean([np.var(t[n]) for t in fitted.trials if n in t]) for n in fitted.noise}
+    return max((one.std**2 / max(around[n], 1e-300) for n, one in noise_of(fitted, longest=0).items()), default=0.0)
 
 
 def _alike(scores: Scores, kept: Mapping[str, float]) -> tuple[tuple[str, ...], ...]:

@@ -27,7 +27,6 @@ from fes_pin.infer.result import shown
 from fes_pin.infer.scoring import LITTLE
 from fes_pin.models.accepted import accepted_trials
 from fes_pin.models.model import Model
-from fes_pin.models.predictions import PredictedTrial
 from fes_pin.models.predictor import StateSpaceNoise
 from fes_pin.workers import one_thread_each
 
@@ -402,10 +401,12 @@ def rough_noise(model: Model, trials: Sequence[Trial], correlation_s: float = 0.
 
 def noise_of(fitted: Fit, longest: int = ORDERS[-1], least: int = 0) -> dict[str, Noise]:
     """Return the noise of a fit's residuals, by output column, with autoregressions of orders `least` to `longest`."""
+    units = {n: Noise(1.0) for t in fitted.trials for n in fitted.model.rig.outputs(t.kind)}
+    run = Problem(fitted.model, fitted.trials, units, ()).innovations(fitted.values, fitted.unknowns)
     step = noise_step([t.dt for t in fitted.trials])
     columns: dict[str, list[np.ndarray]] = {}
     squares: dict[str, list[float]] = {}
-    for trial, one in zip(fitted.trials, residuals_of(fitted), strict=True):
+    for trial, one in zip(fitted.trials, run, strict=True):
         for name, residual in zip(one.outputs, one.values.T, strict=True):
             columns.setdefault(name, []).append(thin(residual, thinning(trial.dt, step)))
             squares.setdefault(name, []).append(float(np.mean(residual**2)))
@@ -413,9 +414,3 @@ def noise_of(fitted: Fit, longest: int = ORDERS[-1], least: int = 0) -> dict[str
         name: estimate_noise(pieces, fitted.degrees, math.sqrt(float(np.mean(squares[name]))), step, longest, least)
         for name, pieces in columns.items()
     }
-
-
-def residuals_of(fitted: Fit) -> list[PredictedTrial]:
-    """Return every trial as simulated by a fit, in the units of its outputs, sample by sample."""
-    units = {n: Noise(1.0) for t in fitted.trials for n in fitted.model.rig.outputs(t.kind)}
-    return Problem(fitted.model, fitted.trials, units, ()).innovations(fitted.values, fitted.unknowns)
