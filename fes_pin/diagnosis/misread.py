@@ -11,7 +11,7 @@ therefore not taken for a misreading. A restated trial must also be explained as
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -44,6 +44,10 @@ STEPS = 8
 """Most Gauss-Newton steps of one value; it usually takes fewer."""
 SHARE = 1e-4
 """Step of a numerical derivative, as a share of the spread of the stated values, or of their size if all are equal."""
+
+
+Pick = tuple[int, str]
+"""A trial by its number, and one of its conditions."""
 
 
 @dataclass(frozen=True)
@@ -113,8 +117,8 @@ def find_misread(model: Model, trials: Sequence[Trial]) -> Misread | None:
     whole = rough_fit(model, trials)
     if not math.isfinite(whole.sse):
         return None
-    odd = _screen(whole, trials, wanted, sizes)
-    found = [one for pick in odd if (one := _left_out(whole, trials, pick, wanted, sizes)) is not None]
+    odd = _screen(whole, wanted, sizes)
+    found = [one for pick in odd if (one := _left_out(whole, pick, wanted, sizes)) is not None]
     return min(found, key=lambda m: m.p_value, default=None)
 
 
@@ -142,17 +146,15 @@ def _sizes(model: Model, trials: Sequence[Trial]) -> dict[str, float]:
     return {n: SHARE * max(float(np.ptp(v)), 0.1 * float(np.max(np.abs(v))), 1e-6) for n, v in values.items()}
 
 
-def _screen(
-    whole: Fit, trials: Sequence[Trial], wanted: Sequence[tuple[int, str]], sizes: dict[str, float]
-) -> list[tuple[int, str]]:
+def _screen(whole: Fit, wanted: Sequence[Pick], sizes: Mapping[str, float]) -> list[Pick]:
     """Return the conditions of largest score in a model whose parameters are free too, under white noise."""
     white = under_own_noise(whole, longest=0)
     projection = Projection(white.parts)
 
-    def score(pick: tuple[int, str]) -> float:
+    def score(pick: Pick) -> float:
         i, name = pick
         columns = np.zeros((len(projection.residual), 1))
-        columns[projection.trials[i], 0] = _column(white, trials[i], name, sizes[name])
+        columns[projection.trials[i], 0] = _column(white, white.trials[i], name, sizes[name])
         left = projection(columns)[:, 0]
         power, before = float(left @ left), float(np.sum(columns**2))
         return float(left @ projection.residual) ** 2 / power if power > 1e-9 * max(before, 1e-300) else 0.0
@@ -173,17 +175,10 @@ def _linearized(fitted: Fit, trial: Trial) -> Linearized:
     return problem.linearize(fitted.values, problem.start_unknowns())[0]
 
 
-def _left_out(
-    whole: Fit,
-    trials: Sequence[Trial],
-    pick: tuple[int, str],
-    wanted: Sequence[tuple[int, str]],
-    sizes: dict[str, float],
-) -> Misread | None:
+def _left_out(whole: Fit, pick: Pick, wanted: Sequence[Pick], sizes: Mapping[str, float]) -> Misread | None:
     """Return the misreading of one trial's condition by a fit of the others; None if the trial is no outlier."""
-    i, name = pick
-    others = [k for k in range(len(trials)) if k != i]
-    rest = [trials[k] for k in others]
+    (i, name), trials = pick, whole.trials
+    rest = [*trials[:i], *trials[i + 1 :]]
     near = fit_problem(Problem(whole.model, rest, noise_of(whole, longest=0)), whole.values)
     fitted = under_own_noise(near, max_iterations=MAX_ITERATIONS)
     if not math.isfinite(fitted.sse):
@@ -200,18 +195,9 @@ def _left_out(
     if not p < CLAIM_LEVEL or own.left > EXPLAINED_AS_WELL * max(usual, 1.0):
         return None
     stated = whole.model.rig.stated(trials[i])[name]
-    halves = [_step(fitted, trials[i], name, sizes[name], half=k).value for k in (0, 1)]
-    return Misread(
-        trials[i].name,
-        name,
-        stated,
-        stated + own.value,
-        own.std * math.sqrt(phi),
-        p,
-        (stated + halves[0], stated + halves[1]),
-        whole,
-        fitted,
-    )
+    odd, even = (stated + _step(fitted, trials[i], name, sizes[name], half=k).value for k in (0, 1))
+    value, std = stated + own.value, own.std * math.sqrt(phi)
+    return Misread(trials[i].name, name, stated, value, std, p, (odd, even), whole, fitted)
 
 
 def _step(fitted: Fit, trial: Trial, name: str, size: float, steps: int = STEPS, half: int | None = None) -> _Step:

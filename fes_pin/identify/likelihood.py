@@ -28,7 +28,6 @@ from fes_pin.infer.problem import Linearized, Unknowns, whitened_sse
 from fes_pin.infer.scoring import Evaluation, NoisyProblem, Point, fisher_scoring
 from fes_pin.models.compile.layout import WIDE
 from fes_pin.models.free_run import FreeRun, with_noise
-from fes_pin.models.model import Model
 from fes_pin.models.predictions import PredictedOutput, PredictedTrial
 from fes_pin.models.predictor import Predictor, StateSpaceNoise
 from fes_pin.workers import check_limit, in_parallel
@@ -56,20 +55,28 @@ class LikelihoodProblem(Problem, NoisyProblem):
 
     noise: StateSpaceNoise
 
-    def __init__(
-        self,
-        model: Model,
-        trials: Sequence[Trial],
-        noise: StateSpaceNoise,
-        free: tuple[str, ...] | None = None,
-        starts: Sequence[Trial] | None = None,
-    ) -> None:
-        self.is_simulated = is_simulated(noise, trials)
-        super().__init__(model, trials, noise, free, starts)
-        self.priors = [spread_of_start(model, t) for t in starts or self.trials]
-        self._predictor: Predictor | None = None
-        self._linearized: Predictor | FreeRun | None = None
-        self._batched: Predictor | FreeRun | None = None
+    @property
+    def is_simulated(self) -> bool:
+        """Whether there is no process noise."""
+        return is_simulated(self.noise, self.trials)
+
+    @cached_property
+    def priors(self) -> list[dict[str, float]]:
+        """Prior standard deviation of each initial state, by trial."""
+        return [spread_of_start(self.model, t) for t in self.starts]
+
+    @cached_property
+    def _linearized(self) -> Predictor | FreeRun:
+        return self._made(1, (*self.free, *self.unknown_names))
+
+    @cached_property
+    def _batched(self) -> Predictor | FreeRun:
+        return self._made(self.batch, ())
+
+    @cached_property
+    def _predictor(self) -> Predictor:
+        """The filter, which estimates the state also without process noise."""
+        return Predictor(self.model, self.trials, (), self.noise.processes, self.priors, self.noise.correlation_s)
 
     def _made(self, count: int, columns: tuple[str, ...]) -> Predictor | FreeRun:
         """Return the predictor of `count` copies of the trials, with sensitivities to some parameters and unknowns."""
@@ -79,8 +86,6 @@ class LikelihoodProblem(Problem, NoisyProblem):
         return Predictor(self.model, self.trials * count, columns, *own)
 
     def _run(self, values: Mapping[str, float], unknowns: Unknowns) -> list[PredictedTrial]:
-        if self._linearized is None:
-            self._linearized = self._made(1, (*self.free, *self.unknown_names))
         return self._linearized.run(values, self.noise, unknowns)
 
     @property
@@ -111,10 +116,7 @@ class LikelihoodProblem(Problem, NoisyProblem):
         self, points: Sequence[tuple[Mapping[str, float], Unknowns, StateSpaceNoise]]
     ) -> list[list[PredictedTrial]]:
         """Return every trial as predicted at each of several points, in batches that fill all lanes."""
-        count, trials = self.batch, len(self.trials)
-        if self._batched is None:
-            self._batched = self._made(count, ())
-        predictor = self._batched
+        count, trials, predictor = self.batch, len(self.trials), self._batched
 
         def in_batch(
             some: Sequence[tuple[Mapping[str, float], Unknowns, StateSpaceNoise]],
@@ -141,9 +143,6 @@ class LikelihoodProblem(Problem, NoisyProblem):
     ) -> list[dict[str, PredictedOutput]]:
         """Return the prediction of each output of each trial, also where nothing was measured."""
         own = self.begun(self.start_unknowns() if unknowns is None else unknowns)
-        if self._predictor is None:  # a filter estimates the state also without process noise
-            random = (self.noise.processes, self.priors, self.noise.correlation_s)
-            self._predictor = Predictor(self.model, self.trials, (), *random)
         with np.errstate(all="ignore"):
             return self._predictor.predict(values, self.noise, own)
 

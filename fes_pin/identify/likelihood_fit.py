@@ -10,7 +10,7 @@ from fes_pin.identify.process_noise import without_memory
 from fes_pin.infer.levels import PARAMETER_PENALTY
 from fes_pin.infer.maximise import ROUNDS, alternate, together
 from fes_pin.infer.optimum import Optimum, minimise
-from fes_pin.infer.problem import Unknowns, completed
+from fes_pin.infer.problem import Unknowns
 from fes_pin.models.predictor import StateSpaceNoise
 
 
@@ -43,8 +43,7 @@ def fit_of(problem: LikelihoodProblem, found: Optimum) -> LikelihoodFit:
 def at_noise(fitted: Fit, noise: StateSpaceNoise) -> LikelihoodFit:
     """Return a fit, with its parameters, at another noise."""
     problem = LikelihoodProblem(fitted.model, fitted.trials, noise)
-    unknowns = completed(problem.start_unknowns(), fitted.unknowns)
-    return fit_of(problem, minimise(problem, fitted.values, unknowns, 0))
+    return fit_of(problem, minimise(problem, fitted.values, fitted.unknowns, 0))
 
 
 def maximise(

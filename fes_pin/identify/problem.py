@@ -39,9 +39,6 @@ class Problem(infer.Problem):
         Trials whose first samples give the initial states, where those of `trials` are not all measured.
     """
 
-    is_simulated = True
-    """Whether trials are simulated freely, from initial states that are fitted."""
-
     def __init__(
         self,
         model: Model,
@@ -54,8 +51,13 @@ class Problem(infer.Problem):
         self.free = model.fitted_parameters() if free is None else free
         self.limits = limits_of(model, self.trials)
         self.unknown_names = unknown_names(model, self.trials, self.is_simulated)
-        self.begins = [model.rig.initial_unknowns(t) for t in starts or self.trials]
-        self._simulated: FreeRun | None = None
+        self.starts = tuple(starts or self.trials)
+        self.begins = [model.rig.initial_unknowns(t) for t in self.starts]
+
+    @property
+    def is_simulated(self) -> bool:
+        """Whether trials are simulated freely, from initial states that are fitted."""
+        return True
 
     def on(self, trials: Sequence[Trial]) -> Self:
         """Return the same problem on other trials."""
@@ -83,10 +85,12 @@ class Problem(infer.Problem):
         with np.errstate(all="ignore"):
             return self._run(values, self.begun(unknowns))
 
+    @cached_property
+    def _simulation(self) -> FreeRun:
+        return FreeRun(self.model, self.trials, (*self.free, *self.unknown_names), self.noise)
+
     def _run(self, values: Mapping[str, float], unknowns: Unknowns) -> list[PredictedTrial]:
-        if self._simulated is None:
-            self._simulated = FreeRun(self.model, self.trials, (*self.free, *self.unknown_names), self.noise)
-        return self._simulated.run(values, self.noise, unknowns)
+        return self._simulation.run(values, self.noise, unknowns)
 
     def linearize(self, values: Mapping[str, float], unknowns: Unknowns) -> list[Linearized]:
         """Return whitened residuals and their sensitivities at a parameter value."""
