@@ -15,7 +15,7 @@ from fes_pin.infer.text import percent
 from fes_pin.view.chart import panels, svg
 from fes_pin.view.drawing import Drawing, rows_csv
 from fes_pin.view.missing import Missing, binned, explained, smoothed
-from fes_pin.view.style import COLOURS, WIDTHS, label, milli, unit_of
+from fes_pin.view.style import COLOURS, WIDTHS, label, milli, quantity
 
 DOTS = 500
 """Dots of one panel."""
@@ -48,7 +48,7 @@ def trial_drawing(one: Replay, noise: NoiseModel, position_unit: str = "rad") ->
         for of, values in curves.items():
             panel.plot(time, values, color=COLOURS[of], linewidth=WIDTHS[of])
         panel.set_ylabel(label(name, position_unit))
-        factor, unit = milli(one.residuals(name)["nominal"], unit_of(name, position_unit))
+        factor, unit = milli(one.residuals(name)["nominal"], quantity(name, position_unit)[1])
         band = factor * 2.0 * noise[name].std if name in noise else 0.0
         _residuals(next(rows), one, name, factor, band, f"residual\n({unit})")
     for name in inputs:
@@ -62,7 +62,7 @@ def described(one: Replay, position_unit: str) -> str:
     """A trial in words: what was measured, and by how much each model misses it."""
     trial, words = one.measured, []
     for name in one.outputs:
-        what, unit = label(name, position_unit).partition(" (")[0], unit_of(name, position_unit)
+        what, unit = quantity(name, position_unit)
         missed = [f"{of} model at most {_short(np.abs(r).max())} {unit} off" for of, r in one.residuals(name).items()]
         low, high = _short(trial[name].min()), _short(trial[name].max())
         words.append(f"{what} from {low} to {high} {unit}; {', '.join(missed)}")

@@ -13,7 +13,7 @@ from fes_pin.view.page import Content, Markup, element, figure, html_table, sect
 from fes_pin.view.plots import stimulus_drawing
 from fes_pin.view.report_trials import missing_section, position_unit, trials_section
 from fes_pin.view.sections import Parts, not_testable, value_and_interval
-from fes_pin.view.style import unit_of
+from fes_pin.view.style import quantity
 
 
 def _counts(diagnosis: Diagnosis) -> str:
@@ -64,7 +64,7 @@ def _parameters(diagnosis: Diagnosis) -> list[Markup]:
     head = ("parameter", "unit", "start", "nominal", "95 % interval", "extended", "95 % interval")
     unit = position_unit(diagnosis)
     noise: list[list[Content]] = [
-        [element("code", n), f"{m.std:.3g}", unit_of(n, unit) or "-", str(len(m.ar)) if m.ar else "white"]
+        [element("code", n), f"{m.std:.3g}", quantity(n, unit)[1] or "-", str(len(m.ar)) if m.ar else "white"]
         for n, m in diagnosis.extended.noise.items()
     ]
     return [

@@ -11,6 +11,7 @@ from fes_pin.view.sections import Parts, not_testable
 from fes_pin.view.style import COLOURS
 from fes_pin.view.walk_playback import PLAYBACK_FILE, playback_html
 from fes_pin.walk.judge import CHANNELS
+from fes_pin.walk.plates import stretches
 from fes_pin.walk.result import BODY_FILE, WalkDiagnosis
 
 SHOWN_S = 4.0
@@ -63,15 +64,15 @@ def _drawing(trial: str, time: np.ndarray, curves: Mapping[str, np.ndarray], sin
         Shape (n,): whether one foot alone is on the ground.
     """
     shown = time <= time[0] + SHOWN_S
-    time, edges = time[shown], np.flatnonzero(np.diff(single[shown], prepend=False, append=False))
+    time = time[shown]
     columns, words = {"time_s": time}, []
     drawing, axes = panels([ROW] * 3, columns=2)
     for channel, (name, panel) in enumerate(zip(CHANNELS, axes.T.flat, strict=True)):
         unit = "N" if channel < 3 else "N m"
         own = {of: values[shown, channel] for of, values in curves.items()}
         columns |= {f"{name.replace(' ', '_')}_{of}": values for of, values in reversed(own.items())}
-        for begin, end in edges.reshape(-1, 2).tolist():
-            panel.axvspan(time[begin], time[end - 1], color=COLOURS["band"])
+        for rows in stretches(single[shown]):
+            panel.axvspan(time[rows.start], time[rows.stop - 1], color=COLOURS["band"])
         for of, values in own.items():
             panel.plot(time, values, color=COLOURS[of], linewidth=2.4 if of == "extended" else 1.2)
         panel.set_ylabel(f"{name} ({unit})".replace(" about", "\nabout"))

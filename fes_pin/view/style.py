@@ -22,40 +22,33 @@ LABELS = {
     "force_n": ("force", "N"),
     "torque_nm": ("torque", "N m"),
     "length_m": ("length", "m"),
-    "pulse_width_us": ("pulse width", "us"),
+    "pulse_width_us": ("pulse width", "µs"),
     "stim": ("pulses", ""),
     "activation": ("activation", ""),
     "time_s": ("time", "s"),
 }
 
 
-def label(column: str, position_unit: str = "rad") -> str:
-    """Axis label of a column, with its unit.
+def quantity(column: str, position_unit: str = "rad") -> tuple[str, str]:
+    """Return the name and the unit of a column, as printed.
 
     Parameters
     ----------
     column
-        Of a trial, or a name of `diagnose.missing`.
+        Of a trial, or a name of `view.missing`.
     position_unit
         "rad" for a revolute joint, "m" for a prismatic one.
     """
-    effort = "N m" if position_unit == "rad" else "N"
-    place = "angle" if position_unit == "rad" else "position"
-    own = {
-        "position": (place, position_unit),
-        "angle": (place, position_unit),
-        "velocity": ("rate", f"{position_unit}/s"),
-        "rate": ("rate", f"{position_unit}/s"),
-        "effort": ("effort", effort),
-    }
-    name, unit = (own | LABELS).get(column, (column.replace("_", " "), ""))
-    return f"{name} ({unit.replace('us', 'µs')})" if unit else name
+    place, effort = ("angle", "N m") if position_unit == "rad" else ("position", "N")
+    own = {n: (place, position_unit) for n in ("position", "angle")}
+    own |= {n: ("rate", f"{position_unit}/s") for n in ("velocity", "rate")} | {"effort": ("effort", effort)}
+    return (own | LABELS).get(column, (column.replace("_", " "), ""))
 
 
-def unit_of(column: str, position_unit: str = "rad") -> str:
-    """Unit of a column as printed."""
-    text = label(column, position_unit)
-    return text.partition("(")[2].rstrip(")")
+def label(column: str, position_unit: str = "rad") -> str:
+    """Return the axis label of a column, with its unit."""
+    name, unit = quantity(column, position_unit)
+    return f"{name} ({unit})" if unit else name
 
 
 def milli(values: np.ndarray, unit: str) -> tuple[float, str]:

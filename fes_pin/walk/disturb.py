@@ -25,31 +25,32 @@ segment's frame is the mean of several (U. Della Croce et al., Gait Posture 21:2
 SMALL_N = 1.0
 """Ordinary errors with a smaller residual in all waves together are left out, N or N m."""
 
-Disturbance = Callable[[np.ndarray, np.ndarray, bool, np.random.Generator], np.ndarray]
-CoordinateErrors = dict[str, np.ndarray]
+CoordinateErrors = Iterator[dict[str, np.ndarray]]
+Disturbance = Callable[[np.ndarray, bool, np.random.Generator], np.ndarray]
+"""Function of the phase in the stride, (n,), whether a coordinate is an angle, and a generator: its error, (n,)."""
 
 
-def tissue(time: np.ndarray, phase: np.ndarray, angle: bool, random: np.random.Generator) -> np.ndarray:
-    """Return an error that repeats in each stride, (n,)."""
-    out = np.zeros(len(time))
+def tissue(phase: np.ndarray, angle: bool, random: np.random.Generator) -> np.ndarray:
+    """Return an error that repeats in each stride."""
+    out = np.zeros(len(phase))
     for h in range(1, TISSUE_WAVES + 1):
         a, b = random.normal(size=2) / h
         out += a * np.cos(2.0 * np.pi * h * phase) + b * np.sin(2.0 * np.pi * h * phase)
     return (TISSUE_RAD if angle else TISSUE_M) * out
 
 
-def white(time: np.ndarray, phase: np.ndarray, angle: bool, random: np.random.Generator) -> np.ndarray:
-    """Return white noise as of markers with 1 mm, (n,)."""
-    return 1e-3 * random.normal(size=len(time)) / (CLUSTER_M if angle else 1.0)
+def white(phase: np.ndarray, angle: bool, random: np.random.Generator) -> np.ndarray:
+    """Return white noise as of markers with 1 mm."""
+    return 1e-3 * random.normal(size=len(phase)) / (CLUSTER_M if angle else 1.0)
 
 
 def disturbed_waves(recording: WalkRecording, strides: Strides, kind: Disturbance, draws: int, seed: int) -> np.ndarray:
     """Return changes of the residual's waves in the first stride by random errors of all coordinates: (draws, 6, k)."""
     random = np.random.default_rng(seed)
 
-    def errors(names: list[str], clock: np.ndarray, turn: np.ndarray) -> Iterator[CoordinateErrors]:
+    def errors(names: list[str], phase: np.ndarray) -> CoordinateErrors:
         for _ in range(draws):
-            yield {n: kind(clock, turn, _is_angle(n), random) for n in names}
+            yield {n: kind(phase, _is_angle(n), random) for n in names}
 
     return _responses(recording, strides, errors)
 
@@ -57,9 +58,9 @@ def disturbed_waves(recording: WalkRecording, strides: Strides, kind: Disturbanc
 def misplaced(recording: WalkRecording, strides: Strides) -> np.ndarray:
     """Return changes of the residual's waves by the ordinary error of each coordinate's zero: (coordinates, 6, k)."""
 
-    def errors(names: list[str], clock: np.ndarray, _turn: np.ndarray) -> Iterator[CoordinateErrors]:
+    def errors(names: list[str], phase: np.ndarray) -> CoordinateErrors:
         for n in names:
-            yield {n: np.full(len(clock), LANDMARK_RAD if _is_angle(n) else LANDMARK_M)}
+            yield {n: np.full(len(phase), LANDMARK_RAD if _is_angle(n) else LANDMARK_M)}
 
     return _responses(recording, strides, errors)
 
@@ -69,9 +70,7 @@ def _is_angle(name: str) -> bool:
 
 
 def _responses(
-    recording: WalkRecording,
-    strides: Strides,
-    errors: Callable[[list[str], np.ndarray, np.ndarray], Iterator[CoordinateErrors]],
+    recording: WalkRecording, strides: Strides, errors: Callable[[list[str], np.ndarray], CoordinateErrors]
 ) -> np.ndarray:
     """Return changes of the residual's waves in the first stride by errors of the coordinates: (errors, 6, k)."""
     _, rows, phase = strides.windows[0]
@@ -84,15 +83,11 @@ def _responses(
     total = recording.plates.total[rows]
 
     def residual(own: dict[str, np.ndarray]) -> np.ndarray:
-        motion = recording.moved(clock, own).part(inside)
+        motion = recording.moved(clock, {n: c + own.get(n, 0.0) for n, c in columns.items()}).part(inside)
         return about(total - required(motion), centre_of_mass(motion))
 
-    base = residual(columns)
-    out = []
-    for one in errors(list(columns), clock, turn):
-        moved = {**columns, **{n: columns[n] + error for n, error in one.items()}}
-        out.append((residual(moved) - base)[:, :, None])
-    return strides.first(np.concatenate(out, axis=2))
+    base = residual({})
+    return strides.first(np.stack([residual(one) - base for one in errors(list(columns), turn)], axis=2))
 
 
 def compressed(columns: np.ndarray) -> np.ndarray:
