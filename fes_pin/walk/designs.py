@@ -78,12 +78,12 @@ class Designs:
         return Design(trials, self._residual(trials), x, later_s)
 
     def _residual(self, trials: list[WalkTrial]) -> np.ndarray:
-        return self.strides.mean([s.residual[:, :, None] for s in trials])[..., 0]
+        return self.strides.mean([s.residual for s in trials])
 
     @cached_property
     def measured(self) -> np.ndarray:
         """The measured reaction in every stride: (n, 6, k)."""
-        return self.strides.coefficients([s.measured[:, :, None] for s in self.as_read.trials])[..., 0]
+        return self.strides.coefficients([s.measured for s in self.as_read.trials])
 
     @cached_property
     def landmarks(self) -> np.ndarray:
@@ -152,7 +152,7 @@ class Designs:
     def by_stride(self, names: Names) -> tuple[np.ndarray, np.ndarray]:
         """Return residual (n, 6, k) and columns (n, 6, k, p) of a set, stride by stride."""
         trials = self.design(names).trials
-        y = self.strides.coefficients([s.residual[:, :, None] for s in trials])[..., 0]
+        y = self.strides.coefficients([s.residual for s in trials])
         return y, self.strides.coefficients([self.signals(names, s) for s in trials])
 
     def signals(self, names: Names, trial: WalkTrial) -> np.ndarray:
@@ -178,7 +178,7 @@ def _taken(trials: list[WalkTrial], strides: Strides) -> np.ndarray:
     square of the frequency, as errors of accelerations do.
     """
     h = strides.harmonics
-    needed = strides.mean([s.needed[:, :, None] for s in trials])[..., 0]
+    needed = strides.mean([s.needed for s in trials])
     waves = needed * (h > 0)
     out = np.zeros((*waves.shape, 7))
     out[:, range(6), :, range(6)] = TAKEN * np.moveaxis(waves, 1, 0)

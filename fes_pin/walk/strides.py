@@ -46,22 +46,23 @@ class Strides:
         return [np.linalg.pinv(_waves(phase, self.harmonics)) for _, _, phase in self.windows]
 
     def coefficients(self, signals: Sequence[np.ndarray]) -> np.ndarray:
-        """Return coefficients of signals (n, 6, p) of each trial: (strides, 6, k, p); their squares sum to the mean
-        square."""
-        out = []
-        for (trial, rows, _), inverse in zip(self.windows, self._inverses, strict=True):
-            values = signals[trial][rows]
-            flat = inverse @ values.reshape(len(values), int(np.prod(values.shape[1:])))
-            out.append(np.moveaxis(flat.reshape(len(self.harmonics), *values.shape[1:]), 0, 1))
-        return np.array(out)
+        """Return coefficients of signals (n, 6, ...) of each trial; their squares sum to the mean square.
+
+        Returns
+        -------
+        ndarray
+            Shape (strides, 6, k, ...).
+        """
+        pairs = zip(self.windows, self._inverses, strict=True)
+        out = [np.tensordot(inverse, signals[trial][rows], 1) for (trial, rows, _), inverse in pairs]
+        return np.array(out).swapaxes(1, 2)
 
     def first(self, values: np.ndarray) -> np.ndarray:
         """Return coefficients of signals (n, 6, draws) that are known in the first stride only: (draws, 6, k)."""
-        flat = self._inverses[0] @ values.reshape(len(values), -1)
-        return np.moveaxis(flat.reshape(len(self.harmonics), *values.shape[1:]), (0, 2), (2, 0))
+        return np.tensordot(self._inverses[0], values, 1).transpose(2, 1, 0)
 
     def mean(self, signals: Sequence[np.ndarray]) -> np.ndarray:
-        """Return the mean coefficients over strides: (1, 6, k, p)."""
+        """Return the mean coefficients over strides: (1, 6, k, ...)."""
         return self.coefficients(signals).mean(axis=0, keepdims=True)
 
 
