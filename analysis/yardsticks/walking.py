@@ -12,6 +12,7 @@ from fes_pin.body.joints import SIDES
 from fes_pin.data.motion import OPTIONAL
 from fes_pin.data.smooth import low_pass, rates
 from fes_pin.walk.motion import Motion, has_rates
+from fes_pin.walk.plates import LOADED_N
 
 
 def rooted_motion(free: Motion, columns: Mapping[str, np.ndarray], rows: slice) -> Motion:
@@ -101,3 +102,21 @@ def _part(model: pin.Model, data: pin.Data, side: str, push: np.ndarray) -> int:
     origin = data.oMi[joint].translation if joint > 1 else fore.translation
     pressure = np.array([-push[4] / push[2], push[3] / push[2], 0.0])
     return int(float(ahead[:2] @ (pressure - origin)[:2]) > 0.0)
+
+
+def pressure_and_free_moment(wrench: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where a reaction pierces the ground z = 0, and its free moment about the vertical there.
+
+    Parameters
+    ----------
+    wrench
+        (n, 6) force and moment about the world's origin.
+
+    Returns
+    -------
+    point, free
+        (n, 2) m and (n,) N m; NaN where the vertical force is below 20 N.
+    """
+    up = np.where(wrench[:, 2] > LOADED_N, wrench[:, 2], np.nan)
+    point = np.stack([-wrench[:, 4] / up, wrench[:, 3] / up], axis=1)
+    return point, wrench[:, 5] - (point[:, 0] * wrench[:, 1] - point[:, 1] * wrench[:, 0])

@@ -168,32 +168,34 @@ def _penalised(values: np.ndarray, penalty: float) -> np.ndarray:
     return scipy.linalg.solveh_banded(bands, values)
 
 
-def explained(value: np.ndarray, against: np.ndarray) -> float:
-    """Share of the variance of a quantity that is a function of one variable alone: its correlation ratio, 0 to 1.
+def binned(value: np.ndarray, against: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+    """Return the medians of a variable and of a quantity in bins of equal width of the variable.
+
+    The outermost hundredth of the variable's values on either side goes to the outermost bins; bins with fewer than
+    `FEW` values are left out.
 
     Parameters
     ----------
     value, against
-        Shape (n,).
-    """
-    size = float(np.abs(value).max(initial=0.0)) or 1.0  # a share has no unit, and squares of 1e200 no number
-    groups = [g / size for _, g in binned(value, against)]
-    seen = np.concatenate(groups)
-    total = float(np.sum((seen - seen.mean()) ** 2))
-    between = sum(len(g) * float(g.mean() - seen.mean()) ** 2 for g in groups)
-    return between / total if total > 0 else 0.0
+        The quantity and the variable: shape (n,).
 
-
-def binned(value: np.ndarray, against: np.ndarray) -> list[tuple[float, np.ndarray]]:
-    """The values in bins of equal width of one variable: its median in each bin, and the values there.
-
-    The outermost hundredth of the variable's values on either side goes to the outermost bins; bins with fewer than
-    `FEW` values are left out.
+    Returns
+    -------
+    at, medians : ndarray
+        Shape (bins,).
+    share : float
+        Share of the variance of the quantity that is a function of the variable alone: its correlation ratio, 0 to 1.
     """
     low, high = np.quantile(against, (0.01, 0.99))
-    if high - low < 1e-9 * max(1.0, abs(high)):
-        return [(float(np.median(against)), value)]
-    index = np.clip(((against - low) / (high - low) * BINS).astype(int), 0, BINS - 1)
+    width = max((high - low) / BINS, 1e-9 * max(1.0, abs(high)) / BINS)
+    index = np.clip((against - low) / width, 0, BINS - 1).astype(int)
     chosen = [np.flatnonzero(index == k) for k in range(BINS)]
-    made = [(float(np.median(against[g])), value[g]) for g in chosen if len(g) >= FEW]
-    return made or [(float(np.median(against)), value)]
+    groups = [g for g in chosen if len(g) >= FEW] or [np.arange(len(value))]
+    at, medians = (np.array([float(np.median(v[g])) for g in groups]) for v in (against, value))
+    scaled = value / (
+        float(np.abs(value).max(initial=0.0)) or 1.0
+    )  # a share has no unit, and squares of 1e200 no number
+    seen = scaled[np.concatenate(groups)]
+    total = float(np.sum((seen - seen.mean()) ** 2))
+    between = sum(len(g) * float(scaled[g].mean() - seen.mean()) ** 2 for g in groups)
+    return at, medians, between / total if total > 0 else 0.0

@@ -14,7 +14,7 @@ from fes_pin.infer.noise import NoiseModel
 from fes_pin.infer.text import percent
 from fes_pin.view.chart import panels, svg
 from fes_pin.view.drawing import Drawing, rows_csv
-from fes_pin.view.missing import Missing, binned, explained, smoothed
+from fes_pin.view.missing import Missing, binned, smoothed
 from fes_pin.view.style import COLOURS, WIDTHS, label, milli, quantity
 
 DOTS = 500
@@ -114,7 +114,7 @@ def missing_drawing(
     position_unit
         As in `trial_drawing`.
     """
-    x, value = _joined(before, name)
+    value, x = _joined(before, name)
     factor, unit = milli(value, before[0].unit)
     drawing, axes = panels([150.0], NARROW, 58.0)
     panel = axes[0, 0]
@@ -122,17 +122,16 @@ def missing_drawing(
     panel.axhline(color=COLOURS["faint"], linewidth=0.8)
     chosen = _spread(x, value)
     panel.plot(x[chosen], factor * value[chosen], ".", color=COLOURS["nominal"], markersize=2.4)
-    at, middle = _medians(x, value)
+    at, middle, share_of = binned(value, x)
     panel.plot(at, factor * middle, color=COLOURS["measured"], linewidth=1.8)
     rows: list[tuple[str | float, ...]] = [("instant", a, b) for a, b in zip(x[chosen], value[chosen], strict=True)]
     rows += [("median_nominal", a, b) for a, b in zip(at, middle, strict=True)]
     left = ""
     if after:
-        there, stays = _medians(*_joined(after, name))
+        there, stays, _ = binned(*_joined(after, name))
         panel.plot(there, factor * stays, color=COLOURS["extended"], linewidth=2.8)
         rows += [("median_extended", a, b) for a, b in zip(there, stays, strict=True)]
         left = f"; of the extended model from {_short(stays.min())} to {_short(stays.max())} {before[0].unit}"
-    share_of = explained(value, x)
     limit = factor * _limit(before)
     panel.set(ylim=(-limit, limit), xlabel=label(name, position_unit), ylabel=f"missing {before[0].kind} ({unit})")
     panel.set_title(f"{100 * share_of:.0f} % of its variance", loc="right", color=COLOURS["ink"], fontsize=10)
@@ -147,12 +146,11 @@ def missing_drawing(
 
 def share(before: Sequence[Missing], name: str) -> float:
     """Share of the missing input's variance that is a function of one variable alone, 0 to 1."""
-    x, value = _joined(before, name)
-    return explained(value, x)
+    return binned(*_joined(before, name))[2]
 
 
 def _joined(many: Sequence[Missing], name: str) -> tuple[np.ndarray, np.ndarray]:
-    return np.concatenate([m.against[name] for m in many]), np.concatenate([m.value for m in many])
+    return np.concatenate([m.value for m in many]), np.concatenate([m.against[name] for m in many])
 
 
 def _limit(many: Sequence[Missing]) -> float:
@@ -168,11 +166,6 @@ def _spread(x: np.ndarray, value: np.ndarray) -> np.ndarray:
     )
     along = np.concatenate([[0.0], np.cumsum(steps + 0.3 * steps.mean() + 1e-12)])
     return np.unique(np.searchsorted(along, np.linspace(0.0, along[-1], min(DOTS, len(x)))))
-
-
-def _medians(x: np.ndarray, value: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    groups = binned(value, x)
-    return np.array([at for at, _ in groups]), np.array([float(np.median(v)) for _, v in groups])
 
 
 def stimulus_drawing(trial: Trial, position_unit: str = "rad") -> Drawing:

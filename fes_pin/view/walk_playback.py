@@ -7,7 +7,7 @@ from fes_pin.view.arrows import Arrow
 from fes_pin.view.viewer import FRAMES_A_SECOND, BodyScene
 from fes_pin.walk.dynamics import centre_of_mass, required
 from fes_pin.walk.motion import Motion
-from fes_pin.walk.plates import LOADED_N, Plates, pressure_and_free_moment
+from fes_pin.walk.plates import LOADED_N, Plates
 from fes_pin.walk.result import WalkDiagnosis
 
 PLAYBACK_FILE = "playback.html"
@@ -66,6 +66,6 @@ def _way(motion: Motion) -> np.ndarray:
 def _arrow(wrench: np.ndarray, way: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Foot and vector of a reaction; nothing where the feet carry nothing."""
     up = wrench[:, 2] > LOADED_N
-    pressure = np.where(up[:, None], pressure_and_free_moment(wrench)[0], 0.0)
+    pressure = np.column_stack([-wrench[:, 4], wrench[:, 3]]) / np.where(up, wrench[:, 2], np.inf)[:, None]
     foot = np.column_stack([pressure, np.zeros(len(wrench))]) - np.where(up[:, None], way, 0.0)
     return foot, METRES_A_NEWTON * wrench[:, :3] * up[:, None]

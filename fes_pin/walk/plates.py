@@ -110,21 +110,3 @@ def _held(point: np.ndarray, loaded: np.ndarray) -> np.ndarray:
     if not loaded.any():
         return np.zeros_like(point)
     return point[distance_transform_edt(~loaded, return_distances=False, return_indices=True)[0]]
-
-
-def pressure_and_free_moment(wrench: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where a reaction pierces the ground z = 0, and its free moment about the vertical there.
-
-    Parameters
-    ----------
-    wrench
-        (n, 6) force and moment about the world's origin.
-
-    Returns
-    -------
-    point, free
-        (n, 2) m and (n,) N m; NaN where the vertical force is below 20 N.
-    """
-    up = np.where(wrench[:, 2] > LOADED_N, wrench[:, 2], np.nan)
-    point = np.stack([-wrench[:, 4] / up, wrench[:, 3] / up], axis=1)
-    return point, wrench[:, 5] - (point[:, 0] * wrench[:, 1] - point[:, 1] * wrench[:, 0])

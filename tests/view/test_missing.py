@@ -6,7 +6,7 @@ from fes_pin.diagnosis.replay import replayed_trials
 from fes_pin.models.effects import effect_named
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.simulate import simulate
-from fes_pin.view.missing import binned, explained, missing_input, smooth
+from fes_pin.view.missing import binned, missing_input, smooth
 
 
 def missing_of(study, added, index=0):
@@ -61,11 +61,13 @@ def test_smooth_takes_what_has_no_noise(values):
 def test_the_share_explained_is_one_of_a_function_and_small_of_noise():
     rng = np.random.default_rng(0)
     x = rng.uniform(-1.0, 1.0, 4000)
-    assert explained(np.sign(x), x) > 0.95
-    assert explained(1e200 * np.sign(x), x) == explained(np.sign(x), x)
-    assert explained(rng.standard_normal(4000), x) < 0.02
-    assert explained(np.ones(10), np.zeros(10)) == 0.0
-    assert sum(len(values) for _, values in binned(x, x)) == 4000
+    share = binned(np.sign(x), x)[2]
+    assert share > 0.95
+    assert binned(1e200 * np.sign(x), x)[2] == share
+    assert binned(rng.standard_normal(4000), x)[2] < 0.02
+    assert binned(np.ones(10), np.zeros(10))[2] == 0.0
+    at, medians, _ = binned(2.0 * x, x)
+    assert np.allclose(medians, 2.0 * at) and (np.diff(at) > 0.0).all()
 
 
 def test_a_replay_has_every_trial_in_order():

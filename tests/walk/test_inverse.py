@@ -5,7 +5,7 @@ import csv
 import numpy as np
 import pinocchio as pin
 import pytest
-from yardsticks.walking import joint_torques, rooted_motion
+from yardsticks.walking import joint_torques, pressure_and_free_moment, rooted_motion
 
 from fes_pin.body.build import Body
 from fes_pin.body.skeleton import TO_WORLD
@@ -19,7 +19,6 @@ from fes_pin.walk.dynamics import (
     segment_regressors,
 )
 from fes_pin.walk.motion import PELVIS_TO_HIP, Session, motion_of
-from fes_pin.walk.plates import pressure_and_free_moment
 
 pytestmark = pytest.mark.shared
 CARRIERS = {"trunk": "torso", "pelvis": "pelvis", "right_thigh": "femur_r", "left_thigh": "femur_l"}
