@@ -8,9 +8,8 @@ import numpy as np
 
 from fes_pin.comparison.own_part import own_part, pairs_of, stride
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.errors_ahead import free_residuals
 from fes_pin.diagnosis.held_out import folds_of
-from fes_pin.identify.ahead import forecast, own_noise
+from fes_pin.identify.ahead import forecast, free_residuals, own_noise
 from fes_pin.identify.fit import Fit, fit_multistart
 from fes_pin.identify.problem import Problem
 from fes_pin.infer.held_out import within

@@ -7,13 +7,12 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from fes_pin.data.trial import Trial
-from fes_pin.identify.ahead import forecast, forecasts, one_step, reach_of
+from fes_pin.identify.ahead import forecast, forecasts, free_ahead, free_residuals, one_step, reach_of
 from fes_pin.identify.likelihood import is_simulated
 from fes_pin.identify.likelihood_fit import LikelihoodFit
-from fes_pin.identify.per_trial import predictions
 from fes_pin.identify.process_noise import driving_size, first_guess
-from fes_pin.infer.held_out import FOLDS, Errors, joined_errors, within
-from fes_pin.infer.levels import AVERAGED_S, RUNAWAY, SMALL_SHARE
+from fes_pin.infer.held_out import FOLDS, Errors, joined_errors
+from fes_pin.infer.levels import AVERAGED_S, SMALL_SHARE
 from fes_pin.infer.noise import NoiseModel
 from fes_pin.models.autoregression import weights_ahead
 from fes_pin.models.model import Model
@@ -187,13 +186,12 @@ def _predict(fitted: LikelihoodFit, trial: Trial, horizon_s: float) -> _Predicte
 
 def _predict_freely(fitted: LikelihoodFit, trial: Trial, horizon_s: float) -> _Predicted:
     """Return the same without process noise: a free simulation plus the prediction of autoregressive noise."""
-    predicted, variances = {}, {}
+    predicted, variances = free_ahead(fitted.model, trial, fitted.noise, horizon_s), {}
     steps = max(1, round(horizon_s / trial.dt))
-    for name, missed in free_residuals(fitted.model, trial, fitted.noise).items():
+    for name in predicted:
         noise = fitted.noise[name]
-        predicted[name] = trial[name] - missed + forecast(np.nan_to_num(missed), noise, trial.dt, horizon_s)
         grown = np.append(1.0, weights_ahead(noise.ar, steps - 1)[:, 0] if noise.ar else np.zeros(steps - 1))
-        variances[name] = np.where(np.isfinite(missed), (noise.innovation_std**2) * float(grown @ grown), 0.0)
+        variances[name] = np.where(np.isfinite(trial[name]), (noise.innovation_std**2) * float(grown @ grown), 0.0)
     return predicted, variances
 
 
@@ -254,17 +252,3 @@ def _sums(fitted: LikelihoodFit, floor: LikelihoodFit, trial: Trial, horizon_s: 
     with np.errstate(all="ignore"):
         around = [float(np.nansum(spread if k in (0, 2) else spread[~begun])) for k in range(len(errors))]
         return np.array([[float(np.nansum(e**2)) for e in errors], around]) / floor.noise.white[name] ** 2
-
-
-def free_residuals(model: Model, trial: Trial, noise: NoiseModel) -> dict[str, np.ndarray]:
-    """Return measured minus freely simulated, shape (n,), by output column of a trial; NaN where unmeasured.
-
-    The error of a simulation that diverges is limited to `RUNAWAY` times the largest reading.
-    """
-    (readings,) = predictions(model, [trial], noise)
-    out = {}
-    for k, name in enumerate(model.rig.outputs(trial.kind)):
-        if name in trial.columns and name in noise:
-            most = RUNAWAY * float(np.nanmax(np.abs(trial[name]), initial=0.0))
-            out[name] = np.where(np.isfinite(trial[name]), within(trial[name] - readings[:, k], most), np.nan)
-    return out

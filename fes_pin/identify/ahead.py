@@ -20,6 +20,7 @@ from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit, noise_of
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.per_trial import cross_fitted_unknowns, predictions
+from fes_pin.infer.held_out import within
 from fes_pin.infer.levels import HORIZON_S, RUNAWAY
 from fes_pin.infer.noise import Noise, NoiseModel, thin, thinning
 from fes_pin.models.autoregression import weights_ahead
@@ -94,15 +95,28 @@ def predict_ahead(model: Model, trial: Trial, random: NoiseModel, horizon_s: flo
         raise InputError(f"expected a column {expected}: a prediction over a horizon goes on from what was measured")
     if isinstance(random, StateSpaceNoise):
         return over_horizon(model, trial, random, horizon_s)
-    (readings,) = predictions(model, [trial], random)
+    return free_ahead(model, trial, {n: random.get(n, Noise(1.0)) for n in outputs}, horizon_s)
+
+
+def free_residuals(model: Model, trial: Trial, noise: NoiseModel) -> dict[str, np.ndarray]:
+    """Return measured minus freely simulated, shape (n,), by output column of a trial; NaN where unmeasured.
+
+    The error of a simulation that diverges is limited to `RUNAWAY` times the largest reading.
+    """
+    (readings,) = predictions(model, [trial], noise)
     out = {}
     for k, name in enumerate(model.rig.outputs(trial.kind)):
-        if name in outputs:
-            free = readings[:, k]
-            out[name] = free + (
-                forecast(trial[name] - free, random[name], trial.dt, horizon_s) if name in random else 0.0
-            )
+        if name in trial.columns and name in noise:
+            most = RUNAWAY * float(np.nanmax(np.abs(trial[name]), initial=0.0))
+            out[name] = np.where(np.isfinite(trial[name]), within(trial[name] - readings[:, k], most), np.nan)
     return out
+
+
+def free_ahead(model: Model, trial: Trial, noise: NoiseModel, horizon_s: float) -> dict[str, np.ndarray]:
+    """Return a free simulation with the prediction of autoregressive noise over a horizon, shape (n,), by output."""
+    left = free_residuals(model, trial, noise)
+    ahead = {n: forecast(np.nan_to_num(missed), noise[n], trial.dt, horizon_s) for n, missed in left.items()}
+    return {n: trial[n] - missed + ahead[n] for n, missed in left.items()}
 
 
 def one_step(model: Model, trial: Trial, noise: StateSpaceNoise) -> dict[str, np.ndarray]:

@@ -6,7 +6,7 @@ import math
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -237,12 +237,7 @@ def fit_problem(
     return Fit(**ended(problem.model, found), trials=problem.trials, noise=problem.noise)
 
 
-def from_beginnings(
-    problem: Problem,
-    plain: F,
-    again: Callable[[Mapping[str, float], Unknowns], F],
-    max_iterations: int = MAX_ITERATIONS,
-) -> F:
+def from_beginnings(problem: Problem, plain: F, again: Callable[[Mapping[str, float], Unknowns], F]) -> F:
     """Return a fit, or the one from fits to the beginning of every trial, to twice as much of it, and so on, if better.
 
     The error of an angle by a wrong parameter grows with time, past half a swing. The sum of squares of a long trial
@@ -258,7 +253,7 @@ def from_beginnings(
     values, unknowns = problem.model.parameters(), None
     for share in GROWTH:
         short = problem.on([t.first(max(SHORTEST, round(share * len(t)))) for t in problem.trials])
-        near = minimise(short, values, unknowns, max_iterations)
+        near = minimise(short, values, unknowns)
         values, unknowns = near.values, near.unknowns
     grown = again(near.values, near.unknowns)
     return grown if grown.sse < plain.sse or not math.isfinite(plain.sse) else plain
@@ -269,9 +264,7 @@ def fit_multistart(problem: Problem, max_iterations: int = MAX_ITERATIONS) -> Fi
     plain = fit_problem(problem, problem.model.parameters(), max_iterations=max_iterations)
     if plain.reduced < GROSS:
         return plain
-    return from_beginnings(
-        problem, plain, lambda values, own: fit_problem(problem, values, own, max_iterations), max_iterations
-    )
+    return from_beginnings(problem, plain, partial(fit_problem, problem, max_iterations=max_iterations))
 
 
 def rough_fit(model: Model, trials: Sequence[Trial]) -> Fit:

@@ -16,8 +16,8 @@ from fes_pin.comparison.literature import LITERATURE, published_model
 from fes_pin.comparison.own_part import own_part
 from fes_pin.comparison.result import apart_from
 from fes_pin.data.errors import InputError
-from fes_pin.diagnosis.errors_ahead import free_errors, free_residuals
-from fes_pin.identify.ahead import forecast, own_noise
+from fes_pin.diagnosis.errors_ahead import free_errors
+from fes_pin.identify.ahead import forecast, free_residuals, own_noise
 from fes_pin.identify.fit import rough_noise
 
 DEMO = Path(__file__).parents[2] / "analysis/studies/ankle_demo"

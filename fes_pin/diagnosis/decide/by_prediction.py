@@ -11,9 +11,9 @@ from dataclasses import replace
 import numpy as np
 
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.errors_ahead import free_residuals
 from fes_pin.diagnosis.held_out import folds_of
 from fes_pin.diagnosis.search.likelihood_models import LikelihoodSearch
+from fes_pin.identify.ahead import free_residuals
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.problem import limits_of
