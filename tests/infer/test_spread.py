@@ -52,3 +52,14 @@ def test_p_values_are_those_of_units_that_scatter(scatter, alarms):
         spread = ByUnit.of(moved, y - moved, parts).clustered()
         low += spread.p_value(float(moved @ moved), 1) < 0.05
     assert low / 1000 == pytest.approx(alarms, abs=0.021)
+
+
+def test_a_part_of_the_residual_that_all_units_share_is_no_spread():
+    """A cause changes the gains of a filter too: the residual at the maximum is then not orthogonal to its effect."""
+    rng, parts = np.random.default_rng(4), trials([30] * 8)
+    moved = np.repeat([0.0, 5.0, 0.1, 0.2, 1.0, 2.0, 0.0, 0.4], 30)
+    y = rng.standard_normal(240)
+    left = y - moved * (moved @ y) / (moved @ moved)
+    apart, shared = (ByUnit.of(moved, r, parts).clustered() for r in (left, left - 0.1 * moved))
+    assert shared.phi == pytest.approx(apart.phi, rel=1e-9)
+    assert shared.free == apart.free
