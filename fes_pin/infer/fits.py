@@ -126,10 +126,6 @@ class FittedSets(ABC, Generic[F, S]):
         """Return the same set in another form that is significant; None where none is."""
         return None
 
-    def other_form(self, fitted: F) -> F | None:
-        """Return the same set in a form that another order of refinements reaches, where that is better; else None."""
-        return None
-
     def begin_again(self, names: Names) -> bool:
         """Fit a set and the nominal model with another kind of noise; return False where none lowers the criterion."""
         return False

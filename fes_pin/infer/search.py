@@ -107,9 +107,6 @@ class Models(Protocol[F, M_co]):
     def better_form(self, fitted: F) -> F | None:
         """Return the same set in another form that is significant; None where none is."""
 
-    def other_form(self, fitted: F) -> F | None:
-        """Return the same set in a form that another order of refinements reaches, where that is better; else None."""
-
     def begin_again(self, names: Names) -> bool:
         """Fit a set and the nominal model with another kind of noise; return False where none lowers the criterion."""
 
@@ -312,23 +309,10 @@ class Search(Generic[F, M]):
 
     def _reform(self, names: Names) -> None:
         """Give a set, once, the form that is significant."""
-        while names not in self._formed and self._replaced(names, self._sets.better_form(self._sets.fits[names])):
-            pass
+        fits = self._sets.fits
+        while names not in self._formed and (better := self._sets.better_form(fits[names])) is not None:
+            fits[names] = better
         self._formed.add(names)
-
-    def _replaced(self, names: Names, better: F | None) -> bool:
-        """Take a better fit of a set; return False if there is none."""
-        if better is not None:
-            self._sets.fits[names] = better
-        return better is not None
-
-    def form_otherwise(self, names: Names) -> bool:
-        """Give a set another form if that is better; return False if none is, or time is up."""
-        try:
-            with time_limit(self.seconds_left):
-                return self._replaced(names, self._sets.other_form(self._sets.fits[names]))
-        except OutOfTime:
-            return False
 
     def _backward(self, names: Names) -> Names:
         """Drop candidates that are not significant given the others."""

@@ -77,8 +77,6 @@ class State(Generic[F, M, W]):
         Candidates that no answer may contain.
     settled
         The set for which rivals were searched last.
-    formed
-        Sets that were tried in another form.
     steps
         The claims that changed the state, in their order.
     replaced
@@ -90,7 +88,6 @@ class State(Generic[F, M, W]):
     weighed: W
     rejected: Mapping[str, Rejected]
     settled: frozenset[str]
-    formed: frozenset[frozenset[str]] = frozenset()
     steps: tuple[str, ...] = ()
     replaced: State[F, M, W] | None = None
 
@@ -123,7 +120,6 @@ class Verdict(ABC, Generic[F, M, W]):
             self.drop_unsupported,
             self.settle,
             self.drop_rarely_chosen,
-            self.try_another_form,
             self.switch_estimator,
         )
 
@@ -194,17 +190,6 @@ class Verdict(ABC, Generic[F, M, W]):
     def drop_rarely_chosen(self, state: State[F, M, W]) -> State[F, M, W] | None:
         """Reject the weakest of the candidates that most folds of the data do not choose."""
         return self._without_weakest(state, [n for n in state.names if self.is_rarely_chosen(state, n)])
-
-    def try_another_form(self, state: State[F, M, W]) -> State[F, M, W] | None:
-        """Give a set with a lack of fit another form; rejected candidates may return."""
-        names = tuple(sorted(state.names))
-        if not self.lack_of_fit(state).unexplained or state.names in state.formed:
-            return None
-        if not state.search.form_otherwise(names):
-            return None
-        found = state.search.settle(names)
-        settled, formed = frozenset(found.without), state.formed | {state.names}
-        return replace(state, found=found, weighed=self.weigh(found), rejected={}, settled=settled, formed=formed)
 
     def switch_estimator(self, state: State[F, M, W]) -> State[F, M, W] | None:
         """Take the verdict of another estimator of the same data if it predicts them better; this is tried once.

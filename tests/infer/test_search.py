@@ -1,13 +1,11 @@
 """Sets are extended by one candidate at a time; a rival that is better together with the others takes its place."""
 
 import itertools
-import time
 from types import SimpleNamespace
 
 import pytest
 
 from fes_pin.infer.search import Search
-from fes_pin.workers import check_limit, time_limit
 
 COST = {
     (): 0.0,
@@ -152,15 +150,3 @@ def test_other_forms_are_tried_of_sets_with_half_of_what_they_must_gain(search):
     assert not search._is_rough(("lag", "tendon"), ("lag",))
     search._reform(("lag", "velocity"))
     assert not search._is_rough(("lag", "velocity"), ("lag",))
-
-
-def test_no_other_form_is_tried_past_the_limit_of_the_search(search):
-    better = search.models.fits[()]
-    search.models.other_form = lambda base: check_limit() or better
-    assert search.form_otherwise(())
-    search.models.near = lambda size: check_limit()
-    with time_limit(0.0):
-        time.sleep(0.01)
-        search.run()
-    assert search.was_stopped
-    assert not search.form_otherwise(())

@@ -8,13 +8,11 @@ import numpy as np
 from fes_pin.diagnosis.decide.significance import level_of
 from fes_pin.diagnosis.search.likelihood_maxima import LikelihoodMaxima
 from fes_pin.diagnosis.search.refined_forms import is_identified
-from fes_pin.diagnosis.search.starts import STARTS, number_of_forms, refinements, restarted_forms
+from fes_pin.diagnosis.search.starts import STARTS, number_of_forms, refinements
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.distributions import chi2_quantile, chi2_tail
 from fes_pin.infer.fits import more_degrees
-from fes_pin.infer.optimize import WORTH
 from fes_pin.infer.search import Fitted
-from fes_pin.models.stage import Effect
 from fes_pin.workers import in_parallel
 
 F = TypeVar("F", bound=Fitted)
@@ -34,15 +32,9 @@ class LikelihoodForms:
     def __init__(self, maxima: LikelihoodMaxima, measured: Mapping[str, np.ndarray]) -> None:
         self._maxima, self._measured = maxima, measured
 
-    def refined(self, base: LikelihoodFit, barred: str | None = None) -> LikelihoodFit | None:
-        """Return the best fit of a set with one more refinement; None where none is significant.
-
-        Parameters
-        ----------
-        barred
-            A refinement that is not tried.
-        """
-        models = [refinements(base.model, effect, self._measured, barred) for effect in base.model.effects]
+    def refined(self, base: LikelihoodFit) -> LikelihoodFit | None:
+        """Return the best fit of a set with one more refinement; None where none is significant."""
+        models = [refinements(base.model, effect, self._measured) for effect in base.model.effects]
         looks = in_parallel(lambda s: self._maxima.look(s, base), [s for many in models for s in many])
         level = level_of(base) / number_of_forms(base.model, base.model.effects)
 
@@ -50,25 +42,6 @@ class LikelihoodForms:
             return [f for f in in_parallel(self._maxima.go_on, worth) if is_identified(f, base)]
 
         return demanded_form(base, looks, level, finished)
-
-    def otherwise(self, base: LikelihoodFit) -> LikelihoodFit | None:
-        """Return the best fit of a set with one of its refinements barred; None if no criterion is lower.
-
-        The form is grown from no refinement. Refinements are adopted one after another, the one that explains most
-        first; two others together may explain more.
-        """
-        each = [(e, [n for n, *_ in e.refinements() if n in e.refined()]) for e in base.model.effects]
-        found = (self._grown(base, e, n) for e, adopted in each if len(adopted) > 1 for n in adopted)
-        best = min(found, key=lambda f: f.criterion, default=base)
-        return best if best.criterion < base.criterion - WORTH else None
-
-    def _grown(self, base: LikelihoodFit, effect: Effect, barred: str) -> LikelihoodFit:
-        """Return a set with one effect in the form that is significant if one refinement of it is barred."""
-        adopted = [n for n, *_ in effect.refinements() if n in effect.refined()]
-        fitted = self._maxima.go_on(self._maxima.look(self._maxima.less(base, adopted, effect), base))
-        while (better := self.refined(fitted, barred)) is not None:
-            fitted = better
-        return fitted
 
     def simplified(self, base: LikelihoodFit) -> LikelihoodFit | None:
         """Return the best fit of a set with one refinement fewer; None where no criterion is lower.
@@ -78,14 +51,6 @@ class LikelihoodForms:
         both = ((e, n) for e in base.model.effects for n, *_ in e.refinements() if n in e.refined())
         starts = in_parallel(lambda one: self._maxima.less(base, one[1:], one[0]), list(both))
         return self._maxima.better(starts, base, base.criterion)
-
-    def reformed(self, base: LikelihoodFit) -> LikelihoodFit | None:
-        """Return a set with all refinements of a cause restarted together; None where the criterion is no lower.
-
-        They were adopted one after another, so that the first may be distorted by what a later one explains.
-        """
-        starts = [s for effect in base.model.effects for s in restarted_forms(base.model, effect, self._measured)]
-        return self._maxima.better(starts, base, base.criterion - WORTH)
 
 
 def demanded_form(

@@ -95,17 +95,13 @@ class LikelihoodModels(LikelihoodFits):
         return not (are_large(random_parts(fitted)) or lack_of_fit(fitted, self.seed).unexplained)
 
     def better_form(self, fitted: LikelihoodFit) -> LikelihoodFit | None:
-        """Return a set with one refinement fewer, one more, or all restarted, where that is better; else None.
+        """Return a set with one refinement fewer, or one more, where that is better; else None.
 
         It is None by least squares: where a model is wrong every further parameter is significant.
         """
         if self.noise == WHITE:
             return None
-        return self.forms.simplified(fitted) or self.forms.refined(fitted) or self.forms.reformed(fitted)
-
-    def other_form(self, fitted: LikelihoodFit) -> LikelihoodFit | None:
-        """See `LikelihoodForms.otherwise`."""
-        return None if self.noise == WHITE else self.forms.otherwise(fitted)
+        return self.forms.simplified(fitted) or self.forms.refined(fitted)
 
 
 LikelihoodSearch = Search[LikelihoodFit, LikelihoodModels]

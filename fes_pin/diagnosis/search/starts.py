@@ -39,16 +39,14 @@ def started(effect: Effect, amplitudes: Mapping[str, float]) -> Effect:
     return replace(effect, **values)
 
 
-def refinements(
-    model: Model, effect: Effect, measured: Mapping[str, np.ndarray], barred: str | None = None
-) -> list[Model]:
-    """Return starts with one more refinement of an effect switched on, without the barred one.
+def refinements(model: Model, effect: Effect, measured: Mapping[str, np.ndarray]) -> list[Model]:
+    """Return starts with one more refinement of an effect switched on.
 
     A value equal to the refinement's null switches nothing on and gives no start.
     """
     out, info, refined, grids = [], effect.parameters(), effect.refined(), effect.grids(measured)
     for names in effect.refinements():
-        if names[0] in refined or names[0] == barred or not fits_rig(model, info[names[0]]):
+        if names[0] in refined or not fits_rig(model, info[names[0]]):
             continue
         paths = [f"{effect.name}.{n}" for n in names]
         for values in itertools.product(*(grids[n] for n in names)):
@@ -66,13 +64,3 @@ def number_of_forms(model: Model, effects: Sequence[Effect]) -> int:
 def fits_rig(model: Model, refinement: ParameterInfo) -> bool:
     """Return whether a refinement is for the model's rig."""
     return not refinement.rigs or model.rig.is_one_of(refinement.rigs)
-
-
-def restarted_forms(model: Model, effect: Effect, measured: Mapping[str, np.ndarray]) -> list[Model]:
-    """Return the start of an effect with its refinements at their first grid values; none if it has fewer than two."""
-    adopted = [names for names in effect.refinements() if names[0] in effect.refined()]
-    if len(adopted) < 2:
-        return []
-    grids = effect.grids(measured)
-    starts = {f"{effect.name}.{n}": grids[n][0] for names in adopted for n in names if len(grids[n])}
-    return [model.with_parameters(starts)]
