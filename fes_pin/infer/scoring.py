@@ -239,27 +239,13 @@ class _Scoring:
         if found is None:
             done = self.left < WORTH or len(self.lengths) == 1
             self.lengths = self.lengths[1:] or self.lengths
-            return done and not self._leap()
+            return done
         k, end, after = found
         step, gained = self.z - end, self.now.cost - after.cost
         self.left = abs(gained - slopes.predicted(step))
         self.held = self.scale.held(end, gradient - information @ step)
         self.z, self.now, self.damping = end, after, max(0.3 * float(dampings[k]), 1e-6)
         return min(gained, self.left) < LITTLE
-
-    def _leap(self) -> bool:
-        """Take the longest step in one logarithm of the noise that lowers the cost; return False if none does.
-
-        It serves where slopes are meaningless, as a prediction with dry friction changes abruptly with the gains.
-        """
-        axes = np.eye(len(self.z))[len(self.scale.units) :] * LONGEST_MOVE
-        ends = np.array([np.clip(self.z + m, self.scale.low, self.scale.high) for m in (*axes, *-axes)])
-        tried = [one for k in range(0, len(ends), self.batch) for one in self.at_all(ends[k : k + self.batch])]
-        best = min(range(len(tried)), key=lambda k: tried[k].cost, default=None)
-        if best is None or not tried[best].cost < self.now.cost - WORTH:
-            return False
-        self.z, self.now, self.lengths = ends[best], tried[best], list(STEPS)
-        return True
 
 
 def _first_below(

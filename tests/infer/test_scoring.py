@@ -85,21 +85,6 @@ def test_what_a_prediction_runs_away_beside_stays_and_the_others_move():
     assert found.values["slope"] == pytest.approx(SLOPE, abs=0.05)
 
 
-def test_where_slopes_are_of_what_flips_what_is_random_leaps():
-    """Innovations that seem larger after every small step, whichever way, and noise that begins much too small."""
-
-    class Flips(Line):
-        def one(self, values, random):
-            told, std = super().one(values, random), random.get("std", self.noise_parameters["std"])
-            flips = np.abs(np.sin(1e4 * np.log(std / self.noise_parameters["std"])))
-            return replace(told, innovations=told.innovations * (1.0 + 50.0 * flips))
-
-    line = Flips()
-    line.noise_parameters = {"std": 0.03 * STD}
-    found = fisher_scoring(line, {"slope": SLOPE, "offset": OFFSET}, [], {}, 12)
-    assert found.noise["std"] == pytest.approx(STD, rel=0.8)
-
-
 def test_a_bound_holds_a_parameter_and_the_others_move_beside_it():
     line = Line(slope=(-1e3, 1.0))
     found = climbed(line)
