@@ -15,7 +15,7 @@ from fes_pin.body.gait import posture_angles
 from fes_pin.body.joints import JOINT_NAMES, JOINTS, SIDES, angles_array, axis_of, side_of
 from fes_pin.body.skeleton import Skeleton, read_segments
 from fes_pin.body.urdf import origin_of, write_urdf
-from fes_pin.data.errors import InputError
+from fes_pin.data.errors import InputError, errors_of
 from fes_pin.data.files import read_text, write_text
 from fes_pin.data.named import NamedArray
 from fes_pin.data.numbers import known_word, positive_number, shortened
@@ -149,11 +149,9 @@ class Body:
             The file is no URDF, its joints are not the 19 or turn about other axes, or a segment has no mass.
         """
         moving_joints(_a_path(path))  # links, masses and joints that no body has are said with their row
-        try:
+        with errors_of(path):
             text = read_text(path)
             body = cls(text, _stance_of(_parsed(text)), None, Path(path).name)
-        except InputError as error:
-            raise InputError(error.message, file=path, column=error.column) from None
         if not body.model.existFrame("vertex"):
             return body
         return replace(body, height_m=float(body.placement("vertex", "neutral")[1][2]))

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from fes_pin.body.joints import JOINTS, SEGMENT_NAMES, SIDES
-from fes_pin.data.errors import InputError
+from fes_pin.data.errors import InputError, errors_of
 from fes_pin.data.files import read_text
 from fes_pin.data.numbers import numbers
 from fes_pin.data.read_only import ReadOnly
@@ -114,10 +114,8 @@ def read_segments(path: str | Path) -> Skeleton:
         table = json.loads(read_text(path))
     except (json.JSONDecodeError, RecursionError) as error:
         raise InputError(f"cannot be read as a table of segments: {error}", file=path) from None
-    try:
+    with errors_of(path):
         return skeleton_of_table(table)
-    except InputError as error:
-        raise InputError(error.message, file=path, column=error.column) from None
 
 
 def skeleton_of_table(table: Mapping) -> Skeleton:

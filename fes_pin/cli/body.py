@@ -10,7 +10,7 @@ import typer
 
 from fes_pin.cli.group import App, needs, python_names, release_output
 from fes_pin.cli.options import Force, output
-from fes_pin.data.errors import InputError
+from fes_pin.data.errors import InputError, errors_of
 from fes_pin.data.numbers import between
 
 app = App(help="The walking body: modes, nerves, view.")
@@ -237,9 +237,7 @@ def _walking(body, path: Path):
     from fes_pin.view.viewer import show_walk
 
     time, columns = read_coordinates(path)
-    try:
+    with errors_of(path):
         postures, turns = postures_of_walk(columns, body.stance, flat_foot=False), pelvis_turns(columns)
-    except InputError as error:
-        raise InputError(error.message, file=path, column=error.column) from None
     rate = int(np.clip(round(1.0 / float(np.median(np.diff(time)))), 1, 120))
     return show_walk(body, postures, rate, f"{path.name} ({body.label})", turns)

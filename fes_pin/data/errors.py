@@ -1,6 +1,7 @@
 """The one error that bad input raises: a line that says where it is and what was expected."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 
@@ -48,6 +49,21 @@ def fault_at(column: str = "{}", file: str | Path | None = None) -> KeyFault:
         Where it stands.
     """
     return lambda key, message: InputError(message, file=file, column=column.format(key))
+
+
+@contextmanager
+def errors_of(file: str | Path | None) -> Iterator[None]:
+    """Let errors of input name a file.
+
+    Raises
+    ------
+    InputError
+        In the place of one that was raised within.
+    """
+    try:
+        yield
+    except InputError as error:
+        raise InputError(error.message, file=file, column=error.column) from None
 
 
 def _short(name: str, most: int = 500) -> str:

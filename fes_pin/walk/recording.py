@@ -2,14 +2,14 @@
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from fes_pin.body.build import Body
-from fes_pin.data.errors import InputError
+from fes_pin.data.errors import InputError, errors_of
 from fes_pin.data.smooth import CUTOFF_HZ
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
@@ -76,21 +76,20 @@ def body_of(study: Study) -> tuple[Body, np.ndarray]:
     if "urdf" in study.files:
         body = Body.from_urdf(study.files["urdf"])
         if body.height_m is None and height is not None:
-            body = Body(body.urdf, body.stance, height, body.label)
+            body = replace(body, height_m=height)
         return body, pelvis_to_hip(body)
     if "segments" in study.files:
         path = study.files["segments"]
         body = Body.from_segments(path)
-        try:
-            return _as_heavy(body, study), pelvis_to_hip(body, json.loads(path.read_text()))
-        except InputError as error:
-            raise InputError(error.message, file=path, column=error.column) from None
+        with errors_of(path):
+            _check_mass(body, study)
+            return body, pelvis_to_hip(body, json.loads(path.read_text()))
     body = Body.from_subject(study.constants["mass_kg"], study.constants["height_m"])
     return body, pelvis_to_hip(body)
 
 
-def _as_heavy(body: Body, study: Study) -> Body:
-    """The body itself, if the study's mass is not another one.
+def _check_mass(body: Body, study: Study) -> None:
+    """Refuse a body of another mass than the study's.
 
     Raises
     ------
@@ -100,7 +99,6 @@ def _as_heavy(body: Body, study: Study) -> Body:
     mass = study.constants.get("mass_kg", body.mass_kg)
     if abs(mass - body.mass_kg) > MASS_SHARE * body.mass_kg:
         raise InputError(f"its segments weigh {body.mass_kg:.2f} kg, and the study says mass_kg = {mass:g}")
-    return body
 
 
 def recordings_of(study: Study, *, cutoff_hz: float = CUTOFF_HZ, body: Body | None = None) -> list[WalkRecording]:
@@ -133,15 +131,11 @@ def _recording(trial: Trial, body: Body, hip: np.ndarray, cutoff_hz: float) -> W
         partial(motion_of, body, hip=hip, session=session),
         partial(plates_of, columns=dict(raw), session=session),
     )
-    try:
+    with errors_of(source):
         motion = moved(time, columns).part(inside)
         plates = read(raw_time, at=motion.time)
-    except InputError as error:
-        raise InputError(error.message, file=source, column=error.column) from None
-    try:
+    with errors_of(reaction):
         check_together(motion, plates)
         rows = carried_along(motion, plates)
-    except InputError as error:
-        raise InputError(error.message, file=reaction, column=error.column) from None
     used = motion.part(rows), plates.part(rows)
     return WalkRecording(trial.name, *used, time, dict(columns), raw_time, moved, read, session)
