@@ -27,7 +27,6 @@ from fes_pin.identify.correlation_time import words_of_reading
 from fes_pin.identify.effort_noise import words_of_noise
 from fes_pin.identify.effort_timing import words_of_lateness
 from fes_pin.identify.feedback import is_fed_back
-from fes_pin.infer.result import STOPPED
 from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
 from fes_pin.models.nominal import nominal_model
 from fes_pin.workers import Progress, noting_stops, one_thread_each, time_limit
@@ -88,11 +87,10 @@ def contrast(
         end = math.inf if limit is None else began + limit
         found = _Work(measured.study, catalogue, seed, tell, end, stops).contrast()
     tell(1.0, "done")
-    warnings += found.warnings
+    found = replace(found, warnings=(*warnings, *found.warnings))
     if stops:
-        warnings.append(f"the search was stopped at its limit of {limit:g} s: best set so far")
-        found = replace(found, verdict=STOPPED, unchanged={}, excluded={})
-    return replace(found, warnings=tuple(warnings), provenance=made, wall_s=time.perf_counter() - began)
+        found = replace(found, unchanged={}, excluded={})
+    return found.ended(began, made, limit if stops else None)
 
 
 class _Work:

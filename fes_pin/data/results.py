@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import json
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -265,6 +266,24 @@ class Result(Saveable):
         """Content of every file of the answer but the report, by name."""
         proposed = self.next_experiment.trial if self.next_experiment else None
         return {self.FILE: self.to_json(), **({NEXT_FILE: trial_csv(proposed)} if proposed else {})}
+
+    def ended(self, began: float, made: Provenance, limit: float | None) -> Self:
+        """Return the same with its origin and computing time; stopped where a limit of time ended its search.
+
+        Parameters
+        ----------
+        began
+            When it was begun, of `time.perf_counter`.
+        made
+            Its origin.
+        limit
+            The limit that ended the search, s; None where none did.
+        """
+        done = replace(self, provenance=made, wall_s=time.perf_counter() - began)
+        if limit is None:
+            return done
+        said = f"the search was stopped at its limit of {limit:g} s: best set so far"
+        return replace(done, verdict=STOPPED, warnings=(*self.warnings, said))
 
     def by_command(self, command: str) -> Self:
         """The same with a command line in its provenance."""

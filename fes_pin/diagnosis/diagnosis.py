@@ -32,7 +32,6 @@ from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodModels, 
 from fes_pin.diagnosis.testable import given_away
 from fes_pin.identify.feedback import is_fed_back, is_stimulus_fed_back
 from fes_pin.identify.recording import improves, low_pass_of
-from fes_pin.infer.result import STOPPED
 from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
@@ -92,11 +91,8 @@ def diagnose_joint(
     tell(1.0, "done")
     warnings += diagnosis.warnings
     warnings += few_trials(len(split(measured.study)[0])) if diagnosis.causes else []
-    if stops:
-        warnings.append(f"the search was stopped at its limit of {limit:g} s: best set so far")
-        diagnosis = replace(diagnosis, verdict=STOPPED)
     found = replace(diagnosis, left_out=measured.left_out, warnings=tuple(warnings), catalogue=catalogue)
-    return replace(found, provenance=made, wall_s=time.perf_counter() - began)
+    return found.ended(began, made, limit if stops else None)
 
 
 class _Work:

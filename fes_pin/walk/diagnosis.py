@@ -9,7 +9,6 @@ from fes_pin.data.errors import InputError
 from fes_pin.data.provenance import provenance_now
 from fes_pin.data.smooth import CUTOFF_HZ
 from fes_pin.data.study import Study
-from fes_pin.infer.result import STOPPED
 from fes_pin.infer.search import SearchResult
 from fes_pin.infer.verdict import word_of
 from fes_pin.walk.designs import Designs
@@ -65,11 +64,7 @@ def diagnose_walk(
         tell(0.85, "strides held out")
         out = _judged(study, search, found, seed)
     tell(1.0, "done")
-    out = replace(out, provenance=made, wall_s=time.perf_counter() - began)
-    if not stops:
-        return out
-    said = f"the search was stopped at its limit of {limit:g} s: best set so far"
-    return replace(out, verdict=STOPPED, warnings=(said,))
+    return out.ended(began, made, limit if stops else None)
 
 
 def _searched(models: WalkModels, tell: Progress) -> tuple[WalkSearch, SearchResult[WalkFit]]:

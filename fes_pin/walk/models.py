@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -82,11 +81,9 @@ class WalkModels(FittedSets[WalkFit, None]):
 
     def with_noise_of(self, best: WalkFit) -> WalkModels:
         """Return the same sets with channels rotated for the residual of one set, and the null in its noise."""
-        other = copy.copy(self)
-        FittedSets.__init__(other)
-        other.designs = self.designs.turned(self.designs.residual(best.names, best.fitted.values))
+        other = WalkModels(self.designs.turned(self.designs.residual(best.names, best.fitted.values)), self.seed)
         other.null = simulated_nulls(other.designs, other.fit(best.names).fitted.variance, self.seed)
-        other.most_candidates = type(self).most_candidates
+        other.most_candidates = FittedSets.most_candidates
         return other
 
     def nominal(self) -> WalkFit:
