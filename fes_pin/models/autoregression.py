@@ -13,6 +13,7 @@ variances v_k (Levinson's recursion backwards, c the last coefficient of each):
 Source: Ljung, System Identification, 2nd ed., sections 3.2 and 10.1.
 """
 
+import math
 from functools import cache
 
 import numpy as np
@@ -59,7 +60,10 @@ def beginning(ar: tuple[float, ...]) -> tuple[tuple[np.ndarray, ...], np.ndarray
     predictors, variances = [], np.ones(len(ar))
     for k in reversed(range(len(ar))):
         left = 1.0 - now[k] ** 2
-        variance, now = variance / left, (now[:k] + now[k] * now[:k][::-1]) / left
+        if not left > 0.0:  # noise that is not stationary: nothing predicts its first samples
+            variance, now = math.inf, np.zeros(k)
+        else:
+            variance, now = variance / left, (now[:k] + now[k] * now[:k][::-1]) / left
         predictors.append(now)
         variances[k] = variance
     return tuple(reversed(predictors)), variances

@@ -51,3 +51,11 @@ def test_white_noise_is_left_as_it_is():
     told, variances = noise_ahead(x, np.ones(20, dtype=bool), ())
     assert not told.any()
     assert variances == pytest.approx(np.ones(20))
+
+
+def test_the_first_sample_of_noise_that_is_not_stationary_has_no_weight():
+    x, ar = np.random.default_rng(3).standard_normal(50), (1.2, -0.1)
+    out = innovations_of(x, ar)
+    assert out[0] == 0.0
+    assert np.isfinite(out).all()
+    assert out[2:] == pytest.approx(x[2:] - 1.2 * x[1:-1] + 0.1 * x[:-2])
