@@ -104,15 +104,13 @@ def not_changed(
 
 def misread_change(models: ContrastModels, misread: Misread) -> Change:
     """Return a restated trial as a change of its group."""
-    known = models.nominal_model.rig.schema.conditions.get(misread.condition)
-    estimate = ParameterEstimate(misread.value, misread.std, known.unit if known is not None else "m")
     group = next(g for g, many in models.trials.items() if misread.trial in (t.name for t in many))
     return Change(
         name=NAME,
         kind="condition",
         group=group,
         words=misread.words,
-        parameters={misread.condition: {group: estimate}},
+        parameters={misread.condition: {group: misread.estimate}},
         equivalents=(),
         p_value=misread.p_value,
         trial=misread.trial,

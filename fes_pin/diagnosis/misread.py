@@ -25,6 +25,7 @@ from fes_pin.infer.levels import CLAIM_LEVEL, EXPLAINED_AS_WELL, FEWEST_STATED, 
 from fes_pin.infer.optimum import MAX_ITERATIONS
 from fes_pin.infer.problem import Linearized
 from fes_pin.infer.projection import Projection, without_locals
+from fes_pin.infer.result import ParameterEstimate
 from fes_pin.models.model import Model
 from fes_pin.workers import in_parallel
 
@@ -79,6 +80,12 @@ class Misread:
     halves: tuple[float, float]
     whole: Fit = field(repr=False)
     others: Fit = field(repr=False)
+
+    @property
+    def estimate(self) -> ParameterEstimate:
+        """Return the estimated value with its unit."""
+        known = self.whole.model.rig.schema.conditions.get(self.condition)
+        return ParameterEstimate(self.value, self.std, known.unit if known is not None else "m")
 
     @property
     def words(self) -> str:

@@ -19,7 +19,7 @@ from fes_pin.identify.fit import rough_fit
 from fes_pin.identify.likelihood_fit import LikelihoodFit, maximum_from
 from fes_pin.identify.per_trial import halves
 from fes_pin.infer.held_out import Errors, held_out_gain
-from fes_pin.infer.result import Cause, ParameterEstimate
+from fes_pin.infer.result import Cause
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Stage
 
@@ -89,15 +89,12 @@ def _without(
 
 def _cause(made: Made, gain_fit: float, trials: Sequence[Trial], seed: int) -> Cause:
     misread = made.misread
-    unit = made.misread.whole.model.rig.schema.conditions.get(misread.condition)
     trial = next(t for t in trials if t.name == misread.trial)
     stated, restated = _errors_of_halves(made, trial)
     return Cause(
         name=NAME,
         stage=str(Stage.RIG),
-        parameters={
-            misread.condition: ParameterEstimate(misread.value, misread.std, unit.unit if unit is not None else "m")
-        },
+        parameters={misread.condition: misread.estimate},
         equivalents=(),
         p_value=misread.p_value,
         gain_fit=gain_fit,

@@ -110,7 +110,7 @@ class LikelihoodProblem(Problem, NoisyProblem):
 
     def _evaluated(self, points: Sequence[tuple[Mapping[str, float], Unknowns, StateSpaceNoise]]) -> list[Evaluation]:
         with np.errstate(all="ignore"):
-            return [_joined(run) for run in self._runs(points)]
+            return [Evaluation.joined([_evaluation(one) for one in run]) for run in self._runs(points)]
 
     def _runs(
         self, points: Sequence[tuple[Mapping[str, float], Unknowns, StateSpaceNoise]]
@@ -214,7 +214,7 @@ class LikelihoodProblem(Problem, NoisyProblem):
 
     def with_orders(self, values: Mapping[str, float], unknowns: Unknowns) -> StateSpaceNoise:
         """Return the noise with autoregressions of the orders that the innovations support."""
-        (run,) = self._runs([(values, unknowns, self.noise)])
+        run = self.residual_run(values, unknowns)
         return replace(self.noise, ar=autoregressions(run, dict.fromkeys(self.noise.white, ORDERS)))
 
     def set_noise(self, parameters: Mapping[str, float]) -> None:
@@ -278,11 +278,5 @@ def _added(part: Linearized, at: Sequence[int], factors: np.ndarray) -> Lineariz
     return replace(part, jacobian=jacobian)
 
 
-def _joined(run: Sequence[PredictedTrial]) -> Evaluation:
-    return Evaluation(
-        float(sum(one.cost() for one in run)),
-        np.concatenate([one.whitened for one in run]),
-        np.concatenate([one.seen_variances for one in run]),
-        np.concatenate([one.repeated_noise for one in run]),
-        np.concatenate([one.readings.again for one in run]),
-    )
+def _evaluation(one: PredictedTrial) -> Evaluation:
+    return Evaluation(one.cost(), one.whitened, one.seen_variances, one.repeated_noise, one.readings.again)
