@@ -12,11 +12,11 @@ from fes_pin.infer.result import Remainder
 from fes_pin.workers import in_parallel
 
 
-def left_in_groups(models: ContrastModels, best: Grouped, seed: int) -> tuple[Remainder, list[str]]:
+def left_in_groups(models: ContrastModels, best: Grouped) -> tuple[Remainder, list[str]]:
     """Return the lack of fit in some groups alone, and warnings; one of all groups is an error of the model."""
     parts = in_parallel(lambda g: models.maxima.part(best, g), list(models.trials))
-    each = dict(zip(models.trials, in_parallel(lambda f: lack_of_fit(f, seed), parts), strict=True))
-    each = {g: _in_single_trials(models, best, g, r, seed) if r.unexplained else r for g, r in each.items()}
+    each = dict(zip(models.trials, in_parallel(lack_of_fit, parts), strict=True))
+    each = {g: _in_single_trials(models, best, g, r) if r.unexplained else r for g, r in each.items()}
     least = min(each.values(), key=lambda r: r.p_value)
     open_ = [g for g, r in each.items() if r.unexplained]
     p = min(1.0, len(each) * least.p_value)
@@ -28,11 +28,11 @@ def left_in_groups(models: ContrastModels, best: Grouped, seed: int) -> tuple[Re
     return Remainder(True, p, least.where), [f"lack of fit in the group {g}" for g in open_]
 
 
-def _in_single_trials(models: ContrastModels, best: Grouped, group: str, left: Remainder, seed: int) -> Remainder:
+def _in_single_trials(models: ContrastModels, best: Grouped, group: str, left: Remainder) -> Remainder:
     """Return the lack of fit of a group, if half of its trials have one with nominal values of their own.
 
     Trials that differ in strength or friction, within a group too, have a lack of fit with shared values.
     """
     alone = in_parallel(lambda k: models.maxima.part(best, group, k), range(len(models.trials[group])))
-    p = min(1.0, 2.0 * float(np.median([lack_of_fit(one, seed).p_value for one in alone])))
+    p = min(1.0, 2.0 * float(np.median([lack_of_fit(one).p_value for one in alone])))
     return replace(left, unexplained=p < CLAIM_LEVEL, p_value=max(left.p_value, p))

@@ -50,7 +50,7 @@ class ContrastVerdict(Verdict[Grouped, ContrastModels, ContrastWeighed]):
         evidence = {} if self.search.was_stopped else self._evidence(found)
         fitted = {n: Evidence(f.sse - found.best.sse, 0.0, FITTED) for n, f in found.without.items()}
         gains = {n: Gain(one.added, one.low, one.high, on=one.on) for n, one in {**fitted, **evidence}.items()}
-        left, said = left_in_groups(models, found.best, models.seed)
+        left, said = left_in_groups(models, found.best)
         return ContrastWeighed(gains, evidence, left, said)
 
     def unsupported(self, state: Judgement) -> list[str]:

@@ -169,7 +169,7 @@ class _Work:
         whole, stated = study, train
         if again is not None:
             train, whole = again.trials, restated_study(study, nominal, again.misread)
-        diagnosis = diagnosis_of(whole, search, found, (train, test), self.seed)
+        diagnosis = diagnosis_of(whole, search, found, (train, test))
         return diagnosis if again is None else with_misread(diagnosis, again, stated, test, self.seed)
 
 

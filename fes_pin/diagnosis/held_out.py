@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.errors_ahead import Ahead, errors_ahead, squared_errors
+from fes_pin.diagnosis.errors_ahead import squared_errors
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit, fit_of, maximise
 from fes_pin.infer.held_out import FOLDS, Errors, deal, held_out_gain, marginal_cost
@@ -130,16 +130,6 @@ def evidence_of(folds: Sequence[Fold], found: Found, alike: Again) -> dict[str, 
 
 def _cost(fitted: LikelihoodFit) -> float:
     return marginal_cost(fitted, {n: one.scale for n, one in fitted.model.parameter_info().items()})
-
-
-def held_errors_ahead(folds: Sequence[Fold], horizon_s: float, falling: bool) -> tuple[Ahead, Ahead] | None:
-    """Return errors of the nominal model and of the set of each fold on trials held out; None where none are."""
-    if not folds:
-        return None
-    return (
-        errors_ahead([(f.nominal, f.best, f.test) for f in folds], horizon_s, falling),
-        errors_ahead([(f.chosen or f.best, f.best, f.test) for f in folds], horizon_s, falling),
-    )
 
 
 def gains_of(

@@ -37,10 +37,10 @@ def _ceiling(fitted: LikelihoodFit) -> float:
 
 
 def diagnosis_of(
-    study: Study, search: LikelihoodSearch, found: Found, trials: tuple[list[Trial], list[Trial]], seed: int
+    study: Study, search: LikelihoodSearch, found: Found, trials: tuple[list[Trial], list[Trial]]
 ) -> Diagnosis:
     """Return the diagnosis of a rig from a search by the likelihood that has run."""
-    verdict = RigVerdict(search, trials[1], seed)
+    verdict = RigVerdict(search, trials[1])
     state = verdict.of(found)
     found, (left, reason) = state.found, verdict.remainder(state)
     again = [f.best for f in state.weighed.folds if f.within]

@@ -27,7 +27,6 @@ from fes_pin.diagnosis.held_out import (
     evidence_of,
     folds_of,
     gains_of,
-    held_errors_ahead,
     make_folds,
     refit,
     with_choices,
@@ -77,13 +76,11 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
         That has run.
     test
         Trials that the study itself holds out.
-    seed
-        Of critical values.
     """
 
-    def __init__(self, search: LikelihoodSearch, test: Sequence[Trial], seed: int) -> None:
+    def __init__(self, search: LikelihoodSearch, test: Sequence[Trial]) -> None:
         super().__init__(search)
-        self.models, self.test, self.seed = search.models, tuple(test), seed
+        self.models, self.test = search.models, tuple(test)
         self.refitted, self._alike = Again(refit), Again(as_random_as_in_all)
         self._chosen: dict[int, tuple[Found, list[LikelihoodFit]]] = {}
         self._unmoved: set[int] = set()
@@ -94,9 +91,9 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
         folds = make_folds(found, self.models.trials, self.test, self.refitted)
         within = folds or [Fold(found.nominal, found.best, found.without, self.models.trials)]
         return RigWeighed(
-            gains=gains_of(within, found.without, self.models.judged_s, self.seed),
+            gains=gains_of(within, found.without, self.models.judged_s, self.models.seed),
             evidence=evidence_of(folds, found, self._alike) if folds else {},
-            lack_of_fit=lack_of_fit(found.best, self.seed),
+            lack_of_fit=lack_of_fit(found.best),
             folds=folds,
             random=random_parts(found.best),
             no_noise=no_noise(found.best),
@@ -177,16 +174,18 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
 
     def errors(self, state: RigState) -> tuple[Ahead, Ahead]:
         """Return errors of the nominal and of the extended model on the fitted trials."""
-        found, train = state.found, self.models.trials
-        nominal, best = (
-            errors_ahead([(f, found.best, train)], self.models.horizon_s, self._falls(state))
-            for f in (found.nominal, found.best)
-        )
-        return nominal, best
+        found = state.found
+        return self._errors_on(state, [Fold(found.nominal, found.best, found.without, self.models.trials)])
 
     def held_out_errors(self, state: RigState) -> tuple[Ahead, Ahead] | None:
         """Return the same on held-out trials; None where there are none."""
-        return held_errors_ahead(self.folds(state), self.models.horizon_s, self._falls(state))
+        folds = self.folds(state)
+        return self._errors_on(state, folds) if folds else None
+
+    def _errors_on(self, state: RigState, folds: Sequence[Fold]) -> tuple[Ahead, Ahead]:
+        fits = [(f.nominal, f.best, f.test) for f in folds], [(f.chosen or f.best, f.best, f.test) for f in folds]
+        nominal, best = (errors_ahead(one, self.models.horizon_s, self._falls(state)) for one in fits)
+        return nominal, best
 
     def remainder(self, state: RigState) -> tuple[Remainder, str | None]:
         """Return the lack of fit of a set, and its reason where no test finds it.

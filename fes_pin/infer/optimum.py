@@ -93,6 +93,10 @@ class Optimum:
             return CONFIDENCE_95 * self.std(name)
         return reach_at_bound(self.parts, self.place(name), [n in self.at_bound for n in self.free])
 
+    def interval(self, name: str) -> tuple[float, float]:
+        """Return the 95 % interval of a fitted parameter by the quadratic approximation."""
+        return self.within(name, -math.inf, math.inf)
+
     def within(self, name: str, low: float, high: float) -> tuple[float, float]:
         """Return a parameter's 95 % interval by the quadratic approximation, cut at these bounds."""
         value, reach = self.parameters[name], self.reach(name)

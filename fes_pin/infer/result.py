@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Protocol, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 from fes_pin.infer.levels import CONFIDENCE_95, NOTHING_PERCENT
+from fes_pin.infer.optimum import Optimum
 from fes_pin.infer.text import percent, probability, quantity
 
 CELLS = ("value", "std", "unit", "low", "high", "at_bound")
@@ -26,28 +27,6 @@ def shown(value: float | None, digits: int = DIGITS) -> float | None:
 def p_shown(value: float) -> float | None:
     """Return a p-value rounded for print; none is zero."""
     return shown(max(value, LEAST_P)) if math.isfinite(value) else None
-
-
-class EstimatedFit(Protocol):
-    """The part of a fit that an estimate needs."""
-
-    @property
-    def values(self) -> Mapping[str, float]:
-        """Values of every parameter by name."""
-
-    @property
-    def free(self) -> tuple[str, ...]:
-        """Names of the fitted parameters."""
-
-    @property
-    def at_bound(self) -> tuple[str, ...]:
-        """Names of those that ended at a bound."""
-
-    def std(self, name: str) -> float:
-        """Return the standard deviation of a fitted parameter."""
-
-    def interval(self, name: str) -> tuple[float, float]:
-        """Return the 95 % interval of a fitted parameter."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +51,7 @@ class ParameterEstimate:
     ends: tuple[float, float] | None = None
 
     @classmethod
-    def of(cls, fitted: EstimatedFit, name: str, unit: str, wider: float = 1.0) -> ParameterEstimate:
+    def of(cls, fitted: Optimum, name: str, unit: str, wider: float = 1.0) -> ParameterEstimate:
         """Return the estimate of a parameter of a fit, with its standard deviation times `wider`."""
         value = fitted.values[name]
         if name not in fitted.free:

@@ -22,7 +22,7 @@ def test_trials_that_the_study_holds_out_do_not_choose_between_estimators():
     search = LikelihoodSearch(models, lambda share, words: None)
     found = search.run()
     columns = {n: -v if n == "position" else v for n, v in held.columns.items()}
-    verdicts = [RigVerdict(search, test, 0) for test in ([held], [derived_trial(held, columns=columns)], [])]
+    verdicts = [RigVerdict(search, test) for test in ([held], [derived_trial(held, columns=columns)], [])]
     states = [v.of(found) for v in verdicts]
     one, other, none = (v.held_out_errors(s)[1].free for v, s in zip(verdicts, states, strict=True))
     assert one < 1.0 < 100.0 < other
@@ -34,7 +34,7 @@ def test_trials_that_the_study_holds_out_do_not_choose_between_estimators():
 @pytest.mark.parametrize("own", [True, False])
 @pytest.mark.parametrize("replaced", [True, False])
 def test_a_lack_of_fit_by_either_estimator_stays(own, replaced):
-    verdict = RigVerdict(SimpleNamespace(models=SimpleNamespace(library=SimpleNamespace(effects=()))), (), 0)
+    verdict = RigVerdict(SimpleNamespace(models=SimpleNamespace(library=SimpleNamespace(effects=()))), ())
 
     def state(unexplained, before=None):
         left = Remainder(unexplained, 1e-6 if unexplained else 0.5, "rate" if unexplained else None)

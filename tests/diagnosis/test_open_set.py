@@ -25,7 +25,6 @@ from fes_pin.identify.fit import fit, under_own_noise
 from fes_pin.infer.levels import CLAIM_LEVEL, FULL_NOISE
 from fes_pin.infer.noise import Noise, estimate_noise
 from fes_pin.infer.projection import Projection
-from fes_pin.infer.result import Remainder
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.predict import predict
 
@@ -84,7 +83,7 @@ def test_tests_together_keep_the_level(monkeypatch):
 
     monkeypatch.setattr(tests_of_fit, "fit", lambda *_: SimpleNamespace(sse=1.0))
     monkeypatch.setattr(tests_of_fit, "level_of", lambda _: CLAIM_LEVEL)
-    monkeypatch.setattr(tests_of_fit, "_features_left", lambda *_: Remainder(False, rng.uniform(), "phase"))
+    monkeypatch.setattr(tests_of_fit, "_features_left", lambda *_: (rng.uniform(), "phase"))
     fitted = SimpleNamespace(model=None, trials=(), noise=SimpleNamespace(ar={"force_n": ()}))
     share = np.mean([lack_of_fit(fitted).unexplained for _ in range(20_000)])
     assert share == pytest.approx(CLAIM_LEVEL, abs=0.002)

@@ -23,7 +23,7 @@ LITTLE = (RandomPart("effort", 0.1, 0.1, 0.01),)
 
 def unsupported(evidence, low, random):
     """What is refused of a friction with the low end of its gain."""
-    verdict = RigVerdict(SimpleNamespace(models=SimpleNamespace(horizon_s=0.3)), (), 0)
+    verdict = RigVerdict(SimpleNamespace(models=SimpleNamespace(horizon_s=0.3)), ())
     gains = {"coulomb_friction": Gain(low + 1.0, low, low + 2.0)}
     found = SimpleNamespace(without={"coulomb_friction": None})
     return verdict.unsupported(

@@ -26,12 +26,10 @@ TRIED = (1.0, 0.5, 0.25, 0.1)
 KEPT = 1e-3
 """Share of its norm that a feature must keep once the sensitivities to fitted parameters are projected off."""
 FEWEST_SIGNS = 4
-"""Least number of trials whose signs are drawn."""
-SIGN_DRAWS = 400
-"""Draws of random signs of the trials over which the inflation of a statistic is averaged."""
+"""Least number of trials whose signs say how much a statistic is inflated."""
 
 
-def lack_of_fit(fitted: LikelihoodFit, seed: int = 0) -> Remainder:
+def lack_of_fit(fitted: LikelihoodFit) -> Remainder:
     """Test whether a fit leaves anything but noise.
 
     Where measurement noise may be autoregressive, the residuals of a free simulation are tested too, see
@@ -39,22 +37,21 @@ def lack_of_fit(fitted: LikelihoodFit, seed: int = 0) -> Remainder:
     most significant test, times the number of tests.
     """
     free = fit(fitted.model, fitted.trials) if fitted.noise.ar else None
-    featured = _features_left(fitted, seed)
     others = residual_tests(free) if free is not None and math.isfinite(free.sse) else []
-    found = [(featured.p_value, featured.where), *others]
+    found = [_features_left(fitted), *others]
     p_value, where = min(found, key=lambda f: f[0])
     p_value = min(1.0, len(found) * p_value)
     unexplained = p_value < level_of(fitted)
     return Remainder(unexplained, p_value, where if unexplained else None)
 
 
-def _features_left(fitted: LikelihoodFit, seed: int) -> Remainder:
-    """Test whether the residuals of a fit depend on any feature.
+def _features_left(fitted: LikelihoodFit) -> tuple[float, str | None]:
+    """Return the p-value of residuals that depend on no feature, and the variable of the largest single one.
 
     The level is that of a cause: half of it for the largest single feature, half for all features together. The
-    chi-square is divided by its inflation under random signs of the trials, where there are enough. Slopes of a filter
-    are approximate, worst for features with kinks. A score counts therefore only as far as the likelihood improves by
-    it. This does not hold where effort is read: there fits follow such slopes to their end.
+    chi-square is divided by its mean under random signs of the trials, where there are enough, over its rank. Slopes of
+    a filter are approximate, worst for features with kinks. A score counts therefore only as far as the likelihood
+    improves by it. This does not hold where effort is read: there fits follow such slopes to their end.
     """
     featured = _Featured(fitted)
     projection = Projection(fitted.parts)
@@ -62,14 +59,14 @@ def _features_left(fitted: LikelihoodFit, seed: int) -> Remainder:
     before, after = np.linalg.norm(featured.columns, axis=0), np.linalg.norm(left, axis=0)
     good = np.flatnonzero(after > KEPT * np.where(before > 0, before, 1.0))
     if not len(good):
-        return Remainder(False, 1.0, None)
+        return 1.0, None
     left = left[:, good] / after[good]
     by_trial = np.array([left[rows].T @ projection.residual[rows] for rows in projection.trials])
     values, vectors = np.linalg.eigh(left.T @ left)
     kept = values > UNFELT * values.max()
     shares = by_trial @ vectors[:, kept] / np.sqrt(values[kept])
     rank, statistic = int(kept.sum()), float(np.sum(shares.sum(axis=0) ** 2))
-    inflation = _inflation_by_signs(shares, rank, seed)
+    inflation = max(1.0, float(np.sum(shares**2)) / rank) if len(shares) >= FEWEST_SIGNS else 1.0
     single = by_trial.sum(axis=0)
     best = int(np.argmax(np.abs(single)))
 
@@ -83,15 +80,7 @@ def _features_left(fitted: LikelihoodFit, seed: int) -> Remainder:
         alone[good[best]] = single[best] / after[good[best]]
         together[good] = vectors[:, kept] @ (shares.sum(axis=0) / np.sqrt(values[kept])) / after[good]
         p = max(p, p_value(featured.gained(together), featured.gained(alone)))
-    return Remainder(p < level_of(fitted), p, featured.names[good[best]].split(":")[0])
-
-
-def _inflation_by_signs(shares: np.ndarray, rank: int, seed: int) -> float:
-    """Return the ratio of the statistic under random signs of the trials to its rank; 1 with fewer than 4 trials."""
-    if len(shares) < FEWEST_SIGNS or not rank:
-        return 1.0
-    signs = np.random.default_rng(seed).choice((-1.0, 1.0), size=(SIGN_DRAWS, len(shares)))
-    return max(1.0, float(np.mean(np.sum((signs @ shares) ** 2, axis=1))) / rank)
+    return p, featured.names[good[best]].split(":")[0]
 
 
 class _Featured:

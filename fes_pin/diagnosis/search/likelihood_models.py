@@ -92,7 +92,7 @@ class LikelihoodModels(LikelihoodFits):
 
     def leaves_noise(self, fitted: LikelihoodFit) -> bool:
         """Return whether a fit has no lack of fit, and little process noise."""
-        return not (are_large(random_parts(fitted)) or lack_of_fit(fitted, self.seed).unexplained)
+        return not (are_large(random_parts(fitted)) or lack_of_fit(fitted).unexplained)
 
     def better_form(self, fitted: LikelihoodFit) -> LikelihoodFit | None:
         """Return a set with one refinement fewer, or one more, where that is better; else None.
