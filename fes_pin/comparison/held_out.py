@@ -9,8 +9,8 @@ import numpy as np
 from fes_pin.comparison.own_part import own_part, pairs_of, stride
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.held_out import folds_of
-from fes_pin.identify.ahead import forecast, free_residuals, own_noise
-from fes_pin.identify.fit import Fit, fit_multistart
+from fes_pin.identify.ahead import forecast, free_residuals
+from fes_pin.identify.fit import Fit, fit_multistart, noise_of
 from fes_pin.identify.problem import Problem
 from fes_pin.infer.held_out import within
 from fes_pin.infer.levels import RUNAWAY
@@ -70,7 +70,7 @@ def left_out_errors(
 
 
 def _of_parting(fitted: Fit, part: Parting, horizon_s: float, given_s: float | None) -> dict[str, np.ndarray]:
-    noise, rows = own_noise(fitted), []
+    noise, rows = noise_of(fitted) if math.isfinite(fitted.sse) else fitted.noise, []
     for trial in part.held:
         name = fitted.model.rig.output(trial.kind)
         left = free_residuals(fitted.model, trial, fitted.noise)[name]

@@ -17,7 +17,6 @@ import numpy as np
 from fes_pin.data.errors import InputError
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
-from fes_pin.identify.fit import Fit, noise_of
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.per_trial import cross_fitted_unknowns, predictions
 from fes_pin.infer.held_out import within
@@ -41,14 +40,6 @@ def default_horizon(trials: Sequence[Trial]) -> float:
     if all(t.kind == IMPOSED for t in trials):
         return max(t.duration for t in trials)
     return min(HORIZON_S, 0.1 * min(t.duration for t in trials))
-
-
-def own_noise(fitted: Fit) -> NoiseModel:
-    """Return the autoregressive noise of a fit's residuals: errors of the model are correlated as well."""
-    try:
-        return noise_of(fitted)
-    except (FloatingPointError, np.linalg.LinAlgError):  # a fit that does not stay finite
-        return fitted.noise
 
 
 def forecast(residual: np.ndarray, noise: Noise, dt: float, ahead_s: float) -> np.ndarray:
