@@ -14,7 +14,7 @@ from scipy.optimize import minimize_scalar
 
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial, derived_trial
-from fes_pin.identify.fit import Fit, fit_multistart, fit_problem, noise_of, rough_noise
+from fes_pin.identify.fit import Fit, fit_problem, noise_of, rough_fit
 from fes_pin.identify.problem import Problem
 from fes_pin.infer.levels import SMALL_SHARE, SMOOTH
 from fes_pin.infer.noise import thinning
@@ -52,15 +52,13 @@ def low_pass_of(model: Model, trials: Sequence[Trial]) -> float | None:
     dt, shortest = max(t.dt for t in trials), min(t.duration for t in trials)
     if any(t.kind == IMPOSED for t in trials) or PERIODS / shortest >= MOST / dt:
         return None
-    rough = rough_noise(model, trials)
-    begun = fit_multistart(Problem(model, trials, rough))
-    left = noise_of(begun)
-    if any(rough[n].std > SMOOTH * left[n].std for n in left):
+    begun = rough_fit(model, trials)
+    if any(begun.noise[n].std > SMOOTH * left.std for n, left in noise_of(begun).items()):
         return None
 
     def fitted(log_hz: float) -> Fit:
         passed = [derived_trial(t, low_pass_hz=float(np.exp(log_hz))) for t in trials]
-        return fit_problem(Problem(model, passed, rough), begun.values)
+        return fit_problem(Problem(model, passed, begun.noise), begun.values)
 
     grid = np.linspace(math.log(PERIODS / shortest), math.log(MOST / dt), TRIED)
     costs = [_cost(fitted(x)) for x in grid]
