@@ -17,8 +17,8 @@ from fes_pin.comparison.own_part import own_part
 from fes_pin.comparison.result import apart_from
 from fes_pin.data.errors import InputError
 from fes_pin.diagnosis.errors_ahead import free_errors
-from fes_pin.identify.ahead import forecast, free_residuals, own_noise
-from fes_pin.identify.fit import rough_noise
+from fes_pin.identify.ahead import forecast, free_residuals
+from fes_pin.identify.fit import noise_of, rough_noise
 
 DEMO = Path(__file__).parents[2] / "analysis/studies/ankle_demo"
 
@@ -67,7 +67,7 @@ def test_the_error_is_that_of_a_diagnosis(tmp_path):
     held, floor = trials[5:], rough_noise(found.fit.model, trials)
     assert found.percent["free"] == pytest.approx(free_errors(found.fit.model, held, floor).error_percent())
     left = [(t, free_residuals(found.fit.model, t, floor)["force_n"]) for t in held]
-    noise = own_noise(found.fit)["force_n"]
+    noise = noise_of(found.fit)["force_n"]
     ahead = sum(np.sum((x - forecast(x, noise, t.dt, 0.2)) ** 2) for t, x in left)
     around = sum(np.sum((t["force_n"] - t["force_n"].mean()) ** 2) for t in held)
     assert found.percent["horizon"] == pytest.approx(100.0 * ahead / around)
