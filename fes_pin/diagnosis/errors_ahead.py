@@ -135,29 +135,35 @@ def free_errors(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> Err
 
 def _free_squares(model: Model, trial: Trial, noise: NoiseModel, pieces: int) -> np.ndarray:
     """Return squared errors, spread and number of readings of a free simulation of a trial, shape (3, pieces)."""
-    lines = np.zeros((3, len(trial)))
-    for name, missed in free_residuals(model, trial, noise).items():
-        variance = noise[name].std ** 2
-        lines[0] += np.nan_to_num(missed) ** 2 / variance
-        lines[1] += np.nan_to_num(trial[name] - np.nanmean(trial[name])) ** 2 / variance
-        lines[2] += np.isfinite(missed)
+    missed = free_residuals(model, trial, noise)
+    lines = sum((_lines(trial[n], m, noise[n].std ** 2) for n, m in missed.items()), np.zeros((3, len(trial))))
     return np.array([p.sum(axis=1) for p in np.array_split(lines, pieces, axis=1)]).T
 
 
 def _squares(fitted: LikelihoodFit, floor: LikelihoodFit, trial: Trial, horizon_s: float) -> np.ndarray:
     """Return `Errors` of a trial by its seconds, shape (4, seconds); errors within one horizon are correlated."""
     predicted, noise = _predicted(fitted, trial, horizon_s)
-    lines = np.zeros((4, len(trial)))
+    whole = np.zeros((4, len(trial)))
     for name, values in predicted.items():
-        variance, measured = floor.noise.white[name] ** 2, trial[name]
-        squares = noise[name] / variance
-        lines[0] += np.nan_to_num(measured - values, posinf=0.0, neginf=0.0) ** 2 / variance
-        lines[1] += np.nan_to_num(measured - np.nanmean(measured)) ** 2 / variance
-        lines[2] += squares
-        lines[3] += 2.0 * squares**2 * max(1.0, horizon_s / trial.dt)
-    lines[:, : _first(fitted, trial, horizon_s)] = 0.0
-    pieces = np.array_split(lines, max(1, round(trial.duration)), axis=1)
+        lines = _lines(trial[name], trial[name] - values, floor.noise.white[name] ** 2, noise[name])
+        whole += [*lines, 2.0 * lines[2] ** 2 * max(1.0, horizon_s / trial.dt)]
+    whole[:, : _first(fitted, trial, horizon_s)] = 0.0
+    pieces = np.array_split(whole, max(1, round(trial.duration)), axis=1)
     return np.array([p.sum(axis=1) for p in pieces]).T
+
+
+@np.errstate(all="ignore")
+def _lines(measured: np.ndarray, missed: np.ndarray, unit: float, noise: np.ndarray | None = None) -> np.ndarray:
+    """Return squared errors, spread and noise of each sample, shape (3, n); 0 where nothing is measured or predicted.
+
+    Parameters
+    ----------
+    unit
+        Variance that is their unit, and by default that of the noise.
+    """
+    squares = missed**2, (measured - np.nanmean(measured)) ** 2, np.full(len(missed), unit) if noise is None else noise
+    found = np.isfinite(missed), np.isfinite(measured), np.isfinite(missed)
+    return np.where(found, squares, 0.0) / unit
 
 
 _PREDICTED: WeakKeyDictionary[LikelihoodFit, dict[tuple[int, float], tuple[Trial, _Predicted]]] = WeakKeyDictionary()
@@ -236,19 +242,14 @@ def _sums(fitted: LikelihoodFit, floor: LikelihoodFit, trial: Trial, horizon_s: 
     """
     name = fitted.model.rig.output(trial.kind)
     measured, (predicted, noise) = trial[name], _predicted(fitted, trial, horizon_s)
-    begun = np.arange(len(trial)) < _first(fitted, trial, horizon_s)
     free = free_residuals(fitted.model, trial, fitted.noise)[name]
     if is_simulated(fitted.noise, [trial]):
         next_one = free - forecast(np.nan_to_num(free), fitted.noise[name], trial.dt, 0.0)
     else:
         next_one = one_step(fitted.model, trial, fitted.noise)[name]
-    errors = (
-        next_one,
-        np.where(begun, np.nan, measured - predicted[name]),
-        free,
-        np.where(begun, np.nan, np.sqrt(noise[name])),
+    missed, unit = (next_one, measured - predicted[name], free), floor.noise.white[name] ** 2
+    begun = 0, _first(fitted, trial, horizon_s), 0
+    one, ahead, simulated = (
+        _lines(measured, m, unit, noise[name])[:, k:].sum(axis=1) for m, k in zip(missed, begun, strict=True)
     )
-    spread = (measured - np.nanmean(measured)) ** 2
-    with np.errstate(all="ignore"):
-        around = [float(np.nansum(spread if k in (0, 2) else spread[~begun])) for k in range(len(errors))]
-        return np.array([[float(np.nansum(e**2)) for e in errors], around]) / floor.noise.white[name] ** 2
+    return np.array([[one[0], ahead[0], simulated[0], ahead[2]], [one[1], ahead[1], simulated[1], ahead[1]]])

@@ -1,43 +1,12 @@
 """Parts of a diagnosis as plain values, as they stand in `diagnosis.json`, and in words."""
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.errors_ahead import AheadErrors, RandomPart
-from fes_pin.identify.fit import Fit
 from fes_pin.infer.held_out import FOLDS
-from fes_pin.infer.result import ParameterEstimate, shown
-from fes_pin.models.catalogue import Catalogue
-
-
-def left_out_record(left_out: Mapping[str, Mapping[str, Sequence[int]]]) -> dict[str, Any]:
-    """Return the samples left out as spikes by trial and column; no key where there are none."""
-    found = {t: {n: len(k) for n, k in columns.items()} for t, columns in left_out.items()}
-    return {"left_out_samples": found} if found else {}
-
-
-def library_record(catalogue: Catalogue) -> dict[str, Any]:
-    """Return causes and rigs of users' own by the file or module that defines them; no key where there are none."""
-    found = {Path(where).name: names for where, names in catalogue.origins().items()}
-    return {"library": found} if found else {}
-
-
-def parameters_record(fitted: Fit) -> dict[str, Any]:
-    """Return fitted parameters with their standard deviations, by name."""
-    return {n: ParameterEstimate.of(fitted, n, "").record() for n in fitted.free}
-
-
-def errors_record(
-    free: tuple[float | None, float | None], ahead: AheadErrors | None, which: str
-) -> dict[str, float | None]:
-    """Return E of one of the two models, by the names of `identify.error_measures`."""
-    out = {"fit": shown(free[0]), "held_out": shown(free[1])}
-    if ahead is not None:
-        errors = getattr(ahead, f"{which}_held_out") or getattr(ahead, which)
-        out.update({n: shown(getattr(errors, n)) for n in ("one_step", "horizon", "free")})
-    return out
+from fes_pin.infer.result import shown
 
 
 def ahead_record(ahead: AheadErrors | None, driven: bool, random: Sequence[RandomPart]) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from fes_pin.diagnosis.experiment import NextExperiment
 from fes_pin.identify.error_measures import FREE, ONE_STEP
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.stored import log_table, stored_tables
-from fes_pin.infer.result import FITTED, STOPPED, Cause, Explained, Ranked, shown
+from fes_pin.infer.result import FITTED, STOPPED, Cause, Explained, ParameterEstimate, Ranked, shown
 from fes_pin.infer.text import percent, probability
 from fes_pin.models.catalogue import Catalogue, installed
 from fes_pin.models.model import Model
@@ -144,6 +144,8 @@ class Diagnosis(Result):
 
     def own_record(self) -> dict[str, Any]:
         """Return the part of `diagnosis.json` that only a rig has."""
+        left_out = {t: {n: len(k) for n, k in columns.items()} for t, columns in self.left_out.items()}
+        library = {Path(where).name: names for where, names in self.catalogue.origins().items()}
         return {
             "absorbed": list(self.absorbed),
             "nominal": self._model("nominal"),
@@ -151,13 +153,18 @@ class Diagnosis(Result):
             "noise": {n: {"std": shown(m.std), "ar": [shown(a) for a in m.ar]} for n, m in self.extended.noise.items()},
             "ceiling_percent": shown(self.ceiling_percent),
             "next_experiment": self.next_experiment.record() if self.next_experiment else None,
-            **recorded.left_out_record(self.left_out),
+            **({"left_out_samples": left_out} if left_out else {}),
             **({"reason": self.reason} if self.reason else {}),
             **({"log": log_table(self.log)} if self.log != Log() else {}),
-            **recorded.library_record(self.catalogue),
+            **({"library": library} if library else {}),
             **recorded.ahead_record(self.ahead, self.is_driven, self.random),
         }
 
     def _model(self, which: str) -> dict[str, Any]:
-        errors = recorded.errors_record(getattr(self, f"{which}_error"), self.ahead, which)
-        return {"parameters": recorded.parameters_record(getattr(self, which)), "error_percent": errors}
+        fitted, (fit, held_out), ahead = getattr(self, which), getattr(self, f"{which}_error"), self.ahead
+        errors = {"fit": shown(fit), "held_out": shown(held_out)}
+        if ahead is not None:
+            own = getattr(ahead, f"{which}_held_out") or getattr(ahead, which)
+            errors |= {n: shown(getattr(own, n)) for n in ("one_step", "horizon", "free")}
+        parameters = {n: ParameterEstimate.of(fitted, n, "").record() for n in fitted.free}
+        return {"parameters": parameters, "error_percent": errors}
