@@ -92,13 +92,28 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
         return dict(zip(starts, looks, strict=True))
 
     def _look(self, base: Grouped, scores: Sequence[ItemScore]) -> Grouped:
-        """Return a first fit of a set, with one round of its own noise: that of the smaller set explains its items."""
-        out = []
-        for one in scores:
-            new = () if one.effect is None else (one.effect,)
-            model = base.model.having(base.items | {one.item}, new).with_parameters(one.start)
-            out.append(self.maxima.fitted(model, base.weights, base.fit.unknowns, 0))
-        return self.maxima.again(min(out, key=lambda f: f.criterion), rounds=1)
+        """Return a first fit of a set, with a round of its own noise where that of the smaller set explains changes."""
+        new = [base.model.having(base.items | {s.item}, () if s.effect is None else (s.effect,)) for s in scores]
+        begun = [model.with_parameters(s.start) for model, s in zip(new, scores, strict=True)]
+        rounds = 0 if self.leaves_noise(base) else 1
+        looks = (self.maxima.fitted(model, base.weights, base.fit.unknowns, rounds) for model in begun)
+        return min(looks, key=lambda f: f.criterion)
+
+    def near(self, size: int, without: Sequence[Names] = ()) -> list[Names]:
+        """Return the sets of a size near the best, no more than are fitted until they converge.
+
+        After some that were not accepted, those whose gain over the best smaller set is significant against the noise.
+        """
+        near = super().near(size, without)[: self.converged_sets]
+        if not without:
+            return near
+        smaller = self.fits[self.ranked(size - 1)[0]]
+        return [n for n in near if FittedSets.p_value(self, self.fits[n], smaller) < CLAIM_LEVEL]
+
+    def converge(self, size: int, without: Sequence[Names] = ()) -> None:
+        """Fit the best sets of a size until they converge, except some, unless no other can be accepted."""
+        if not without or self.near(size, without):
+            super().converge(size, without)
 
     def converged(self, fits: Sequence[Grouped]) -> list[Grouped]:
         """Return the converged fits."""
