@@ -18,10 +18,10 @@ from fes_pin.data.provenance import Provenance, provenance_now
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
+from fes_pin.diagnosis.conditions import Restated
 from fes_pin.diagnosis.diagnosis import measured_study, split
 from fes_pin.diagnosis.logged import LogFaults
 from fes_pin.diagnosis.long_records import searched_part
-from fes_pin.diagnosis.misread import Misread
 from fes_pin.diagnosis.plausibility import check_study
 from fes_pin.identify.correlation_time import words_of_reading
 from fes_pin.identify.effort_noise import words_of_noise
@@ -30,6 +30,9 @@ from fes_pin.identify.feedback import is_fed_back
 from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
 from fes_pin.models.nominal import nominal_model
 from fes_pin.workers import Progress, noting_stops, one_thread_each, time_limit
+
+GroupsRestated = Restated[Grouped, ContrastModels]
+Searched = tuple[ContrastSearch, Found, GroupsRestated | None]
 
 UNCONFIRMED = "{} is significant in the fitted trials, but the held-out trials do not confirm it"
 
@@ -150,11 +153,10 @@ class _Work:
             said.append("a group has one trial only: differences between repeats are estimated from its parts")
         return out, said
 
-    def _found(self, trials: Sequence[Trial]) -> tuple[ContrastSearch, Found, Misread | None]:
-        """Return a search, its result, and the trial that was restated for it."""
+    def _found(self, trials: Sequence[Trial]) -> Searched:
+        """Return a search, its result, and the trials that were restated for it."""
         with time_limit(self.end - time.perf_counter()):
-            search, found, made = GroupConditions(self.nominal, self._run).search(trials)
-        return search, found, made.misread if made is not None else None
+            return GroupConditions(self.nominal, self._run).search(trials)
 
     def _run(self, trials: Sequence[Trial]) -> tuple[ContrastSearch, Found]:
         effects = self.catalogue.effects_for(self.nominal.rig)
@@ -162,13 +164,13 @@ class _Work:
         search = ContrastSearch(models, self.tell, POLICY)
         return search, search.run()
 
-    def _judged(self, search: ContrastSearch, found: Found, misread: Misread | None, said: list[str]) -> Contrast:
+    def _judged(self, search: ContrastSearch, found: Found, made: GroupsRestated | None, said: list[str]) -> Contrast:
         """Return the contrast of a search that has run."""
         state = ContrastVerdict(search).of(found)
         models, found, best, left = search.models, state.found, state.found.best, state.weighed.lack_of_fit
         evidence = state.weighed.evidence
         changes = [change_of(models, found, i, self.catalogue, evidence.get(str(i))) for i in best.changes]
-        changes += [misread_change(models, misread)] if misread is not None else []
+        changes += [misread_change(models, made.misread)] if made is not None else []
         unchanged, excluded, untestable = not_changed(models, best)
         said += [*state.weighed.said, *_smoothed(best), *(UNCONFIRMED.format(n) for n in state.rejected)]
         if left.unexplained:  # excluded sizes hold for a right model only
@@ -203,7 +205,7 @@ def _provenance(study: Study, after: Study | None, seed: int) -> Provenance:
 
 def _smoothed(best: Grouped) -> tuple[str, ...]:
     """Return warnings about smoothed readings of a driven rig."""
-    noise = max((w.noise for w in best.weights.values()), key=lambda n: n.correlation_s)
+    noise = max(best.weights.noise.values(), key=lambda n: n.correlation_s)
     return words_of_reading(noise, best.model.rig, best.fit.trials)
 
 

@@ -73,5 +73,5 @@ def _late_in(models: ContrastModels, one: Grouped) -> float | None:
 
 def is_likelier(timed: Grouped, recorded: Grouped) -> bool:
     """Return whether corrected efforts explain the same readings with a lower criterion."""
-    one, other = ({w.noise.correlation_s for w in f.weights.values()} for f in (timed, recorded))
+    one, other = ({n.correlation_s for n in f.weights.noise.values()} for f in (timed, recorded))
     return one == other and timed.criterion < recorded.criterion

@@ -3,12 +3,11 @@
 import math
 from collections.abc import Collection, Mapping, Sequence
 
-from fes_pin.contrasts.grouped import Grouped, GroupedModel, GroupedProblem, by_group
-from fes_pin.contrasts.repeats import Repeats
+from fes_pin.contrasts.grouped import Grouped, GroupedModel, GroupedProblem, Weights, by_group
 from fes_pin.data.errors import InputError
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.search.likelihood_fits import FIRST_NOISE_SCALES, MEASUREMENT, PROCESS, LikelihoodFits
-from fes_pin.diagnosis.search.likelihood_maxima import LikelihoodMaxima
+from fes_pin.diagnosis.search.likelihood_maxima import SCREEN_ITERATIONS, LikelihoodMaxima
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit, fit_of
 from fes_pin.identify.process_noise import first_guess
@@ -18,13 +17,8 @@ from fes_pin.infer.problem import Unknowns
 from fes_pin.models.model import Model
 from fes_pin.workers import in_parallel
 
-LOOK = 4
-"""Steps of a first fit at the noise of a smaller set."""
 ROUNDS = 6
 """Most alternations of parameters and noise."""
-
-Weights = Mapping[str, Repeats]
-"""For each group, its noise and the scatter of repeats."""
 
 
 class GroupedFits:
@@ -55,20 +49,21 @@ class GroupedFits:
         alone = in_parallel(self._alone, self.trials)
         if not all(math.isfinite(f.sse) for f in alone):
             raise InputError("the nominal model predicts nothing finite from its start values on")
-        noises = dict(zip(self.trials, (Repeats(f.noise) for f in alone), strict=True))
+        noises = Weights(dict(zip(self.trials, (f.noise for f in alone), strict=True)))
         model = GroupedModel(dict.fromkeys(self.trials, self.nominal)).with_parameters(alone[0].values)
         if self.driven:
-            little = {g: first_guess(self.nominal, t, noises[g].noise.correlation_s) for g, t in self.trials.items()}
-            self._begun = [{g: Repeats(n) for g, n in little.items()}, noises]
+            known = noises.noise.items()
+            little = {g: first_guess(self.nominal, self.trials[g], n.correlation_s) for g, n in known}
+            self._begun = [Weights(little), noises]
             return self.fitted(model, noises)
         starts = [noises, self._without_scatter(model, noises, [u for f in alone for u in f.unknowns])]
         return min((self.fitted(model, w) for w in starts), key=lambda f: f.criterion)
 
-    def _without_scatter(self, model: GroupedModel, noises: Weights, unknowns: Unknowns) -> dict[str, Repeats]:
+    def _without_scatter(self, model: GroupedModel, noises: Weights, unknowns: Unknowns) -> Weights:
         """Return the noise of each group without the part that nominal values of each trial's own explain."""
         known, info = self.nominal.parameters(), self.nominal.parameter_info()
         much = {n: abs(known[n]) or info[n].scale for n in self.nominal.fitted_parameters()}
-        problem = GroupedProblem(model, self.trials, {g: Repeats(w.noise, much) for g, w in noises.items()})
+        problem = GroupedProblem(model, self.trials, Weights(noises.noise, much))
         problem.noise_step(model.parameters(), unknowns)
         return problem.weights
 
@@ -82,7 +77,7 @@ class GroupedFits:
     ) -> Grouped:
         """Fit a grouped model and, in some rounds of alternating maximisation, its noise."""
         problem = GroupedProblem(model, self.trials, weights)
-        return Grouped.of(problem, alternate(problem, model.parameters(), unknowns, rounds, LOOK))
+        return Grouped.of(problem, alternate(problem, model.parameters(), unknowns, rounds, SCREEN_ITERATIONS))
 
     def again(self, one: Grouped, weights: Weights | None = None, rounds: int = ROUNDS) -> Grouped:
         """Fit a set from its own values; without rounds, with given weights, so that residuals have their unit."""
@@ -107,8 +102,8 @@ class GroupedFits:
         """Return a group's part of a fit as a fit of that group, to its own trials or to one of them `alone`."""
         rows = slice(None) if alone is None else slice(alone, alone + 1)
         trials, unknowns = self.trials[group][rows], by_group(one.fit.unknowns, self.trials)[group][rows]
-        problem = LikelihoodProblem(one.model.models[group], trials, one.weights[group].noise)
-        return fit_of(problem, minimise(problem, one.model.models[group].parameters(), unknowns, LOOK))
+        problem = LikelihoodProblem(one.model.models[group], trials, one.weights.noise[group])
+        return fit_of(problem, minimise(problem, one.model.models[group].parameters(), unknowns, SCREEN_ITERATIONS))
 
     def with_process_noise(self, one: Grouped) -> Grouped | None:
         """Return a set fitted with process noise; None where that does not lower the criterion."""
@@ -116,7 +111,7 @@ class GroupedFits:
         begun = {g: LikelihoodMaxima(f.trials).process_noises(f, FIRST_NOISE_SCALES) for g, f in parts.items()}
         if not all(begun.values()):
             return None
-        weights = {g: Repeats(LikelihoodMaxima(f.trials).likeliest(f, begun[g])) for g, f in parts.items()}
+        weights = Weights({g: LikelihoodMaxima(f.trials).likeliest(f, begun[g]) for g, f in parts.items()})
         found = self.again(one, weights)
         if not found.criterion < one.criterion:
             return None

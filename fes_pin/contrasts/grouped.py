@@ -5,13 +5,13 @@ from __future__ import annotations
 import dataclasses
 import itertools
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
 
-from fes_pin.contrasts.repeats import RepeatedProblem, Repeats, Shrink, scatter
+from fes_pin.contrasts.repeats import RepeatedProblem, Shrink, scatter
 from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood import is_simulated
@@ -23,6 +23,7 @@ from fes_pin.infer.problem import Linearized, Unknowns, whitened_sse
 from fes_pin.infer.scoring import Evaluation, NoisyProblem, Point
 from fes_pin.models.model import Model
 from fes_pin.models.parameters import ParameterInfo
+from fes_pin.models.predictor import StateSpaceNoise
 from fes_pin.models.rigs.base import Rig
 from fes_pin.models.stage import Effect
 
@@ -153,6 +154,22 @@ def _agreed(model: GroupedModel) -> GroupedModel:
     return model.with_parameters(values)
 
 
+@dataclass(frozen=True, eq=False)
+class Weights:
+    """What whitens the trials of each group. Groups have their own noise: a noisier day is no change of the rig.
+
+    Attributes
+    ----------
+    noise
+        Process and measurement noise by group.
+    deviations
+        Standard deviation of a nominal parameter between the trials of a group, in its unit, by name.
+    """
+
+    noise: Mapping[str, StateSpaceNoise]
+    deviations: Mapping[str, float] = field(default_factory=dict)
+
+
 class GroupedProblem(NoisyProblem):
     """A grouped model on the trials of all groups.
 
@@ -163,23 +180,22 @@ class GroupedProblem(NoisyProblem):
     trials
         By group, in the order of the model's groups.
     weights
-        By group: noise, and how much repeats scatter. Groups have their own noise: a noisier day is no change of the
-        rig.
+        Noise of each group, and how much repeats scatter.
     """
 
-    def __init__(
-        self, model: GroupedModel, trials: Mapping[str, Sequence[Trial]], weights: Mapping[str, Repeats]
-    ) -> None:
+    def __init__(self, model: GroupedModel, trials: Mapping[str, Sequence[Trial]], weights: Weights) -> None:
         self.model, self.free, self._by_group = model, model.free, trials
-        self.parts = {g: RepeatedProblem(m, trials[g], weights[g]) for g, m in model.models.items()}
+        self.deviations = weights.deviations
+        own = {g: (m, trials[g], weights.noise[g], weights.deviations) for g, m in model.models.items()}
+        self.parts = {g: RepeatedProblem(*given) for g, given in own.items()}
         self.trials = tuple(t for p in self.parts.values() for t in p.trials)
         self.unknown_names = tuple(dict.fromkeys(n for p in self.parts.values() for n in p.unknown_names))
         self.limits = {model.path(n, g): v for g, p in self.parts.items() for n, v in p.limits.items()}
 
     @property
-    def weights(self) -> dict[str, Repeats]:
-        """By group: noise, and how much repeats scatter."""
-        return {g: p.weight for g, p in self.parts.items()}
+    def weights(self) -> Weights:
+        """Noise of each group, and how much repeats scatter."""
+        return Weights({g: p.noise for g, p in self.parts.items()}, self.deviations)
 
     @property
     def noise(self) -> dict[str, Noise]:
@@ -236,7 +252,7 @@ class GroupedProblem(NoisyProblem):
         plain = {g: p.plain(self.model.of(g, values), cut[g]) for g, p in self.parts.items()}
         columns = [p.columns(one, names) for g, p in self.parts.items() for one in plain[g]]
         found = scatter([one for g, many in plain.items() for one in self._spread(g, many)], columns, names)
-        before = self._cost(plain)
+        before, self.deviations = self._cost(plain), found
         for part in self.parts.values():
             part.deviations = found
         return before - self._cost(plain)
@@ -316,14 +332,14 @@ class Grouped:
     fit
         The optimum; its `sse` is twice the negative log-likelihood up to a constant.
     weights
-        Noise and scatter of repeats by group.
+        Noise of each group, and scatter of repeats.
     shrinks
         Whitening of each trial by the scatter of repeats, all groups end to end; empty where nothing scatters.
     """
 
     model: GroupedModel
     fit: Fit
-    weights: Mapping[str, Repeats]
+    weights: Weights
     shrinks: Sequence[Shrink]
 
     @classmethod
@@ -355,7 +371,7 @@ class Grouped:
 
         A common cause is preferred to a change that explains as much: an error of the model in all groups is no change.
         """
-        random = 2 * sum(len(w.noise.acting) for w in self.weights.values()) + len(self.deviations)
+        random = 2 * sum(len(n.acting) for n in self.weights.noise.values()) + len(self.weights.deviations)
         return self.sse + PARAMETER_PENALTY * (self.degrees + random) + SEPARABLE * len(self.changes)
 
     @property
@@ -372,18 +388,13 @@ class Grouped:
     @property
     def is_driven(self) -> bool:
         """Whether predictions are one step ahead: there is process noise, or a motion is imposed."""
-        return not all(is_simulated(w.noise, self.fit.trials) for w in self.weights.values())
-
-    @property
-    def deviations(self) -> Mapping[str, float]:
-        """Standard deviation of each nominal parameter that scatters between trials, in its unit."""
-        return next(iter(self.weights.values())).deviations
+        return not all(is_simulated(n, self.fit.trials) for n in self.weights.noise.values())
 
     @property
     def repeats(self) -> dict[str, float]:
-        """The same as a share of the first group's value."""
+        """Deviation of each nominal parameter between trials, as a share of the first group's value."""
         values = next(iter(self.model.models.values())).parameters()
-        return {n: s / abs(values[n]) for n, s in self.deviations.items() if values[n]}
+        return {n: s / abs(values[n]) for n, s in self.weights.deviations.items() if values[n]}
 
     def leaning(self, moved: np.ndarray) -> float:
         """Return the part of the squares of a change that depends on the scatter of repeats.

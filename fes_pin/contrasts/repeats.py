@@ -14,7 +14,7 @@ that scatter is kept. Source: Laird and Ware, Biometrics 38 (1982).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -35,41 +35,22 @@ COARSE, STEP, FINE = 27, 0.5, 21
 """Grid of a deviation's logarithm, half a unit apart, and its refinement about the best point."""
 
 
-@dataclass(frozen=True, eq=False)
-class Repeats:
-    """Noise of a group's trials, and the scatter of their nominal parameters.
-
-    Attributes
-    ----------
-    noise
-        Process and measurement noise.
-    deviations
-        Standard deviation of a nominal parameter between trials, in its unit, by name.
-    """
-
-    noise: StateSpaceNoise
-    deviations: Mapping[str, float] = field(default_factory=dict)
-
-
 class RepeatedProblem(LikelihoodProblem):
     """A `LikelihoodProblem` whose nominal parameters scatter between trials.
 
     Parameters
     ----------
-    model, trials
+    model, trials, noise
         As in `LikelihoodProblem`.
-    weight
-        Noise, and the scatter of parameters.
+    deviations
+        Standard deviation of a nominal parameter between trials, in its unit, by name.
     """
 
-    def __init__(self, model: Model, trials: Sequence[Trial], weight: Repeats) -> None:
-        super().__init__(model, trials, weight.noise)
-        self.deviations = weight.deviations
-
-    @property
-    def weight(self) -> Repeats:
-        """Noise, and the scatter of parameters."""
-        return Repeats(self.noise, self.deviations)
+    def __init__(
+        self, model: Model, trials: Sequence[Trial], noise: StateSpaceNoise, deviations: Mapping[str, float]
+    ) -> None:
+        super().__init__(model, trials, noise)
+        self.deviations = deviations
 
     def linearize(self, values: Mapping[str, float], unknowns: Unknowns) -> list[Linearized]:
         """Return residuals and sensitivities as `LikelihoodProblem` does, times (I + V D^2 V')^(-1/2)."""

@@ -188,7 +188,7 @@ class Screen:
 
     def _sensitivities(self, one: Effect, base: Grouped, group: str, unknowns: Unknowns) -> np.ndarray:
         """Return sensitivities of the trials of a group to the amplitudes of a cause, whitened as in a fit."""
-        at = (base.model.models[group], base.weights[group].noise, unknowns)
+        at = (base.model.models[group], base.weights.noise[group], unknowns)
         parts = self._by_group[group].sensitivities(one, *at)
         shrinks = by_group(base.shrinks, self._trials)[group]
         return np.concatenate([s.shrunk(p) for s, p in zip(shrinks, parts, strict=True)] if shrinks else parts)

@@ -7,7 +7,7 @@ import pytest
 from contrast_pairs.free import free_pair
 
 import fes_pin as fp
-from fes_pin.contrasts.repeats import RepeatedProblem, Repeats, scatter
+from fes_pin.contrasts.repeats import RepeatedProblem, scatter
 from fes_pin.diagnosis.search.likelihood_fits import MEASUREMENT, LikelihoodFits
 from fes_pin.infer.problem import Linearized
 from fes_pin.infer.projection import without_locals
@@ -69,7 +69,7 @@ SIZES = {"gain": 0.01, "time_constant_s": 0.002}
 
 def test_the_squares_are_those_of_the_covariance(muscle):
     """r' (I + V D^2 V')^-1 r and its log-determinant, as dense matrices have them."""
-    problem = RepeatedProblem(muscle.model, muscle.trials, Repeats(muscle.noise, SIZES))
+    problem = RepeatedProblem(muscle.model, muscle.trials, muscle.noise, SIZES)
     plain = problem.plain(muscle.values, muscle.unknowns)
     for one, two in zip(plain, problem.linearize(muscle.values, muscle.unknowns), strict=True):
         v = without_locals(one, one.jacobian) * list(SIZES.values())
@@ -85,7 +85,7 @@ def test_the_squares_are_those_of_the_covariance(muscle):
 def test_noise_is_found_in_what_trials_do_not_differ_by(muscle):
     """Of a reading r that is whitened it is (I + V D^2 V')^-1 r, with the likeliest start of each trial."""
     white = replace(muscle.noise, ar={})
-    problem = RepeatedProblem(muscle.model, muscle.trials, Repeats(white, SIZES))
+    problem = RepeatedProblem(muscle.model, muscle.trials, white, SIZES)
     run = problem.residual_run(muscle.values, muscle.unknowns)
     for one, left in zip(problem.plain(muscle.values, muscle.unknowns), run, strict=True):
         v = without_locals(one, one.jacobian) * list(SIZES.values())
