@@ -149,20 +149,12 @@ def _foot(body: Body, q: np.ndarray, side: str) -> _Foot:
     return _Foot(turn, data.oMi[mtp].translation - turn @ under, length)
 
 
-def soles(body: Body, q: np.ndarray, side: str, heel: bool) -> np.ndarray:
-    """Corners of a sole on the ground: (4, 2) m; the whole foot's, or without the heel the forefoot's.
+def sole(body: Body, q: np.ndarray, side: str, heel: bool) -> np.ndarray:
+    """Corners of a sole, over the plane of the stance foot: (4, 3) m; the whole foot's, or without heel the forefoot's.
 
     Length and breadth by published proportions from the distance of the ankle and the MTP joint.
     """
-    return _corners(_foot(body, q, side), heel)[:, :2]
-
-
-def sole_height(body: Body, q: np.ndarray, side: str) -> float:
-    """Height of the lowest corner of a forefoot's sole over the plane of the stance foot, m; negative below."""
-    return float(_corners(_foot(body, q, side), False)[:, 2].min())
-
-
-def _corners(foot: _Foot, heel: bool) -> np.ndarray:
+    foot = _foot(body, q, side)
     half = 0.5 * FOOT_BREADTH / FOOT_LENGTH * foot.length
     ends = (-MTP_ALONG_FOOT * foot.length if heel else 0.0, (1.0 - MTP_ALONG_FOOT) * foot.length)
     return np.array([[x, y, 0.0] for x in ends for y in (-half, half)]) @ foot.turn.T + foot.place
@@ -186,7 +178,7 @@ def support(body: Body, q: np.ndarray, heels: dict[str, bool], sides: Sequence[s
         bent = abs(q[body.joint_names.index(f"{side}_mtp_extension")])
         heel = heels[side] and bent <= np.radians(FLAT_DEG)
         names.append(f"{side}_{'foot' if heel else 'forefoot'}")
-        points.append(soles(body, q, side, heel))
+        points.append(sole(body, q, side, heel)[:, :2])
     corners = np.vstack(points)
     return SupportPolygon(corners[ConvexHull(corners).vertices], tuple(names))
 

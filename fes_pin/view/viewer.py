@@ -20,7 +20,7 @@ import numpy as np
 import pinocchio as pin
 
 from fes_pin.body.build import Body
-from fes_pin.body.ground import LEVEL_M, sole_height
+from fes_pin.body.ground import LEVEL_M, sole
 from fes_pin.body.inputs import Inputs
 from fes_pin.body.joints import JOINTS, SIDES
 from fes_pin.body.linear_body import LinearBody
@@ -208,7 +208,7 @@ def said_of(linear: LinearBody) -> str:
     if linear.braced:
         parts.append(f"{len(linear.braced)} joints braced")
     other = SIDES[1 - SIDES.index(linear.body.stance)]
-    below = -sole_height(linear.body, linear.body.angles(linear.whole_posture, check=False), other)
+    below = -sole(linear.body, linear.body.angles(linear.whole_posture, check=False), other, heel=False)[:, 2].min()
     if below > LEVEL_M:
         parts.append(
             f"with the {linear.body.stance} forefoot flat, as the model has it, the {other} one lies "
@@ -251,11 +251,10 @@ def show_walk(
         return scene
     if np.shape(pelvis) != (len(scene.frames), 3, 3):
         raise InputError(f"the pelvis needs shape ({len(scene.frames)}, 3, 3), got {np.shape(pelvis)}")
-    shapes = pin.buildGeomFromUrdfString(body.model, body.urdf, pin.GeometryType.VISUAL)
-    return scene.carry([_put_down(body, shapes, q, turn) for q, turn in zip(scene.frames, pelvis, strict=True)])
+    return scene.carry([_put_down(body, q, turn) for q, turn in zip(scene.frames, pelvis, strict=True)])
 
 
-def _put_down(body: Body, shapes: pin.GeometryModel, q: np.ndarray, turn: np.ndarray) -> pin.SE3:
+def _put_down(body: Body, q: np.ndarray, turn: np.ndarray) -> pin.SE3:
     """Return the pose of the stance foot: the pelvis is oriented as given, the lowest sole touches the floor."""
     data = body.model.createData()
     pin.framesForwardKinematics(body.model, data, q)
@@ -263,15 +262,8 @@ def _put_down(body: Body, shapes: pin.GeometryModel, q: np.ndarray, turn: np.nda
     other = data.oMi[body.model.getJointId("left_hip_flexion" if body.stance == "right" else "right_hip_flexion")]
     rotation = turn @ pelvis.rotation.T
     middle = rotation @ (0.5 * (pelvis.translation + other.translation))
-    placed = shapes.createData()
-    pin.updateGeometryPlacements(body.model, data, shapes, placed, q)
-    lowest = np.inf
-    for k, shape in enumerate(shapes.geometryObjects):
-        if "foot" in shape.name and hasattr(shape.geometry, "halfSide"):
-            corners = shape.geometry.halfSide * np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, 8).T
-            points = placed.oMg[k].rotation @ corners.T + placed.oMg[k].translation[:, None]
-            lowest = min(lowest, float((rotation @ points)[2].min()))
-    return pin.SE3(rotation, np.array([-middle[0], -middle[1], -lowest if np.isfinite(lowest) else 0.0]))
+    lowest = min(float((rotation @ sole(body, q, side, heel=True).T)[2].min()) for side in SIDES)
+    return pin.SE3(rotation, np.array([-middle[0], -middle[1], -lowest]))
 
 
 def show_influence(linear: LinearBody, inputs, names: str | Sequence[str]) -> BodyScene:

@@ -68,11 +68,9 @@ class Strides:
 
 def _waves(phase: np.ndarray, harmonics: np.ndarray) -> np.ndarray:
     """Orthonormal waves of a stride: 1, root 2 cos, root 2 sin, ...: (samples, k)."""
-    out = np.empty((len(phase), len(harmonics)))
-    for k, h in enumerate(harmonics):
-        wave = np.cos if k % 2 else np.sin
-        out[:, k] = 1.0 if h == 0 else np.sqrt(2.0) * wave(2.0 * np.pi * h * phase)
-    return out
+    angle, is_cosine = 2.0 * np.pi * np.outer(phase, harmonics), np.arange(len(harmonics)) % 2 == 1
+    waves = np.sqrt(2.0) * np.where(is_cosine, np.cos(angle), np.sin(angle))
+    return np.where(harmonics == 0, 1.0, waves)
 
 
 def strides_of(trials: Sequence[WalkTrial], cutoff_hz: float) -> Strides:
