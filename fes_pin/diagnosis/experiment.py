@@ -154,12 +154,12 @@ def _often(repeats: int | None) -> str:
 
 def near_measured(best: LikelihoodFit, trials: Sequence[Trial], study: Study) -> list[tuple[Trial, Trial]]:
     """Return the trials that a model predicts within the measured range, each without and with predicted outputs."""
-    ranges, out = _ranges(measured_columns(best.model, study.trials)), []
+    measured, out = measured_columns(best.model, study.trials), []
     run = Simulator(best.model, trials).run(best.values, [_start(best, t) for t in trials])
     for trial, one in zip(trials, run, strict=True):
         names = best.model.rig.outputs(trial.kind)
         read = trial.with_columns(**{n: one.readings[:, k] for k, n in enumerate(names) if n in best.noise})
-        if all(_inside(read[n], limits) for n, limits in ranges.items() if n in read):
+        if all(_is_near(read[n], y) for n, y in measured.items() if n in read):
             out.append((trial, read))
     return out
 
@@ -188,14 +188,11 @@ def discriminations(
     return [Discrimination(rival.criterion - best.criterion, one, known) for one in news]
 
 
-def _ranges(measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, float]]:
-    """Return the range of each output in a proposed trial: the measured range, widened by `ROOM`."""
-    ends = {n: (float(y.min()), float(y.max())) for n, y in measured.items()}
-    return {n: (low - ROOM * (high - low), high + ROOM * (high - low)) for n, (low, high) in ends.items()}
-
-
-def _inside(values: np.ndarray, limits: tuple[float, float]) -> bool:
-    return bool(np.isfinite(values).all() and values.min() >= limits[0] and values.max() <= limits[1])
+def _is_near(values: np.ndarray, measured: np.ndarray) -> bool:
+    """Return whether a prediction stays within the measured range, widened by `ROOM`."""
+    room = ROOM * np.ptp(measured)
+    inside = values.min() >= measured.min() - room and values.max() <= measured.max() + room
+    return bool(np.isfinite(values).all() and inside)
 
 
 BestTrial = tuple[dict[str, Discrimination], Trial]
