@@ -89,7 +89,7 @@ def testable_causes(study: Study, catalogue: Catalogue | None = None) -> Testabl
             return f"the nominal model cannot be fitted ({problem})"
     kept: dict[str, float] = {}
     for one in scores.scored:
-        kept[one.probe.name] = max(kept.get(one.probe.name, 0.0), one.kept)
+        kept[one.effect.name] = max(kept.get(one.effect.name, 0.0), one.kept)
     return Testable(
         shown={n: k for n, k in sorted(kept.items()) if k >= IDENTIFIABLE_SHARE},
         absorbed=tuple(sorted(n for n, k in kept.items() if k < IDENTIFIABLE_SHARE)),
@@ -135,10 +135,10 @@ def _unexplained(fitted: Fit) -> float:
 def _alike(scores: Scores, kept: Mapping[str, float]) -> tuple[tuple[str, ...], ...]:
     """Return groups of causes of one amplitude that have, for some of their shapes, nearly parallel sensitivities."""
     single = [
-        (one.probe.name, block.start)
+        (one.effect.name, block.start)
         for one, block in zip(scores.scored, scores.blocks, strict=False)
         if block.stop - block.start == 1
-        and kept[one.probe.name] >= IDENTIFIABLE_SHARE
+        and kept[one.effect.name] >= IDENTIFIABLE_SHARE
         and one.kept >= IDENTIFIABLE_SHARE
     ]
     groups: list[set[str]] = []

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 import scipy.stats
 
-from fes_pin.diagnosis.search.library import Probe
 from fes_pin.diagnosis.search.score import score_test
 from fes_pin.infer.levels import PARAMETER_PENALTY
 from fes_pin.infer.problem import Linearized
@@ -39,8 +38,8 @@ def left(columns, y):
 @pytest.mark.parametrize("unknowns", [0, 2])
 def test_the_score_is_that_of_least_squares(unknowns):
     parts, columns = parts_of(np.random.default_rng(unknowns), unknowns)
-    common, own = score_test(parts, [Probe(MainsHum.absent(), columns)]).scored
-    assert own.probe.effect.each_trial and not common.probe.effect.each_trial
+    common, own = score_test(parts, [(MainsHum.absent(), columns)]).scored
+    assert own.effect.each_trial and not common.effect.each_trial
     y = np.concatenate([p.residual for p in parts])
     local = np.zeros((TRIALS * ROWS, 0))
     if unknowns:
@@ -58,7 +57,7 @@ def test_under_the_null_it_is_chi_square():
     degrees = 2 * (TRIALS - 1)
     for _ in range(500):
         noisy = [Linearized(rng.standard_normal(ROWS), p.jacobian, p.local) for p in parts]
-        gains.append(score_test(noisy, [Probe(MainsHum.absent(), columns)]).scored[1].gain)
+        gains.append(score_test(noisy, [(MainsHum.absent(), columns)]).scored[1].gain)
     chi2 = np.array(gains) + PARAMETER_PENALTY * (degrees - 2)
     assert scipy.stats.kstest(chi2, "chi2", args=(degrees,)).pvalue > 1e-3
     assert np.mean(np.array(gains) > PARAMETER_PENALTY * 2) < 0.02
@@ -74,9 +73,9 @@ def test_an_unknown_that_no_trial_feels_takes_nothing():
 def test_a_probe_that_runs_away_tells_nothing_and_takes_nothing_from_another():
     """Squares of its columns would leave the floating-point numbers."""
     parts, columns = parts_of(np.random.default_rng(5), 1)
-    runs_away = Probe(MainsHum.absent(), np.full_like(columns, 1e200))
-    alone = score_test(parts, [Probe(MainsHum.absent(), columns)])
-    beside = score_test(parts, [Probe(MainsHum.absent(), columns), runs_away])
+    runs_away = (MainsHum.absent(), np.full_like(columns, 1e200))
+    alone = score_test(parts, [(MainsHum.absent(), columns)])
+    beside = score_test(parts, [(MainsHum.absent(), columns), runs_away])
     assert beside.scored[0].gain == pytest.approx(alone.scored[0].gain, rel=1e-9)
     assert beside.scored[1].gain == 0.0
     assert np.isfinite(beside.gram).all()

@@ -2,10 +2,7 @@
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
-
-import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.search.starts import near_null
@@ -13,27 +10,6 @@ from fes_pin.identify.problem import answered_columns, measured_columns
 from fes_pin.models.catalogue import installed
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
-
-
-@dataclass(frozen=True)
-class Probe:
-    """One effect with one choice of shapes, linearized at its null.
-
-    Attributes
-    ----------
-    effect
-        The effect at (or next to) its null, with its shapes.
-    columns
-        Shape (m, amplitudes): whitened sensitivities, all trials end to end.
-    """
-
-    effect: Effect
-    columns: np.ndarray
-
-    @property
-    def name(self) -> str:
-        """Name of the cause."""
-        return self.effect.name
 
 
 class Library:

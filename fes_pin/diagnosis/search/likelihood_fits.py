@@ -175,7 +175,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
 
     def begin(self, base: LikelihoodFit, starts: Mapping[Names, Starts]) -> dict[Names, LikelihoodFit]:
         """Return the best first fit of each set: at the noise of the base, with little process noise, and from afar."""
-        begun = {k: [base.model + started(s.probe.effect, s.amplitudes) for s in many] for k, many in starts.items()}
+        begun = {k: [base.model + started(s.effect, s.amplitudes) for s in many] for k, many in starts.items()}
         looks = in_parallel(lambda k: self._first_fits(base, starts[k], begun[k]), list(starts))
         restarted = {k: [f] for k, f in self.calm.items()}
         restarted = restarted or self._restarted({names: models[0] for names, models in begun.items()}, base)
@@ -183,7 +183,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         return {names: min((*fits, *restarted.get(names, ())), key=lambda f: f.criterion) for names, fits in each}
 
     def _first_fits(self, base: LikelihoodFit, starts: Starts, models: Sequence[Model]) -> list[LikelihoodFit]:
-        others = [] if base.model.effects else self._elsewhere(starts[0].probe.effect)
+        others = [] if base.model.effects else self._elsewhere(starts[0].effect)
         return [*(self._maxima.look(one, base) for one in models), *others]
 
     def _elsewhere(self, effect: Effect) -> list[LikelihoodFit]:

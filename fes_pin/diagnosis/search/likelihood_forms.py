@@ -50,7 +50,7 @@ class LikelihoodForms:
         """
         both = ((e, n) for e in base.model.effects for n, *_ in e.refinements() if n in e.refined())
         starts = in_parallel(lambda one: self._maxima.less(base, one[1:], one[0]), list(both))
-        return self._maxima.better(starts, base, base.criterion)
+        return self._maxima.better(starts, base)
 
 
 def demanded_form(

@@ -92,8 +92,8 @@ class LikelihoodMaxima:
         found = minimise(problem, start.parameters(), base.unknowns, SCREEN_ITERATIONS)
         return replace(fit_of(problem, found), together=base.together)
 
-    def better(self, starts: Sequence[Model], base: LikelihoodFit, criterion: float) -> LikelihoodFit | None:
-        """Return the best fit from some starts; None where none has a criterion below the given one.
+    def better(self, starts: Sequence[Model], base: LikelihoodFit) -> LikelihoodFit | None:
+        """Return the best fit from some starts; None where none has a lower criterion than the base.
 
         The best first fits are fitted further if their criterion, at the noise of the base, exceeds that of the base by
         less than the penalty of a parameter.
@@ -101,7 +101,7 @@ class LikelihoodMaxima:
         looks = sorted(in_parallel(lambda s: self.look(s, base), starts), key=lambda f: f.criterion)
         worth = [f for f in looks[:STARTS] if f.criterion < base.criterion + PARAMETER_PENALTY]
         best = min(in_parallel(self.go_on, worth), key=lambda f: f.criterion, default=None)
-        return best if best is not None and best.criterion < criterion else None
+        return best if best is not None and best.criterion < base.criterion else None
 
     def less(self, whole: LikelihoodFit, gone: Sequence[str], effect: Effect) -> Model:
         """Return the model of a fit with some parameters of an effect at their nulls, without it if these are all.

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fes_pin.diagnosis.search.cause_sets import names_of
-from fes_pin.diagnosis.search.library import Library, Probe
+from fes_pin.diagnosis.search.library import Library
 from fes_pin.diagnosis.search.score import Scores, score_test
 from fes_pin.identify.likelihood import LikelihoodProblem, is_simulated
 from fes_pin.identify.likelihood_fit import LikelihoodFit
@@ -22,23 +22,23 @@ class LikelihoodScreen:
 
     def __init__(self, library: Library) -> None:
         self._library = library
-        self._scores: dict[int, tuple[LikelihoodFit, Scores]] = {}
+        self._scores: dict[LikelihoodFit, Scores] = {}
         self._probing: dict[tuple, LikelihoodProblem] = {}
 
     def scores(self, base: LikelihoodFit) -> Scores:
         """Return score tests of every effect that a fit does not have, at its noise; none in a fit that diverges."""
         if not math.isfinite(base.sse):
             return Scores([], np.zeros((0, 0)), [])
-        if id(base) not in self._scores:
+        if base not in self._scores:
             wanted = [e for e in self._library.effects if e.name not in names_of(base) and self._library.felt(e)]
             groups = in_parallel(lambda e: self._probes(e, base), wanted)
-            self._scores[id(base)] = (base, score_test(base.parts, [p for g in groups for p in g]))
-        return self._scores[id(base)][1]
+            self._scores[base] = score_test(base.parts, [p for g in groups for p in g])
+        return self._scores[base]
 
-    def _probes(self, effect: type[Effect], base: LikelihoodFit) -> list[Probe]:
+    def _probes(self, effect: type[Effect], base: LikelihoodFit) -> list[tuple[Effect, np.ndarray]]:
         """Return the effect with every choice of its shapes, linearized at the nominal parameters of a fit."""
         forms, at = self._library.grid(effect), (base.model, base.noise, base.unknowns)
-        return [Probe(one, np.nan_to_num(np.concatenate(self.sensitivities(one, *at)))) for one in forms]
+        return [(one, np.nan_to_num(np.concatenate(self.sensitivities(one, *at)))) for one in forms]
 
     def sensitivities(
         self, one: Effect, model: Model, noise: StateSpaceNoise, unknowns: Unknowns
