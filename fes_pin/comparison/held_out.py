@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fes_pin.comparison.own_part import own_part, pairs_of, stride
+from fes_pin.comparison.own_part import own_part, pairs_of
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.held_out import folds_of
 from fes_pin.identify.ahead import forecast, free_residuals
@@ -14,7 +14,7 @@ from fes_pin.identify.fit import Fit, fit_multistart, noise_of
 from fes_pin.identify.problem import Problem
 from fes_pin.infer.held_out import within
 from fes_pin.infer.levels import RUNAWAY
-from fes_pin.infer.noise import Noise
+from fes_pin.infer.noise import Noise, noise_step, thinning
 from fes_pin.models.model import Model
 from fes_pin.workers import in_parallel
 
@@ -84,7 +84,8 @@ def _begun(fitted: Fit, part: Parting, given_s: float) -> dict[str, np.ndarray]:
     """Mean squared errors after the first seconds of trials: predicted from those, and from the inputs alone."""
 
     def counts(trials: Sequence[Trial]) -> list[int]:
-        return [math.ceil(given_s / (stride(t) * t.dt) - 1e-9) for t in trials]
+        step = noise_step([t.dt for t in trials])
+        return [math.ceil(given_s / (thinning(t.dt, step) * t.dt) - 1e-9) for t in trials]
 
     differs = own_part(pairs_of(fitted, part.fitted), counts(part.fitted))
     if differs is None:

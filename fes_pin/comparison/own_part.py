@@ -10,17 +10,15 @@ estimated from its first samples alone. Laird and Ware, Biometrics 38 (1982).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.problem import Problem
-from fes_pin.infer.noise import thin
+from fes_pin.infer.noise import noise_step
 
-STEP_S = 4e-3
-"""Samples are averaged to this time step, s, as the noise's are: `infer.noise.FASTEST_S`."""
 WORTH = (1.0, 3.0, 10.0, 30.0, 100.0)
 """Most samples that count as one: errors of a model have a correlation time of some tenths of a second."""
 TURNS = 40
@@ -59,19 +57,10 @@ class OwnPart:
 
 
 def pairs_of(fitted: Fit, trials: Sequence[Trial]) -> list[Pair]:
-    """Residuals and sensitivities of trials at a fit, averaged to `STEP_S`, the channels weighed as in the fit."""
-    problem = Problem(fitted.model, trials, fitted.noise)
-    parts = problem.linearize(fitted.values, problem.start_unknowns())
-    out = []
-    for trial, part in zip(trials, parts, strict=True):
-        count = stride(trial)
-        out.append((thin(part.residual, count), thin(part.jacobian, count)))
-    return out
-
-
-def stride(trial: Trial) -> int:
-    """Samples of a trial that are averaged into one."""
-    return max(1, round(STEP_S / trial.dt))
+    """Residuals and sensitivities of trials at a fit, at the time step of noise, the channels weighed as in the fit."""
+    step = noise_step([t.dt for t in trials])
+    problem = Problem(fitted.model, trials, {n: replace(one, step_s=step) for n, one in fitted.noise.items()})
+    return [(p.residual, p.jacobian) for p in problem.linearize(fitted.values, problem.start_unknowns())]
 
 
 def own_part(pairs: Sequence[Pair], begun: Sequence[int]) -> OwnPart | None:
