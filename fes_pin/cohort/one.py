@@ -15,6 +15,7 @@ from fes_pin.data.errors import InputError
 from fes_pin.data.provenance import hashes, versions
 from fes_pin.data.sources import code_hash
 from fes_pin.data.study import read_study
+from fes_pin.models.catalogue import load_library
 from fes_pin.verdict.ask import diagnose
 from fes_pin.view.report import answer_files
 
@@ -92,8 +93,6 @@ def diagnose_one(work: Work, key: str) -> Answer:
 
 
 def _files(work: Work) -> dict[str, str | bytes]:
-    from fes_pin.models.catalogue import load_library  # noqa: PLC0415 - a worker imports what it needs
-
     catalogue = load_library(*work.library)
     study = read_study(work.folder, rigs=catalogue.schemas())
     brought = None if study.schema.owner is None else catalogue

@@ -141,19 +141,18 @@ def run_cohort(
     for work, _ in todo:
         outputs.check(store.place(work.name), (*OF_ALL, *OF_WALKS, STATE))
     tell, began = progress or (lambda _progress: None), time.monotonic()
-    done, failed = len(every) - len(todo), 0
     waiting: list[Answer] = []  # failures, until there is a study that did not fail: else nothing is written
     undone = {work.name for work, _ in todo}
     errors = {name: one.error for name in found if name not in undone and (one := store.get(name)) is not None}
-    for answer in _answers(todo, workers, scheduler, run):
+    before = len(errors)
+    on_it = scheduler if todo else None
+    for answer in in_processes(todo, workers, run) if on_it is None else on_cluster(todo, on_it, run):
         waiting.append(answer)
         errors[answer.name] = answer.error
         while waiting and not all(errors.values()):
             store.put(waiting.pop(0))
-        done, failed = done + 1, failed + bool(answer.error)
-        fresh = done - (len(every) - len(todo))
-        left = (time.monotonic() - began) / fresh * (len(every) - done)
-        tell(CohortProgress(done, len(every), failed, left, answer.name))
+        left = (time.monotonic() - began) / (len(errors) - before) * (len(every) - len(errors))
+        tell(CohortProgress(len(errors), len(every), sum(map(bool, errors.values())), left, answer.name))
     if all(errors.values()):
         raise InputError(f"none of {len(found)} studies could be diagnosed; the first: {min(errors.items())[1]}")
 
@@ -167,19 +166,10 @@ def run_cohort(
     return made
 
 
-def _answers(
-    todo: Sequence[Task], workers: int, scheduler: str | None, run: Callable[[Work, str], Answer]
-) -> Iterator[Answer]:
-    if not todo:
-        return iter(())
-    return on_cluster(todo, scheduler, run) if scheduler is not None else in_processes(todo, workers, run)
-
-
 def _files(made: Cohort, seed: int, command: str) -> dict[str, str | bytes]:
     out: dict[str, str | bytes] = {}
-    for name in ("studies", "causes", "pooled", "prevalence"):
-        rows: Sequence[Row] = getattr(made, name)
-        columns = {n: [r[n] for r in rows] for n in HEADS[name]}
+    for name, head in HEADS.items():
+        columns = {n: [r[n] for r in getattr(made, name)] for n in head}
         for suffix in SUFFIXES:
             with suppress(InputError):  # Parquet where it can be written
                 out[name + suffix] = table_bytes(columns, name + suffix)

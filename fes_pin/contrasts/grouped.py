@@ -139,19 +139,15 @@ class GroupedModel:
 
 def _differing(item: Item, effects: Sequence[Effect], is_common: bool) -> list[str]:
     """Names of the parameters that an item gives a group of its own."""
-    for effect in effects:
-        if effect.name == item.name:
-            return [f"{item.name}.{n}" for n in (effect.amplitudes() if is_common else effect.common())]
-    return [item.name]
+    return [
+        f"{e.name}.{n}" for e in effects if e.name == item.name for n in (e.amplitudes() if is_common else e.common())
+    ] or [item.name]
 
 
 def _agreed(model: GroupedModel) -> GroupedModel:
     """The same with one value of every parameter that groups share: that of the first group that has it."""
-    values: dict[str, float] = {}
-    for group, one in model.models.items():
-        for name, value in one.parameters().items():
-            values.setdefault(model.path(name, group), value)
-    return model.with_parameters(values)
+    groups = reversed(list(model.models.items()))
+    return model.with_parameters({model.path(n, g): v for g, m in groups for n, v in m.parameters().items()})
 
 
 @dataclass(frozen=True, eq=False)

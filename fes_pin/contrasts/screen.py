@@ -204,10 +204,8 @@ def _at_null(model: Model, kind: type[Effect]) -> Effect:
 def _own(base: Grouped, item: Item, rows: slice) -> _Column:
     """Return a parameter, or a cause's amplitudes, in one group alone."""
     model, group = base.model, str(item.group)
-    names = [item.name]
-    for effect in model.models[group].effects:
-        if effect.name == item.name:
-            names = [f"{effect.name}.{n}" for n in effect.amplitudes()]
+    effects = (e for e in model.models[group].effects if e.name == item.name)
+    names = [f"{e.name}.{n}" for e in effects for n in e.amplitudes()] or [item.name]
     paths = [model.path(n, group) for n in names]
     every = np.concatenate([p.jacobian for p in base.fit.parts])[:, [model.free.index(p) for p in paths]]
     columns = np.zeros_like(every)
