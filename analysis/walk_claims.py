@@ -79,7 +79,7 @@ def without_motion(*joints):
 # %% Required against measured, and the tree that stands on its forefoot
 motion, own, plates = walk(free)
 left = residual(motion, plates)
-singles = np.isin(plates.support(), ("left", "right"))
+singles = plates.loaded["left"] ^ plates.loaded["right"]
 print("measured - required, rms: forces N, moments about the centre of mass N m")
 print(f"{'':34s}" + "".join(f"{c:>7s}" for c in CHANNELS))
 

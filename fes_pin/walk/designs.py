@@ -75,10 +75,7 @@ class Designs:
 
     def _design(self, trials: list[WalkTrial], later_s: float) -> Design:
         x = {n: self.strides.mean([form.columns(s) for s in trials]) for n, form in self.forms.items()}
-        return Design(trials, self._residual(trials), x, later_s)
-
-    def _residual(self, trials: list[WalkTrial]) -> np.ndarray:
-        return self.strides.mean([s.residual for s in trials])
+        return Design(trials, self.strides.mean([s.residual for s in trials]), x, later_s)
 
     @cached_property
     def measured(self) -> np.ndarray:
@@ -132,7 +129,8 @@ class Designs:
             step = float(np.clip(found.values[0], -0.05, 0.05))
             later = float(np.clip(later + step, -0.2, 0.2))
             trials = [r.trial(later) for r in self.recordings]
-            y, rate = self._residual(trials), self.strides.mean([form.columns(s) for s in trials])
+            y = self.strides.mean([s.residual for s in trials])
+            rate = self.strides.mean([form.columns(s) for s in trials])
             if abs(step) < SHIFT_ENDS_S:
                 break
         return self._design(trials, later)

@@ -58,11 +58,11 @@ def diagnose_walk(
     with one_thread_each(), noting_stops() as stops:
         tell(0.02, "inverse dynamics")
         recordings = recordings_of(replace(study, trials=trials), cutoff_hz=cutoff_hz)
-        models = WalkModels(Designs(recordings, seed), seed)
+        models = WalkModels(Designs(recordings, seed))
         with time_limit(math.inf if limit is None else limit - (time.perf_counter() - began)):
             search, found = _searched(models, tell)
         tell(0.85, "strides held out")
-        out = _judged(study, search, found, seed)
+        out = _judged(study, search, found)
     tell(1.0, "done")
     return out.ended(began, made, limit if stops else None)
 
@@ -79,9 +79,9 @@ def _searched(models: WalkModels, tell: Progress) -> tuple[WalkSearch, SearchRes
     return search, found
 
 
-def _judged(study: Study, search: WalkSearch, found: SearchResult[WalkFit], seed: int) -> WalkDiagnosis:
+def _judged(study: Study, search: WalkSearch, found: SearchResult[WalkFit]) -> WalkDiagnosis:
     """Return the diagnosis of a search's result."""
-    models, verdict = search.models, WalkVerdict(search, seed)
+    models, verdict = search.models, WalkVerdict(search)
     state = verdict.of(found)
     found, left, errors = state.found, verdict.lack_of_fit(state), verdict.errors
     causes = [verdict.cause(state, n) for n in found.best.names]

@@ -21,12 +21,10 @@ class StrideErrors:
     ----------
     models
         The sets.
-    seed
-        Of bootstrap intervals.
     """
 
-    def __init__(self, models: WalkModels, seed: int) -> None:
-        self.models, self.seed = models, seed
+    def __init__(self, models: WalkModels) -> None:
+        self.models = models
         designs = models.designs
         height = designs.recordings[0].motion.body.height_m or 1.8
         self._scale = np.r_[np.ones(3), np.full(3, 1.0 / (ARM * height))][:, None]
@@ -52,7 +50,7 @@ class StrideErrors:
         """Return the share of the nominal error above the noise that a set removes, against a smaller set."""
         sets = (self.models.nominal(), without, best)
         nominal, before, after = (self.errors(one, held_out) for one in sets)
-        return held_out_gain(nominal, before, after, self.seed)
+        return held_out_gain(nominal, before, after, self.models.designs.seed)
 
     def evidence(self, without: WalkFit, best: WalkFit) -> Evidence:
         """Return the evidence for a set in held-out strides, against a smaller set, with the set's noise.

@@ -61,8 +61,6 @@ class WalkModels(FittedSets[WalkFit, None]):
     ----------
     designs
         Design matrices of the recordings.
-    seed
-        Of the simulated null.
 
     Attributes
     ----------
@@ -72,17 +70,17 @@ class WalkModels(FittedSets[WalkFit, None]):
         For forms whose parameter a trial shows directly, its value and standard deviation.
     """
 
-    def __init__(self, designs: Designs, seed: int) -> None:
+    def __init__(self, designs: Designs) -> None:
         super().__init__()
-        self.designs, self.seed = designs, seed
+        self.designs = designs
         self.null: Nulls | None = None
         self.most_candidates = MOST_FOR_NOISE
         self.readings = dict(_read_off(designs))
 
     def with_noise_of(self, best: WalkFit) -> WalkModels:
         """Return the same sets with channels rotated for the residual of one set, and the null in its noise."""
-        other = WalkModels(self.designs.turned(self.designs.residual(best.names, best.fitted.values)), self.seed)
-        other.null = simulated_nulls(other.designs, other.fit(best.names).fitted.variance, self.seed)
+        other = WalkModels(self.designs.turned(self.designs.residual(best.names, best.fitted.values)))
+        other.null = simulated_nulls(other.designs, other.fit(best.names).fitted.variance)
         other.most_candidates = FittedSets.most_candidates
         return other
 

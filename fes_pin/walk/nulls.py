@@ -32,9 +32,9 @@ class Nulls:
     spread: dict[str, np.ndarray] = field(repr=False)
 
 
-def simulated_nulls(designs: Designs, variance: np.ndarray, seed: int) -> Nulls:
+def simulated_nulls(designs: Designs, variance: np.ndarray) -> Nulls:
     """Return the results of the library on residuals without a cause, in noise of this variance, (1, 6, k)."""
-    drawn = _without_a_cause(designs, variance, seed)
+    drawn = _without_a_cause(designs, variance)
     none = np.zeros((*variance.shape, 0))
     alone = [f.deviance for f in fit_many(drawn, none, np.zeros(0), designs.noise, SIMULATED_ROUNDS)]
     best, spread = np.full(SIMULATED, -np.inf), {}
@@ -47,13 +47,13 @@ def simulated_nulls(designs: Designs, variance: np.ndarray, seed: int) -> Nulls:
     return Nulls(SimulatedFamily(best), spread)
 
 
-def _without_a_cause(designs: Designs, variance: np.ndarray, seed: int) -> np.ndarray:
+def _without_a_cause(designs: Designs, variance: np.ndarray) -> np.ndarray:
     """Return simulated residuals in rotated channels: (draws, 1, 6, k).
 
     They are the sum of soft tissue, as errors in the coordinates, scaled in each wave to the estimated noise, of a
     share of the fitted noise, and of the ordinary errors of every session.
     """
-    random = np.random.default_rng(seed)
+    random = np.random.default_rng(designs.seed)
     drawn = random.normal(size=(SIMULATED, *variance.shape)) * np.sqrt(variance)
     always = random.normal(size=(SIMULATED, designs.ordinary.shape[3])) @ designs.ordinary.reshape(variance.size, -1).T
     mixed = random.normal(size=(SIMULATED, len(designs.tissue))) / np.sqrt(len(designs.tissue))

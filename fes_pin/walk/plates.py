@@ -53,15 +53,12 @@ class Plates:
         cut = ({side: values[rows] for side, values in one.items()} for one in (self.feet, self.pressure, self.loaded))
         return Plates(self.time[rows], self.way[rows], *cut)
 
-    def support(self) -> np.ndarray:
-        """The one foot that stands in every sample: `left`, `right`, `both` or "" for none."""
-        left, right = self.loaded["left"], self.loaded["right"]
-        return np.where(left & right, "both", np.where(left, "left", np.where(right, "right", "")))
-
     def single_supports(self) -> list[tuple[str, slice]]:
-        """Single supports in the order of time: the foot and its samples."""
-        kind, dt = self.support(), float(self.time[-1] - self.time[0]) / (len(self.time) - 1)
-        found = [(side, rows) for side in SIDES for rows in stretches(kind == side)]
+        """Return single supports in the order of time: the foot and its samples."""
+        left, right = self.loaded["left"], self.loaded["right"]
+        dt = float(self.time[-1] - self.time[0]) / (len(self.time) - 1)
+        alone = (("left", left & ~right), ("right", right & ~left))
+        found = [(side, rows) for side, where in alone for rows in stretches(where)]
         long = [(side, rows) for side, rows in found if (rows.stop - rows.start) * dt >= SHORTEST_S]
         return sorted(long, key=lambda one: one[1].start)
 

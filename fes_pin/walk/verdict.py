@@ -44,13 +44,11 @@ class WalkVerdict(Verdict[WalkFit, WalkModels, WalkWeighed]):
     ----------
     search
         A search that has run.
-    seed
-        Of bootstrap intervals.
     """
 
-    def __init__(self, search: WalkSearch, seed: int) -> None:
+    def __init__(self, search: WalkSearch) -> None:
         super().__init__(search)
-        self.models, self.errors = search.models, StrideErrors(search.models, seed)
+        self.models, self.errors = search.models, StrideErrors(search.models)
 
     def weigh(self, found: SearchResult[WalkFit]) -> WalkWeighed:
         """Return the evidence of held-out strides, of the other leg and of the test of lack of fit on a set."""

@@ -30,7 +30,7 @@ def strength(gait: Gait, wrong: Wrong, seed: int, study: Study) -> float:
         twin = _designs(read_study(folder))
     waves = min(len(twin.strides.harmonics), len(designs.strides.harmonics))
     y = [b.as_read.y[:, :, :waves] for b in (designs, twin)]
-    noise, variance = twin.noise, WalkModels(twin, 0).nominal().fitted.variance[:, :, :waves]
+    noise, variance = twin.noise, WalkModels(twin).nominal().fitted.variance[:, :, :waves]
     means = twin.strides.harmonics[:waves] == 0
     change = np.where(means, y[0] - y[1], np.einsum("ij,njk->nik", noise.turn, y[0] - y[1])).ravel()
     nuisance = noise.nuisance[:, :, :waves].reshape(change.size, -1)

@@ -21,7 +21,7 @@ def models_of(gait, folder, seed, *args, **more):
 
     make(gait, folder, Wrong(*args, **{"strides": 2, "tissue": 0.4, **more}), seed)
     recordings = recordings_of(read_study(folder))
-    return WalkModels(Designs(recordings), seed=0)
+    return WalkModels(Designs(recordings))
 
 
 @pytest.fixture(scope="module")
@@ -77,7 +77,7 @@ def test_what_strides_held_out_do_not_bear_out_is_refused(models):
     known = models.with_noise_of(models.fits[models.ranked(1)[0]])
     search = WalkSearch(known, lambda share, words: None)
     found = search.run()
-    verdict = WalkVerdict(search, seed=0)
+    verdict = WalkVerdict(search)
     state = verdict.of(found)
     assert state.found.best.names == found.best.names and not state.rejected
     assert all(e.low > 0.0 for e in state.weighed.evidence.values())
