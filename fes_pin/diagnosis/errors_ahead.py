@@ -11,7 +11,7 @@ from fes_pin.identify.ahead import forecast, forecasts, free_ahead, free_residua
 from fes_pin.identify.likelihood import is_simulated
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.process_noise import driving_size, first_guess
-from fes_pin.infer.held_out import FOLDS, Errors, joined_errors
+from fes_pin.infer.held_out import FOLDS, Errors
 from fes_pin.infer.levels import AVERAGED_S, SMALL_SHARE
 from fes_pin.infer.noise import NoiseModel
 from fes_pin.models.autoregression import weights_ahead
@@ -111,7 +111,8 @@ def squared_errors(
         trials, each is divided into tenths.
     """
     if ahead_s is None:
-        return joined_errors([free_errors(f.model, trials, noise_that_is_small(floor)) for f, floor, trials in pairs])
+        each = [free_errors(f.model, trials, noise_that_is_small(floor)) for f, floor, trials in pairs]
+        return Errors(*np.concatenate([[e.squares, e.spread, e.noise] for e in each], axis=1))
     work = [(fitted, floor, trial) for fitted, floor, trials in pairs for trial in trials]
     found = in_parallel(lambda w: _squares(*w, ahead_s), work)
     return Errors(*np.concatenate(found, axis=1))

@@ -160,8 +160,3 @@ def added_likelihood(without: np.ndarray, extended: np.ndarray) -> Evidence:
     without, extended = within(without, FAR), within(extended, FAR)
     difference = without - extended
     return Evidence(float(without @ without - extended @ extended), float(difference @ difference))
-
-
-def joined_errors(errors: Sequence[Errors]) -> Errors:
-    """Return the errors of several folds, all units of evidence together."""
-    return Errors(*(np.concatenate([getattr(e, name) for e in errors]) for name in ("squares", "spread", "noise")))
