@@ -92,9 +92,9 @@ SHORT_NOISE = 2
 """Order of the noise in tests of bursts, repeats and heteroscedastic noise. Theory: these tests hold for any spectrum,
 and a longer autoregression learns slow deviations as noise."""
 FULL_NOISE = 24
-"""Order of the noise in tests of play and of short waves over the angle. Simulation: `scripts/benchmarks/adequate.py`;
-it whitens a random torque down to the lowest frequencies, and at 4 ms a sample its memory is 0.1 s, too short to learn
-what lasts."""
+"""Order of the noise in tests of slips, play and short waves over the angle. Simulation:
+`scripts/benchmarks/adequate.py`; it whitens a random torque down to the lowest frequencies, and at 4 ms a sample its
+memory is 0.1 s, too short to learn a permanent jump."""
 WHITE_SHARE = 0.003
 """Share of the residual's variance that is white noise in addition to the autoregression. Theory: it bounds the depth
 of a notch, so that no filter becomes a resonator that removes a misfit."""

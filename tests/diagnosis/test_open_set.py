@@ -20,6 +20,7 @@ from fes_pin.diagnosis.remainder.lack_of_fit import lack_of_fit
 from fes_pin.diagnosis.remainder.lines import line_p_value
 from fes_pin.diagnosis.remainder.play import play_p_value
 from fes_pin.diagnosis.remainder.repeated import repeated_p_value
+from fes_pin.diagnosis.remainder.slips import slip_p_value
 from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
 from fes_pin.identify.fit import fit, under_own_noise
 from fes_pin.infer.levels import CLAIM_LEVEL, FULL_NOISE
@@ -73,7 +74,7 @@ def test_tests_together_keep_the_level(monkeypatch):
     """Uniform p-values, of two channels where a test looks at each: 20 000 remainders, with a deviation of 0.07 %."""
     rng = np.random.default_rng(43)
     one = [SimpleNamespace(values=None, noise=WHITE, dt=DT)]
-    for name in ("burst", "detent", "repeated", "heteroscedastic", "play"):
+    for name in ("burst", "detent", "repeated", "heteroscedastic", "slip", "play"):
         monkeypatch.setattr(open_set, f"{name}_p_value", lambda *_: rng.uniform())
     monkeypatch.setattr(open_set, "line_p_value", lambda _: (rng.uniform(), "time"))
     monkeypatch.setattr(open_set, "channels", lambda _: [one, one])
@@ -192,10 +193,20 @@ def long_noise(rng, deviation=lambda y, t: 0.0 * y, poles=(1.0,), trials=8):
 
 
 @pytest.mark.parametrize("poles", COLOURED, ids=["white", "slow", "slower"])
-def test_play_keeps_its_level(poles):
-    """At 5 %, more than 5 of 24 have a probability of 0.001."""
+def test_slips_and_play_keep_their_level(poles):
+    """At 5 %, more than 5 of 24 have a probability of 0.001 each."""
     rng = np.random.default_rng(60)
-    assert sum(play_p_value(*long_noise(rng, poles=poles)) < 0.05 for _ in range(24)) <= 5
+    made = [long_noise(rng, poles=poles) for _ in range(24)]
+    assert sum(slip_p_value(*one) < 0.05 for one in made) <= 5
+    assert sum(play_p_value(*one) < 0.05 for one in made) <= 5
+
+
+@pytest.mark.parametrize(("poles", "jump"), [((1.0,), 0.3), ((1.0, -0.8), 0.5)], ids=["white", "slow"])
+def test_a_jump_in_each_trial_is_told_from_slow_noise(poles, jump):
+    """Of one and a half standard deviations, at a time of each trial's own; of 60 other studies each, all pass."""
+    rng = np.random.default_rng(61)
+    made = [long_noise(rng, lambda y, t: jump * (t > rng.uniform(1.2, 3.8)), poles) for _ in range(4)]
+    assert max(slip_p_value(*one) for one in made) < 1e-3
 
 
 @pytest.mark.parametrize("poles", COLOURED[:2], ids=["white", "slow"])

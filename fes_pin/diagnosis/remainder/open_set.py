@@ -1,8 +1,8 @@
 """Tests of the residuals of a free simulation, for deviations that are no function of state and input.
 
 They find bursts at irregular times, spectral lines, torque that is periodic in the angle over short distances,
-deviations at the same time of every trial, deviations that grow with the stimulus, and readings that lag where the
-motion reverses. An autoregressive noise model takes each of them for noise.
+deviations at the same time of every trial, deviations that grow with the stimulus, readings that slip once within a
+trial, and readings that lag where the motion reverses. An autoregressive noise model takes each of them for noise.
 """
 
 import numpy as np
@@ -14,6 +14,7 @@ from fes_pin.diagnosis.remainder.innovations import channels, driven
 from fes_pin.diagnosis.remainder.lines import LONGEST_NOISE, line_p_value
 from fes_pin.diagnosis.remainder.play import play_p_value
 from fes_pin.diagnosis.remainder.repeated import repeated_p_value
+from fes_pin.diagnosis.remainder.slips import slip_p_value
 from fes_pin.identify.fit import Fit, under_own_noise
 from fes_pin.infer.levels import FULL_NOISE, SHORT_NOISE
 from fes_pin.infer.projection import Projection
@@ -31,4 +32,5 @@ def residual_tests(fitted: Fit) -> list[tuple[float, str]]:
             (heteroscedastic_p_value(values, [np.abs(driven(e)) for e in pieces], dt), "stimulus"),
         ]
     found += [line_p_value(pieces) for pieces in channels(under_own_noise(fitted, LONGEST_NOISE))]
-    return [*found, (detent_p_value(full, projection), "angle"), (play_p_value(full, projection), "rate")]
+    tests = ((detent_p_value, "angle"), (slip_p_value, "time"), (play_p_value, "rate"))
+    return [*found, *((test(full, projection), where) for test, where in tests)]
