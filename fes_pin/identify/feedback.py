@@ -16,23 +16,29 @@ SHORTEST = 20
 LAGS = 4
 """Lags of the regression, in samples: a controller acts in the sample in which it reads, or a few later."""
 JUMP = 5.0
-"""Standard deviations above which a second difference is a jump, not noise."""
+"""Standard deviations above which a difference is a jump, not noise."""
+OF_EFFORT = 4
+"""Order of the differences of an effort and of the reading at its samples. A motion of frequency w leaves (w dt)^order
+of itself in them, and noise grows. Second differences of a chirp leave enough that ten of 44 free joints seemed to be
+in closed loop (`tests/identify/test_feedback.py`)."""
+OF_STIMULUS = 2
+"""The same of a stimulus, which has few pulses (`tests/driven/test_stimulated.py`)."""
 
 
 def is_fed_back(rig: Rig, trials: Sequence[Trial]) -> bool:
     """Return whether the effort of a rig follows its reading, by Granger's test of causality.
 
-    The test asks whether the last readings improve the prediction of the effort from the last efforts. It uses the
-    second differences u'' of the effort and y'' of the reading, which are mostly noise:
+    The test asks whether the last readings improve the prediction of the effort from the last efforts. It uses
+    differences U of the effort and Y of the reading, which are mostly noise:
 
-        u''_t = a_1 u''_(t-1) + ... + b_0 y''_t + b_1 y''_(t-1) + ...
+        U_t = a_1 U_(t-1) + ... + b_0 Y_t + b_1 Y_(t-1) + ...
 
     An effort that was chosen beforehand does not depend on the noise. Trials are combined by Fisher's method.
 
     Source: Granger, Investigating causal relations by econometric models and cross-spectral methods, Econometrica 37
     (1969); Fisher, Statistical Methods for Research Workers, 1932, section 21.1.
     """
-    return _certainly(p for p, _ in _answers(rig, [t for t in trials if rig.is_driven([t])]))
+    return _certainly(p for p, _ in _answers(rig, [t for t in trials if rig.is_driven([t])], OF_EFFORT))
 
 
 def is_stimulus_fed_back(rig: Rig, trials: Sequence[Trial]) -> bool:
@@ -42,7 +48,7 @@ def is_stimulus_fed_back(rig: Rig, trials: Sequence[Trial]) -> bool:
     controller.
     """
     free = [t for t in trials if t.kind != IMPOSED and not rig.is_driven([t])]
-    return _certainly(p if share > ANSWERED else 1.0 for p, share in _answers(rig, free))
+    return _certainly(p if share > ANSWERED else 1.0 for p, share in _answers(rig, free, OF_STIMULUS))
 
 
 def _certainly(p_values: Iterable[float]) -> bool:
@@ -50,11 +56,11 @@ def _certainly(p_values: Iterable[float]) -> bool:
     return bool(logs) and float(chi2_tail(-2.0 * sum(logs), 2 * len(logs))) < CERTAIN_LEVEL
 
 
-def _answers(rig: Rig, trials: Sequence[Trial]) -> Iterator[tuple[float, float]]:
+def _answers(rig: Rig, trials: Sequence[Trial], order: int) -> Iterator[tuple[float, float]]:
     for trial in trials:
         output = rig.output(trial.kind)
         if output in trial.columns:
-            yield from (_granger(*_when_given(trial[n], trial[output])) for n in rig.input_columns(trial))
+            yield from (_granger(*_when_given(trial[n], trial[output]), order) for n in rig.input_columns(trial))
 
 
 def _when_given(drive: np.ndarray, reading: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -65,9 +71,9 @@ def _when_given(drive: np.ndarray, reading: np.ndarray) -> tuple[np.ndarray, np.
     return drive[begin::step], reading[begin::step]
 
 
-def _granger(effort: np.ndarray, reading: np.ndarray) -> tuple[float, float]:
+def _granger(effort: np.ndarray, reading: np.ndarray, order: int) -> tuple[float, float]:
     """Return the p-value of the readings as predictors of the effort, and their share of its unpredicted variance."""
-    u, y = (_without_jumps(np.diff(x, 2)) for x in (effort, reading))
+    u, y = (_without_jumps(np.diff(x, order)) for x in (effort, reading))
     n = len(u) - LAGS
     if n < SHORTEST * LAGS or not u.any() or not y.any():
         return 1.0, 0.0
@@ -81,7 +87,7 @@ def _granger(effort: np.ndarray, reading: np.ndarray) -> tuple[float, float]:
 
 
 def _without_jumps(x: np.ndarray) -> np.ndarray:
-    """Return second differences clipped at `JUMP` robust standard deviations: a jump of the reference is no noise."""
+    """Return differences clipped at `JUMP` robust standard deviations: a jump of the reference is no noise."""
     x = np.where(np.isfinite(x), x, 0.0)
     size = np.abs(x[x != 0.0])  # an encoder at rest, or a held sample, has no noise
     most = JUMP * 1.4826 * float(np.median(size)) if len(size) else 0.0
