@@ -13,7 +13,7 @@ from fes_pin.infer.projection import Projection
 TRIM = 0.15
 """Share of a trial at either end in which no jump is sought: Andrews, Tests for parameter instability and structural
 change with unknown change point, Econometrica 61 (1993)."""
-TIMES = 64
+TIMES = 200
 """Times of each trial at which a jump is sought."""
 DRAWS = 16
 """Simulated innovations of all trials; the scatter of their mean is allowed for."""
