@@ -1,7 +1,7 @@
 """A cohort from its studies to its tables and its page; a run that was killed goes on where it was."""
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,7 +27,7 @@ from fes_pin.data.outputs import Outputs
 from fes_pin.data.results import Saveable
 from fes_pin.data.tabular import SUFFIXES, table_bytes
 from fes_pin.infer.result import shown
-from fes_pin.models.catalogue import load_library
+from fes_pin.models.catalogue import Catalogue, load_library
 from fes_pin.verdict.files import OF_ALL, OF_WALKS
 
 
@@ -137,9 +137,7 @@ def run_cohort(
     store = Store(out, outputs)
     every = [Work(n, str(f), seed, limit, library, command) for n, f in found.items()]
     todo: list[Task] = [(work, key) for work in every if not store.has(work, key := work.key())]
-    outputs.check(out, ("cohort.html", *(f"{name}.{kind}" for name in HEADS for kind in ("csv", "parquet"))))
-    for work, _ in todo:
-        outputs.check(store.place(work.name), (*OF_ALL, *OF_WALKS, STATE))
+    _check_outputs(outputs, out, [store.place(work.name) for work, _ in todo])
     tell, began = progress or (lambda _progress: None), time.monotonic()
     waiting: list[Answer] = []  # failures, until there is a study that did not fail: else nothing is written
     undone = {work.name for work, _ in todo}
@@ -156,14 +154,24 @@ def run_cohort(
     if all(errors.values()):
         raise InputError(f"none of {len(found)} studies could be diagnosed; the first: {min(errors.items())[1]}")
 
+    made = _cohort(store, found, catalogue)
+    outputs.write(out, _files(made, seed, command))
+    return made
+
+
+def _check_outputs(outputs: Outputs, out: Path, folders: Sequence[Path]) -> None:
+    outputs.check(out, ("cohort.html", *(f"{name}.{kind}" for name in HEADS for kind in ("csv", "parquet"))))
+    for folder in folders:
+        outputs.check(folder, (*OF_ALL, *OF_WALKS, STATE))
+
+
+def _cohort(store: Store, names: Iterable[str], catalogue: Catalogue) -> Cohort:
     def kept() -> Iterator[Kept]:  # read again for each table: no more than one record is held
-        return (one for name in found if (one := store.get(name)) is not None)
+        return (one for name in names if (one := store.get(name)) is not None)
 
     studies, causes = study_rows(kept()), cause_rows(kept(), catalogue)
     good = sum(r["verdict"] != "failed" for r in studies)
-    made = Cohort(studies, causes, pooled_rows(causes, nominal_rows(kept()), good), prevalence_rows(causes, good))
-    outputs.write(out, _files(made, seed, command))
-    return made
+    return Cohort(studies, causes, pooled_rows(causes, nominal_rows(kept()), good), prevalence_rows(causes, good))
 
 
 def _files(made: Cohort, seed: int, command: str) -> dict[str, str | bytes]:
