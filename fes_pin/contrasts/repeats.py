@@ -77,10 +77,6 @@ class RepeatedProblem(LikelihoodProblem):
     def _sizes(self) -> np.ndarray:
         return np.array(list(self.deviations.values()))
 
-    def costs(self, points: Sequence[tuple[Mapping[str, float], Unknowns]]) -> list[float]:
-        """Return a lower bound of the cost: where parameters scatter, the cost itself needs sensitivities."""
-        return [-np.inf] * len(points) if self.deviations else super().costs(points)
-
     def residual_run(self, values: Mapping[str, float], unknowns: Unknowns) -> list[PredictedTrial]:
         """Return trials minus their likeliest deviation from their group."""
         if not self.deviations:

@@ -102,30 +102,19 @@ class LikelihoodProblem(Problem, NoisyProblem):
 
     def evaluate(self, points: Sequence[Point]) -> list[Evaluation]:
         """Return one-step predictions of all trials at each of several points."""
-        return self._evaluated([(values, unknowns, self.noise.with_values(own)) for values, unknowns, own in points])
-
-    def costs(self, points: Sequence[tuple[Mapping[str, float], Unknowns]]) -> list[float]:
-        """Return the cost at several points without sensitivities: less work than linearizing at one of them."""
-        return [one.cost for one in self._evaluated([(*point, self.noise) for point in points])]
-
-    def _evaluated(self, points: Sequence[tuple[Mapping[str, float], Unknowns, StateSpaceNoise]]) -> list[Evaluation]:
         with np.errstate(all="ignore"):
             return [Evaluation.joined([_evaluation(one) for one in run]) for run in self._runs(points)]
 
-    def _runs(
-        self, points: Sequence[tuple[Mapping[str, float], Unknowns, StateSpaceNoise]]
-    ) -> list[list[PredictedTrial]]:
+    def _runs(self, points: Sequence[Point]) -> list[list[PredictedTrial]]:
         """Return every trial as predicted at each of several points, in batches that fill all lanes."""
         count, trials, predictor = self.batch, len(self.trials), self._batched
 
-        def in_batch(
-            some: Sequence[tuple[Mapping[str, float], Unknowns, StateSpaceNoise]],
-        ) -> list[list[PredictedTrial]]:
+        def in_batch(some: Sequence[Point]) -> list[list[PredictedTrial]]:
             check_limit()
             filled = [*some, *[some[-1]] * (count - len(some))]
-            repeated = [one for one in filled for _ in range(trials)]
-            values, noises = ([one[0] for one in repeated], [one[2] for one in repeated])
-            own = [whole for one in filled for whole in self.begun(one[1])]
+            values = [one for one, _, _ in filled for _ in range(trials)]
+            noises = [noise for *_, one in filled for noise in [self.noise.with_values(one)] * trials]
+            own = [whole for _, unknowns, _ in filled for whole in self.begun(unknowns)]
             with np.errstate(all="ignore"):
                 run = predictor.run(values, noises, own)
             return [run[j * trials : (j + 1) * trials] for j in range(len(some))]
@@ -209,7 +198,7 @@ class LikelihoodProblem(Problem, NoisyProblem):
 
     def residual_run(self, values: Mapping[str, float], unknowns: Unknowns) -> list[PredictedTrial]:
         """Return every trial as predicted, of which the noise of simulated trials is estimated."""
-        (run,) = self._runs([(values, unknowns, self.noise)])
+        (run,) = self._runs([(values, unknowns, {})])
         return run
 
     def with_orders(self, values: Mapping[str, float], unknowns: Unknowns) -> StateSpaceNoise:
