@@ -7,7 +7,7 @@ from fes_pin.contrasts.grouped import Grouped, GroupedModel, GroupedProblem, Wei
 from fes_pin.data.errors import InputError
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.search.likelihood_fits import FIRST_NOISE_SCALES, MEASUREMENT, PROCESS, LikelihoodFits
-from fes_pin.diagnosis.search.likelihood_maxima import SCREEN_ITERATIONS, LikelihoodMaxima
+from fes_pin.diagnosis.search.likelihood_maxima import SCREEN_ITERATIONS, likeliest, process_noises
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit, fit_of
 from fes_pin.identify.process_noise import first_guess
@@ -108,10 +108,10 @@ class GroupedFits:
     def with_process_noise(self, one: Grouped) -> Grouped | None:
         """Return a set fitted with process noise; None where that does not lower the criterion."""
         parts = {g: self.part(one, g) for g in self.trials}
-        begun = {g: LikelihoodMaxima(f.trials).process_noises(f, FIRST_NOISE_SCALES) for g, f in parts.items()}
+        begun = {g: process_noises(f, FIRST_NOISE_SCALES) for g, f in parts.items()}
         if not all(begun.values()):
             return None
-        weights = Weights({g: LikelihoodMaxima(f.trials).likeliest(f, begun[g]) for g, f in parts.items()})
+        weights = Weights({g: likeliest(f, begun[g]) for g, f in parts.items()})
         found = self.again(one, weights)
         if not found.criterion < one.criterion:
             return None

@@ -11,7 +11,6 @@ import numpy as np
 from fes_pin.contrasts.grouped import Grouped, Item, by_group
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.search.library import Library
-from fes_pin.diagnosis.search.likelihood_screen import LikelihoodScreen
 from fes_pin.diagnosis.search.score import bounded_step
 from fes_pin.diagnosis.search.starts import near_null, started
 from fes_pin.infer.covariance import covariance_of
@@ -127,7 +126,7 @@ class Screen:
     def __init__(self, nominal: Model, trials: Mapping[str, Sequence[Trial]], library: Library) -> None:
         self._nominal, self._trials, self._library = nominal, trials, library
         self._effects = [e for e in library.effects if library.felt(e)]
-        self._by_group = {g: LikelihoodScreen(Library(nominal, own, library.effects)) for g, own in trials.items()}
+        self._by_group = {g: Library(nominal, own, library.effects) for g, own in trials.items()}
         self.scores = cache(self._scores)
 
     def _scores(self, base: Grouped) -> ItemScores:

@@ -4,7 +4,6 @@ from fes_pin.data.schema import IMPOSED
 from fes_pin.diagnosis.decide.by_prediction import FEWEST, best_predicting
 from fes_pin.diagnosis.decide.rivals import not_excluded
 from fes_pin.diagnosis.errors_ahead import squared_errors
-from fes_pin.diagnosis.search.cause_sets import names_of
 from fes_pin.diagnosis.search.likelihood_fits import MEASUREMENT, PROCESS, WHITE
 from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodModels, LikelihoodSearch
 from fes_pin.identify.likelihood_fit import LikelihoodFit, with_white_process_noise
@@ -57,7 +56,7 @@ def least_error(search: LikelihoodSearch) -> tuple[LikelihoodSearch, Found] | No
         if len(search.models.trials) < FEWEST:
             other.models.nominal()
             return other.result(())
-        return other.result(best_predicting(other, names_of(other.run().best)))
+        return other.result(best_predicting(other, other.run().best.names))
 
     return _ended(other, attempted(chosen, None, search.seconds_left))
 
@@ -91,7 +90,7 @@ def judged_again(search: LikelihoodSearch, found: Found, white: LikelihoodFit) -
     sets = attempted(begun, None, search.seconds_left)
     if sets is None:
         return None
-    again = LikelihoodSearch(sets, search.progress, Policy(given=names_of(white)))
+    again = LikelihoodSearch(sets, search.progress, Policy(given=white.names))
     return _ended(again, attempted(again.run, None, search.seconds_left))
 
 
@@ -104,9 +103,9 @@ def _predicts_better(white: LikelihoodFit, search: LikelihoodSearch, found: Foun
 
 def _parts_and_rivals(found: Found) -> list[LikelihoodFit]:
     """Return fits with white process noise of the subsets of the best set, and of the rivals equivalent to it."""
-    parts = {names_of(f): f for f in (*found.without.values(), found.nominal)}
-    parts |= {names_of(f): f for many in found.rivals.values() for f in not_excluded(found.best, many)}
-    parts.pop(names_of(found.best), None)
+    parts = {f.names: f for f in (*found.without.values(), found.nominal)}
+    parts |= {f.names: f for many in found.rivals.values() for f in not_excluded(found.best, many)}
+    parts.pop(found.best.names, None)
     return in_parallel(with_white_process_noise, list(parts.values()))
 
 

@@ -92,7 +92,7 @@ def with_choices(folds: Sequence[Fold], chosen: Sequence[LikelihoodFit], refitte
 def refit(fitted: LikelihoodFit, trials: Sequence[Trial]) -> LikelihoodFit:
     """Return the fit of the same model to other trials, with the noise of these."""
     problem, unknowns = _problem(fitted, trials)
-    return maximise(problem, fitted.values, unknowns, near=True)
+    return maximise(problem, unknowns, near=True)
 
 
 def as_random_as_in_all(fitted: LikelihoodFit, trials: Sequence[Trial]) -> LikelihoodFit:

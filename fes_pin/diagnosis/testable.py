@@ -16,7 +16,6 @@ from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.long_records import searched_part
 from fes_pin.diagnosis.search.library import Library
-from fes_pin.diagnosis.search.likelihood_screen import LikelihoodScreen
 from fes_pin.diagnosis.search.score import Scores
 from fes_pin.identify.feedback import is_fed_back
 from fes_pin.identify.fit import Fit, noise_of, rough_fit
@@ -83,7 +82,7 @@ def testable_causes(study: Study, catalogue: Catalogue | None = None) -> Testabl
                 return "the nominal model diverges when it is simulated from its start values"
             library = Library(nominal, trials, effects)
             white = replace(first_guess(nominal, trials), std={}, time={})
-            scores = LikelihoodScreen(library).scores(at_noise(fitted, white))
+            scores = library.scores(at_noise(fitted, white))
             warnings = _given_away(nominal, trials, fitted)
         except (ArithmeticError, np.linalg.LinAlgError) as problem:
             return f"the nominal model cannot be fitted ({problem})"

@@ -33,7 +33,6 @@ from fes_pin.diagnosis.held_out import (
 )
 from fes_pin.diagnosis.rejected import UNMOVED, is_moved_by_what_is_recorded, no_noise, with_rejected_causes
 from fes_pin.diagnosis.remainder.lack_of_fit import lack_of_fit
-from fes_pin.diagnosis.search.cause_sets import names_of
 from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodModels, LikelihoodSearch
 from fes_pin.identify.ahead import falls
 from fes_pin.identify.likelihood_fit import LikelihoodFit
@@ -162,7 +161,7 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
         if not folds or not folds[0].within or id(state.search) in self._unmoved:
             return []
         if id(found) not in self._chosen:
-            fits = {**state.search.possible(), names_of(found.best): found.best}
+            fits = {**state.search.possible(), found.best.names: found.best}
             choose = ChosenAgain(fits, state.search.improves)
             self._chosen[id(found)] = found, [choose.without(out) for out in folds_of(self.models.trials)]
         return self._chosen[id(found)][1]
@@ -204,7 +203,7 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
     def by_the_other(self, state: RigState) -> LikelihoodFit | None:
         """Return the same set fitted by the other estimator; None without another, or where that found another set."""
         other = self._with_white_noise if state.replaced is None else state.replaced.found.best
-        return other if other is not None and names_of(other) == names_of(state.found.best) else None
+        return other if other is not None and other.names == state.found.best.names else None
 
     def _falls(self, state: RigState) -> bool:
         return self.models.answered and falls(state.found.best.model, self.models.trials)

@@ -1,13 +1,13 @@
 """Fits by the likelihood of one-step predictions: parameters, with process and measurement noise."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit, ended
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.process_noise import without_memory
-from fes_pin.infer.levels import PARAMETER_PENALTY
+from fes_pin.infer.levels import CLAIM_LEVEL, DRIVEN_LEVEL, PARAMETER_PENALTY
 from fes_pin.infer.maximise import ROUNDS, alternate, together
 from fes_pin.infer.optimum import Optimum, minimise
 from fes_pin.infer.problem import Unknowns
@@ -31,6 +31,19 @@ class LikelihoodFit(Fit):
         """Twice the negative log-likelihood, with a penalty for each degree of freedom and for process noise."""
         return self.sse + PARAMETER_PENALTY * (self.degrees + 2 * len(self.noise.acting))
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the causes, in alphabetical order."""
+        return tuple(sorted(e.name for e in self.model.effects))
+
+    @property
+    def level(self) -> float:
+        """Family-wise level of a claim in this fit, or of its lack of fit.
+
+        It is stricter with process noise, which is of first order in the model, while that of the rig is not known.
+        """
+        return DRIVEN_LEVEL if self.noise.acting else CLAIM_LEVEL
+
     def _has_profile(self) -> bool:
         return False
 
@@ -47,28 +60,32 @@ def at_noise(fitted: Fit, noise: StateSpaceNoise) -> LikelihoodFit:
 
 
 def maximise(
-    problem: LikelihoodProblem,
-    start: Mapping[str, float],
-    unknowns: Unknowns | None = None,
-    rounds: int = ROUNDS,
-    near: bool = False,
+    problem: LikelihoodProblem, unknowns: Unknowns | None = None, rounds: int = ROUNDS, near: bool = False
 ) -> LikelihoodFit:
-    """Maximise the likelihood by `infer.maximise.alternate`, or by `together` alone if the maximum is near."""
+    """Maximise the likelihood from the values of the problem's model, and return the fit.
+
+    It is done by `infer.maximise.alternate`, or by `together` alone if the maximum is near.
+    """
+    start = problem.model.parameters()
     if near and not problem.is_final:
         return fit_of(problem, together(problem, start, unknowns))
     return fit_of(problem, alternate(problem, start, unknowns, rounds))
 
 
-def maximum_from(fitted: LikelihoodFit, trials: Sequence[Trial], noise: StateSpaceNoise | None = None) -> LikelihoodFit:
+def maximum_from(
+    fitted: LikelihoodFit, trials: Sequence[Trial], noise: StateSpaceNoise | None = None, rounds: int = ROUNDS
+) -> LikelihoodFit:
     """Maximise the likelihood of a fit's model on trials similar to its own, from the values of the fit.
 
     Parameters
     ----------
     noise
         Start values of the noise; by default that of the fit.
+    rounds
+        Most alternations of parameters and noise.
     """
     problem = LikelihoodProblem(fitted.model, trials, noise or fitted.noise)
-    return maximise(problem, fitted.values, fitted.unknowns, near=fitted.together)
+    return maximise(problem, fitted.unknowns, rounds, fitted.together)
 
 
 def with_white_process_noise(fitted: LikelihoodFit) -> LikelihoodFit:
@@ -79,4 +96,4 @@ def with_white_process_noise(fitted: LikelihoodFit) -> LikelihoodFit:
     """
     problem = LikelihoodProblem(fitted.model, fitted.trials, without_memory(fitted.noise, fitted.trials))
     problem.noise_step(fitted.values, fitted.unknowns)
-    return maximise(problem, fitted.values, fitted.unknowns)
+    return maximise(problem, fitted.unknowns)

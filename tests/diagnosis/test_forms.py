@@ -7,7 +7,7 @@ import pytest
 from identify.rigs import WHITE, measured
 from models.cases import RIGS, trial
 
-from fes_pin.diagnosis.search.refined_forms import is_identified
+from fes_pin.diagnosis.search.likelihood_forms import is_identified
 from fes_pin.diagnosis.search.starts import number_of_forms, refinements
 from fes_pin.identify.fit import fit_problem
 from fes_pin.identify.problem import Problem

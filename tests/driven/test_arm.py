@@ -10,8 +10,8 @@ from fes_pin.data.study import read_study
 from fes_pin.diagnosis.diagnosis import diagnose_joint
 from fes_pin.diagnosis.errors_ahead import errors_ahead
 from fes_pin.diagnosis.estimators import found_with_white_process_noise
-from fes_pin.diagnosis.search.likelihood_maxima import LikelihoodMaxima
-from fes_pin.identify.likelihood_fit import with_white_process_noise
+from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.identify.likelihood_fit import maximise, with_white_process_noise
 from fes_pin.identify.process_noise import first_guess, without_memory
 from fes_pin.infer.levels import CONFIDENCE_95
 from fes_pin.infer.scatter import as_wide_as_estimates_differ, with_honest_intervals
@@ -36,7 +36,7 @@ def fitted(tmp_path_factory):
         study = read_study(drawn.study)
         trials = [t.first(round(SECONDS / t.dt)) for t in study.trials]
         model = Model(nominal_model(study).rig) + CoulombFriction(torque_nm=3.0, softness=1.0, stretch=2e-4)
-        likeliest = LikelihoodMaxima(trials).from_start(model, first_guess(model, trials))
+        likeliest = maximise(LikelihoodProblem(model, trials, first_guess(model, trials)))
         out.append((drawn.truth, likeliest, with_white_process_noise(likeliest)))
     return out
 

@@ -4,6 +4,7 @@ from driven_rigs.draw import draw
 
 from fes_pin.data.study import read_study
 from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
+from fes_pin.diagnosis.search.likelihood_forms import simplified_form
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import maximise
 from fes_pin.models.effects import CoulombFriction, QuadraticDamping
@@ -17,9 +18,9 @@ def test_friction_that_grew_with_the_load_is_plain_beside_another_damping(tmp_pa
     sets = LikelihoodFits(nominal_model(study), study.trials)
     model = sets.nominal().model + CoulombFriction(0.1, load_exponent=1.5) + QuadraticDamping(0.05)
     problem = LikelihoodProblem(model, study.trials, sets.fits[()].noise)
-    sets.fits[PAIR] = stood = maximise(problem, model.parameters())
-    simpler = sets.forms.simplified(sets.fits[PAIR])
+    sets.fits[PAIR] = stood = maximise(problem)
+    simpler = simplified_form(sets.fits[PAIR])
     assert simpler.criterion < stood.criterion - 100.0
     assert simpler.values["coulomb_friction.load_exponent"] == 0.0
     sets.fits[PAIR] = simpler
-    assert sets.forms.simplified(sets.fits[PAIR]) is None
+    assert simplified_form(sets.fits[PAIR]) is None

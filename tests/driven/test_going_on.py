@@ -17,5 +17,5 @@ def test_a_search_whose_causes_promise_nothing_goes_on_where_something_is_left(e
     best = search.run().best
     names = tuple(e.name for e in best.model.effects)
     assert names == (("coulomb_friction",) if CoulombFriction in effects else ())
-    monkeypatch.setattr(sets.screen, "scores", lambda base: Scores([], np.zeros((0, 0)), []))
+    monkeypatch.setattr(sets.library, "scores", lambda base: Scores([], np.zeros((0, 0)), []))
     assert search._worth_extending(names) == (CoulombFriction not in effects)

@@ -16,7 +16,7 @@ from fes_pin.infer.levels import SMALL_SHARE
 
 def fitted_to(trials):
     model = believed()
-    return maximise(LikelihoodProblem(model, trials, first_guess(model, trials)), model.parameters())
+    return maximise(LikelihoodProblem(model, trials, first_guess(model, trials)))
 
 
 @pytest.fixture(scope="module")

@@ -9,8 +9,9 @@ from fes_pin.data.study import read_study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.diagnosis import diagnose_joint
 from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
-from fes_pin.diagnosis.search.likelihood_maxima import LikelihoodMaxima
+from fes_pin.diagnosis.search.likelihood_forms import refined_form
 from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.identify.likelihood_fit import maximise
 from fes_pin.identify.process_noise import first_guess
 from fes_pin.models.effects import CoulombFriction
 from fes_pin.models.simulate import simulate
@@ -65,9 +66,9 @@ def refined(trials):
     """The nominal fit, that of friction in its plainest form, and that in the form that the data demand."""
     sets = LikelihoodFits(believed(), trials, [CoulombFriction])
     nominal = sets.nominal()
-    plain = LikelihoodMaxima(trials).from_start(nominal.model + CoulombFriction(), nominal.noise)
+    plain = maximise(LikelihoodProblem(nominal.model + CoulombFriction(), trials, nominal.noise))
     sets.extend(())
-    while better := sets.forms.refined(sets.fits[NAMES]):
+    while better := refined_form(sets.fits[NAMES], sets.library.measured):
         sets.fits[NAMES] = better
     return nominal, plain, sets.fits[NAMES]
 

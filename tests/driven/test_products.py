@@ -28,7 +28,7 @@ def test_a_fit_follows_the_product_of_stiffness_and_rest(upright):
     def fitted(share):
         spring = ParallelStiffness(stiffness_nm_per_rad=share * size, rest_angle_rad=rest / share)
         model = nominal_model(study) + spring
-        start = {**model.parameters(), "inertia_scale": 1.0, "gravity_scale": share}
-        return maximise(LikelihoodProblem(model, study.trials, first_guess(model, study.trials)), start)
+        start = model.with_parameters({"inertia_scale": 1.0, "gravity_scale": share})
+        return maximise(LikelihoodProblem(start, study.trials, first_guess(model, study.trials)))
 
     assert fitted(0.25).sse < fitted(1.0).sse + 0.5

@@ -6,6 +6,7 @@ from driven_rigs.draw import draw
 from fes_pin.data.study import read_study
 from fes_pin.diagnosis.diagnosis import diagnose_joint
 from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
+from fes_pin.diagnosis.search.likelihood_forms import refined_form
 from fes_pin.models.effects import CoulombFriction, EffortOffset
 
 FRICTION, BOTH = ("coulomb_friction",), ("coulomb_friction", "effort_offset")
@@ -16,12 +17,12 @@ def test_a_set_is_fitted_again_beside_a_cause_whose_form_has_changed():
     sets = LikelihoodFits(believed(), [trial(1), trial(2)], [CoulombFriction, EffortOffset])
     sets.nominal()
     plain = sets.nominal().model + CoulombFriction()
-    sets.fits[FRICTION] = sets._maxima.from_start(plain, sets.nominal().noise)
+    sets.fits[FRICTION] = sets._maximum(plain, sets.nominal().noise)
     sets.extend(FRICTION)
     first = sets.fits[BOTH]
     sets.extend(FRICTION)
     assert sets.fits[BOTH] is first
-    sets.fits[FRICTION] = sets.forms.refined(sets.fits[FRICTION])
+    sets.fits[FRICTION] = refined_form(sets.fits[FRICTION], sets.library.measured)
     (form,) = (e.refined() for e in sets.fits[FRICTION].model.effects)
     assert form and not first.model.effects[0].refined()
     sets.extend(FRICTION)

@@ -25,7 +25,7 @@ def friction_fitted(folder):
     sets.extend(())
     ended = sets.fits["coulomb_friction",]
     problem = LikelihoodProblem(ended.model, study.trials, ended.noise)
-    return maximise(problem, ended.values, ended.unknowns, near=True)
+    return maximise(problem, ended.unknowns, near=True)
 
 
 def test_what_has_moved_together_is_where_no_single_step_leads_down(tmp_path):

@@ -22,7 +22,7 @@ def test_less_its_only_cause_a_set_is_the_nominal_model(tmp_path, own):
     nominal = sets.nominal()
     torque = PeriodicTorque.of_each_trial(frequency_hz=0.4) if own else PeriodicTorque(0.01, frequency_hz=0.4)
     problem = LikelihoodProblem(nominal.model + torque, study.trials, nominal.noise)
-    sets.fits[names] = maximise(problem, problem.model.parameters())
+    sets.fits[names] = maximise(problem)
     del sets.fits[()]
     assert sets.without(names, "periodic_torque").sse == pytest.approx(nominal.sse, abs=0.5)
 

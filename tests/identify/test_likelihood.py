@@ -56,7 +56,7 @@ def believed(weight: float = TRUE["weight"]) -> Model:
 @pytest.fixture(scope="module")
 def fitted():
     trials = [held(k, 0.06) for k in range(3)]
-    return maximise(LikelihoodProblem(believed(), trials, first_guess(believed(), trials)), believed().parameters())
+    return maximise(LikelihoodProblem(believed(), trials, first_guess(believed(), trials)))
 
 
 def test_the_rig_and_what_is_random_are_found(fitted):
@@ -87,9 +87,8 @@ def test_the_maximum_of_a_model_that_is_wrong_is_found_from_anywhere():
     trials = [read_in_counts(held(k, 0.02, noise=1e-6, friction=0.3, slow=0.3), 1e-5) for k in range(2)]
     ends = []
     for scale, damping in ((0.5, 0.03), (2.0, 0.3)):
-        problem = LikelihoodProblem(believed(), trials, first_guess(believed(), trials))
-        begun = {**believed().parameters(), "inertia_scale": scale, "damping": damping}
-        ends.append(maximise(problem, begun))
+        begun = believed().with_parameters({"inertia_scale": scale, "damping": damping})
+        ends.append(maximise(LikelihoodProblem(begun, trials, first_guess(believed(), trials))))
     assert ends[0].sse == pytest.approx(ends[1].sse, abs=0.2)
     problem = LikelihoodProblem(believed(), trials, ends[0].noise)
     for name in ends[0].free:
@@ -119,7 +118,7 @@ def rubbing():
     """Slow motion with dry friction, read so coarsely that the sign of the velocity is often in doubt; fitted."""
     trials = [held(k, 0.01, noise=2e-3, friction=0.2, slow=0.3) for k in range(12)]
     model = believed() + CoulombFriction(torque_nm=0.2)
-    return maximise(LikelihoodProblem(model, trials, first_guess(model, trials)), model.parameters())
+    return maximise(LikelihoodProblem(model, trials, first_guess(model, trials)))
 
 
 def test_the_likelihood_of_dry_friction_is_smooth(rubbing):
@@ -144,7 +143,7 @@ def test_friction_that_is_felt_near_standstill_is_not_underestimated(rubbing):
 
 def test_without_a_random_torque_none_is_found():
     trials = [held(k, 0.0) for k in range(2)]
-    found = maximise(LikelihoodProblem(believed(), trials, first_guess(believed(), trials)), believed().parameters())
+    found = maximise(LikelihoodProblem(believed(), trials, first_guess(believed(), trials)))
     assert found.noise.std["effort"] < 0.01 * driving_size(believed(), trials)["effort"]
 
 
@@ -152,7 +151,7 @@ def test_three_errors_of_a_rig_that_falls():
     """On its head free simulation says nothing; 0.1 s ahead errors are small, one sample ahead they are noise."""
     trials = [held(k, 0.02, weight=-TRUE["weight"]) for k in range(2)]
     model = believed(-TRUE["weight"])
-    found = maximise(LikelihoodProblem(model, trials, first_guess(model, trials)), model.parameters())
+    found = maximise(LikelihoodProblem(model, trials, first_guess(model, trials)))
     assert falls(found.model, trials)
     near = one_step(found.model, trials[0], found.noise)["position"]
     missed = trials[0]["position"] - over_horizon(found.model, trials[0], found.noise, 0.1)["position"]
@@ -163,7 +162,7 @@ def test_three_errors_of_a_rig_that_falls():
 def test_a_horizon_uses_all_that_is_older():
     """As a run to which nothing was shown from there on; runs that share a trial's predictions hide parts of it."""
     (trial,) = trials = [held(7, 0.03)]
-    found = maximise(LikelihoodProblem(believed(), trials, first_guess(believed(), trials)), believed().parameters())
+    found = maximise(LikelihoodProblem(believed(), trials, first_guess(believed(), trials)))
     shared = over_horizon(found.model, trial, found.noise, 0.1)["position"]
     for last in range(900, 930, 6):  # the newest that a prediction uses, every quarter of 25 samples
         older = masked(trial, ["position"], [range(last + 1, len(trial))])
@@ -176,7 +175,7 @@ def test_a_horizon_uses_all_that_is_older():
 def test_a_horizon_uses_nothing_younger():
     """What is foretold of a sample does not change when the samples within the horizon before it do."""
     trials = [held(7, 0.03)]
-    found = maximise(LikelihoodProblem(believed(), trials, first_guess(believed(), trials)), believed().parameters())
+    found = maximise(LikelihoodProblem(believed(), trials, first_guess(believed(), trials)))
     column = np.array(trials[0]["position"])
     column[1000 - 24 : 1000] += 0.05  # 0.1 s are 25 samples
     changed = trials[0].with_columns(position=column)

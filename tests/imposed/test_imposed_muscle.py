@@ -157,7 +157,7 @@ def test_a_random_force_acts_on_a_muscle_on_a_lever():
     study = study_of()
     trial = study.trials[0].with_columns(force_n=12.0 * activation() + wandering(len(TIME), DT, 0.1, 0.05, RNG))
     problem = LikelihoodProblem(Model(MUSCLE), [trial], first_guess(Model(MUSCLE), [trial]))
-    found = maximise(problem, Model(MUSCLE).parameters()).noise
+    found = maximise(problem).noise
     assert found.std["force"] == pytest.approx(0.1, rel=0.4) and found.white["force_n"] < 0.02
 
 

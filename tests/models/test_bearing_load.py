@@ -8,8 +8,9 @@ import pytest
 from cases import JOINT
 
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.search.likelihood_forms import LikelihoodForms
-from fes_pin.diagnosis.search.likelihood_maxima import LikelihoodMaxima
+from fes_pin.diagnosis.search.likelihood_forms import refined_form
+from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.identify.likelihood_fit import maximise
 from fes_pin.identify.problem import measured_columns
 from fes_pin.models.effects.coulomb_friction import CoulombFriction
 from fes_pin.models.model import Model
@@ -71,9 +72,9 @@ def test_the_load_is_told_from_swings(exponent):
         clean = swing(true, amplitude)
         measured = clean["position"] + 1e-3 * rng.standard_normal(len(TIME))
         trials.append(Trial("swing", "motion", {"position": measured}, TIME, clean.conditions))
-    maxima = LikelihoodMaxima(trials)
-    base = maxima.from_start(nominal + CoulombFriction(0.8 * TORQUE), StateSpaceNoise({"position": 1e-3}))
-    refined = LikelihoodForms(maxima, measured_columns(nominal, trials)).refined(base)
+    start = nominal + CoulombFriction(0.8 * TORQUE)
+    base = maximise(LikelihoodProblem(start, trials, StateSpaceNoise({"position": 1e-3})))
+    refined = refined_form(base, measured_columns(nominal, trials))
     if exponent:
         assert refined.values["coulomb_friction.load_exponent"] == exponent
         assert refined.values["coulomb_friction.torque_nm"] == pytest.approx(TORQUE, rel=0.03)

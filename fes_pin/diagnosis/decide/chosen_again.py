@@ -21,13 +21,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fes_pin.diagnosis.search.cause_sets import Names
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.covariance import least_squares_step
 from fes_pin.infer.levels import PARAMETER_PENALTY
 from fes_pin.infer.problem import normal_equations
 from fes_pin.infer.scatter import at_rest
 from fes_pin.infer.scoring import LITTLE
+from fes_pin.infer.search import Names
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,6 @@ import math
 
 import numpy as np
 
-from fes_pin.diagnosis.decide.significance import level_of
 from fes_pin.diagnosis.remainder.open_set import residual_tests
 from fes_pin.identify.fit import fit
 from fes_pin.identify.likelihood import LikelihoodProblem
@@ -41,7 +40,7 @@ def lack_of_fit(fitted: LikelihoodFit) -> Remainder:
     found = [_features_left(fitted), *others]
     p_value, where = min(found, key=lambda f: f[0])
     p_value = min(1.0, len(found) * p_value)
-    unexplained = p_value < level_of(fitted)
+    unexplained = p_value < fitted.level
     return Remainder(unexplained, p_value, where if unexplained else None)
 
 
@@ -75,7 +74,7 @@ def _features_left(fitted: LikelihoodFit) -> tuple[float, str | None]:
         return min(1.0, 2.0 * min(p_values))
 
     p = p_value(statistic, float(single[best] ** 2))
-    if p < level_of(fitted) and featured.can_keep:
+    if p < fitted.level and featured.can_keep:
         alone, together = np.zeros((2, len(featured.names)))
         alone[good[best]] = single[best] / after[good[best]]
         together[good] = vectors[:, kept] @ (shares.sum(axis=0) / np.sqrt(values[kept])) / after[good]

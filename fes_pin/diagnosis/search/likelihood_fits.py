@@ -8,24 +8,23 @@ from typing import Self
 
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.search.cause_sets import Names, names_of
 from fes_pin.diagnosis.search.library import Library
-from fes_pin.diagnosis.search.likelihood_forms import LikelihoodForms
-from fes_pin.diagnosis.search.likelihood_maxima import LikelihoodMaxima
-from fes_pin.diagnosis.search.likelihood_screen import LikelihoodScreen
+from fes_pin.diagnosis.search.likelihood_maxima import less, likeliest, look, maximum_from_afar, process_noises
 from fes_pin.diagnosis.search.possible import is_possible
 from fes_pin.diagnosis.search.score import Scored, best_by_effect
 from fes_pin.diagnosis.search.starts import STARTS, from_afar, refinements, started
 from fes_pin.identify.ahead import default_horizon
 from fes_pin.identify.correlation_time import with_new_noise
 from fes_pin.identify.likelihood import LikelihoodProblem
-from fes_pin.identify.likelihood_fit import LikelihoodFit, at_noise
+from fes_pin.identify.likelihood_fit import LikelihoodFit, at_noise, maximise, maximum_from
 from fes_pin.identify.process_noise import first_guess, stilled, without_memory
 from fes_pin.infer.covariance import step_gain
 from fes_pin.infer.fits import Candidate, FittedSets
+from fes_pin.infer.maximise import ROUNDS
 from fes_pin.infer.optimize import WORTH
-from fes_pin.infer.problem import normal_equations
+from fes_pin.infer.problem import Unknowns, normal_equations
 from fes_pin.infer.scoring import LITTLE
+from fes_pin.infer.search import Names
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import StateSpaceNoise
 from fes_pin.models.stage import Effect
@@ -75,10 +74,8 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         Fits by names in alphabetical order.
     calm
         Fits of sets to the same trials without process noise, where there are any.
-    screen
-        Score tests of every cause in a fit.
-    forms
-        Other forms of a fitted set.
+    library
+        The causes, with their score tests.
     """
 
     def __init__(
@@ -100,14 +97,11 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         self.library = Library(self.model, trials, effects, answered)
         self._calm: StateSpaceNoise | None = None
         self._compared: dict[tuple[Names, str], LikelihoodFit] = {}
-        self._maxima = LikelihoodMaxima(trials)
-        self.screen = LikelihoodScreen(self.library)
-        self.forms = LikelihoodForms(self._maxima, self.library.measured)
 
     def begun_with(self, fits: Sequence[LikelihoodFit]) -> Self:
         """Return the same trials and causes with some fits to start from; the process noise is timed as in these."""
         other = copy.copy(self)
-        other.fits = {names_of(f): f for f in fits}
+        other.fits = {f.names: f for f in fits}
         other._converged, other._begun, other._compared = set(), set(), {}
         return other
 
@@ -133,32 +127,38 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         """Return the nominal fit without process noise, or with it if that improves the penalised likelihood."""
         guess = first_guess(self.model, self.trials)
         none = stilled(self.model, self.trials, guess) if self.answered else replace(guess, std={}, time={})
-        calm = self.calm.get(()) or self._maxima.from_afar(self.model, none)
+        calm = self.calm.get(()) or maximum_from_afar(self.model, self.trials, none)
         calm = calm if self.noise == WHITE or () in self.calm else self._with_orders(calm)
         self._calm = calm.noise
         return min(calm, self.with_process_noise(calm), key=lambda f: f.criterion) if self.noise == PROCESS else calm
 
     def with_process_noise(self, calm: LikelihoodFit) -> LikelihoodFit:
         """Return a fit without process noise again with it, from the likeliest of several sizes of process noise."""
-        begun = self._maxima.process_noises(calm, FIRST_NOISE_SCALES)
+        begun = process_noises(calm, FIRST_NOISE_SCALES)
         if not begun:
             return calm
         if self.answered:
-            found = in_parallel(lambda d: self._maxima.from_start(calm.model, d), begun)
+            found = in_parallel(lambda d: self._maximum(calm.model, d), begun)
             return self._with_orders(min(found, key=lambda f: f.sse))
-        return self._with_orders(self._maxima.from_start(calm.model, self._maxima.likeliest(calm, begun)))
+        return self._with_orders(self._maximum(calm.model, likeliest(calm, begun)))
 
     def _with_orders(self, fitted: LikelihoodFit) -> LikelihoodFit:
         """Return a fit again, with autoregressive noise of the orders that its innovations support."""
         problem = LikelihoodProblem(fitted.model, self.trials, fitted.noise)
         noise = problem.with_orders(fitted.values, fitted.unknowns)
-        return self._maxima.from_start(fitted.model, noise, fitted.unknowns)
+        return self._maximum(fitted.model, noise, fitted.unknowns)
+
+    def _maximum(
+        self, model: Model, noise: StateSpaceNoise, unknowns: Unknowns | None = None, rounds: int = ROUNDS
+    ) -> LikelihoodFit:
+        """Return the maximum from the values of a model and start values of noise; see `maximise`."""
+        return maximise(LikelihoodProblem(model, self.trials, noise), unknowns, rounds)
 
     def _nominal(self, correlation_s: float) -> LikelihoodFit:
         """Return the nominal fit at a correlation time of the measurement noise."""
         guess = first_guess(self.model, self.trials, correlation_s)
         starts = [replace(guess, std={n: k * v for n, v in guess.std.items()}) for k in FIRST_NOISE_SCALES]
-        return min(in_parallel(lambda d: self._maxima.from_start(self.model, d), starts), key=lambda f: f.sse)
+        return min(in_parallel(lambda d: self._maximum(self.model, d), starts), key=lambda f: f.sse)
 
     def _guess(self) -> StateSpaceNoise:
         """Return start values with little process noise, or with none where measurement noise is autoregressive."""
@@ -170,7 +170,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
 
     def candidates(self, base: LikelihoodFit) -> dict[str, Candidate[Starts]]:
         """Return the causes that a fit does not have, each with its shapes of largest score."""
-        by_effect = best_by_effect(self.screen.scores(base).scored)
+        by_effect = best_by_effect(self.library.scores(base).scored)
         return {n: Candidate(many[0].gain, _of_much(many)) for n, many in by_effect.items()}
 
     def begin(self, base: LikelihoodFit, starts: Mapping[Names, Starts]) -> dict[Names, LikelihoodFit]:
@@ -184,7 +184,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
 
     def _first_fits(self, base: LikelihoodFit, starts: Starts, models: Sequence[Model]) -> list[LikelihoodFit]:
         others = [] if base.model.effects else self._elsewhere(starts[0].effect)
-        return [*(self._maxima.look(one, base) for one in models), *others]
+        return [*(look(one, base) for one in models), *others]
 
     def _elsewhere(self, effect: Effect) -> list[LikelihoodFit]:
         """Return fits of one cause alone from far sizes, with the start values of the nominal model.
@@ -195,7 +195,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         guess, measured = self._guess(), self.library.measured
         begun = [self.model + one for one in from_afar(effect, measured)]
         begun += refinements(self.model + effect, effect, measured) if self.noise == WHITE else []
-        return in_parallel(lambda one: self._maxima.from_start(one, guess, rounds=RESTART_ROUNDS), begun)
+        return in_parallel(lambda one: self._maximum(one, guess, rounds=RESTART_ROUNDS), begun)
 
     def _restarted(self, starts: Mapping[Names, Model], base: LikelihoodFit) -> dict[Names, list[LikelihoodFit]]:
         """Return fits that start with little process noise, where that of the base takes what a cause should explain.
@@ -205,14 +205,14 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         guess, least = self._guess(), first_guess(self.model, self.trials, base.noise.correlation_s).std
         if all(base.noise.std[n] <= FIRST_NOISE_SCALES[-1] * least[n] for n in base.noise.acting):
             return {}
-        first = in_parallel(lambda start: self._maxima.from_start(start, guess, rounds=1), list(starts.values()))
+        first = in_parallel(lambda start: self._maximum(start, guess, rounds=1), list(starts.values()))
         lowest = sorted(zip(starts, first, strict=True), key=lambda one: one[1].criterion)[:RESTART_SETS]
-        gone_on = in_parallel(lambda one: self._maxima.go_on(one[1], RESTART_ROUNDS - 1), lowest)
+        gone_on = in_parallel(lambda one: maximum_from(one[1], self.trials, rounds=RESTART_ROUNDS - 1), lowest)
         return {names: [fitted] for (names, _), fitted in zip(lowest, gone_on, strict=True)}
 
     def converged(self, fits: Sequence[LikelihoodFit]) -> list[LikelihoodFit]:
         """Return the converged fits."""
-        return in_parallel(self._maxima.go_on, fits)
+        return in_parallel(lambda f: maximum_from(f, self.trials), fits)
 
     def under_noise_of(self, other: LikelihoodFit, fits: Sequence[LikelihoodFit]) -> list[LikelihoodFit]:
         """Return fits, with their parameters, under the noise of another fit of the same trials."""
@@ -233,8 +233,8 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         rest, whole = tuple(n for n in names if n != name), self.fits[names]
         if self._compared.get((names, name)) is not whole:
             effect = next(e for e in whole.model.effects if e.name == name)
-            begun = self._maxima.less(whole, effect.amplitudes(), effect)
-            own = self._maxima.from_start(begun, whole.noise, whole.unknowns)
+            begun = less(whole, effect.amplitudes(), effect)
+            own = self._maximum(begun, whole.noise, whole.unknowns)
             if any(own.sse > f.sse + WORTH for f in self._parts(rest)):  # it diverged, or a subset explains more
                 own = self._grown(rest, begun.effects)
             if rest not in self.fits or own.criterion < self.fits[rest].criterion:
@@ -253,9 +253,9 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         """
         fitted = self._parts(names)[0]
         for one in effects:
-            if one.name not in names_of(fitted):
+            if one.name not in fitted.names:
                 nothing = {n: one.nulls()[n] for n in one.amplitudes()}
-                fitted = self._maxima.from_start(fitted.model + started(one, nothing), fitted.noise, fitted.unknowns)
+                fitted = self._maximum(fitted.model + started(one, nothing), fitted.noise, fitted.unknowns)
         return fitted
 
     def is_possible(self, fitted: LikelihoodFit) -> bool:

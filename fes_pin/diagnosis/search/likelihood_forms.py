@@ -1,56 +1,48 @@
-"""Forms of the causes of a fitted set: one refinement more, one fewer, or all refinements of a cause restarted."""
+"""Forms of the causes of a fitted set: one refinement more or one fewer, and whether refinements are identified."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import TypeVar
 
 import numpy as np
 
-from fes_pin.diagnosis.decide.significance import level_of
-from fes_pin.diagnosis.search.likelihood_maxima import LikelihoodMaxima
-from fes_pin.diagnosis.search.refined_forms import is_identified
+from fes_pin.diagnosis.search.likelihood_maxima import better, less, look
 from fes_pin.diagnosis.search.starts import STARTS, number_of_forms, refinements
-from fes_pin.identify.likelihood_fit import LikelihoodFit
+from fes_pin.identify.fit import Fit
+from fes_pin.identify.likelihood_fit import LikelihoodFit, maximum_from
 from fes_pin.infer.distributions import chi2_quantile, chi2_tail
 from fes_pin.infer.fits import more_degrees
+from fes_pin.infer.levels import CONFIDENCE_95
 from fes_pin.infer.search import Fitted
 from fes_pin.workers import in_parallel
 
 F = TypeVar("F", bound=Fitted)
 
 
-class LikelihoodForms:
-    """Fits of a set in other forms.
+def refined_form(base: LikelihoodFit, measured: Mapping[str, np.ndarray]) -> LikelihoodFit | None:
+    """Return the best fit of a set with one more refinement; None where none is significant.
 
     Parameters
     ----------
-    maxima
-        Fits of single models.
     measured
         Columns by name, of all trials end to end.
     """
+    models = [refinements(base.model, effect, measured) for effect in base.model.effects]
+    looks = in_parallel(lambda s: look(s, base), [s for many in models for s in many])
+    level = base.level / number_of_forms(base.model, base.model.effects)
 
-    def __init__(self, maxima: LikelihoodMaxima, measured: Mapping[str, np.ndarray]) -> None:
-        self._maxima, self._measured = maxima, measured
+    def finished(worth: Sequence[LikelihoodFit]) -> list[LikelihoodFit]:
+        return [f for f in in_parallel(lambda f: maximum_from(f, f.trials), worth) if is_identified(f, base)]
 
-    def refined(self, base: LikelihoodFit) -> LikelihoodFit | None:
-        """Return the best fit of a set with one more refinement; None where none is significant."""
-        models = [refinements(base.model, effect, self._measured) for effect in base.model.effects]
-        looks = in_parallel(lambda s: self._maxima.look(s, base), [s for many in models for s in many])
-        level = level_of(base) / number_of_forms(base.model, base.model.effects)
+    return demanded_form(base, looks, level, finished)
 
-        def finished(worth: Sequence[LikelihoodFit]) -> list[LikelihoodFit]:
-            return [f for f in in_parallel(self._maxima.go_on, worth) if is_identified(f, base)]
 
-        return demanded_form(base, looks, level, finished)
+def simplified_form(base: LikelihoodFit) -> LikelihoodFit | None:
+    """Return the best fit of a set with one refinement fewer; None where no criterion is lower.
 
-    def simplified(self, base: LikelihoodFit) -> LikelihoodFit | None:
-        """Return the best fit of a set with one refinement fewer; None where no criterion is lower.
-
-        A refinement that was adopted with fewer causes may have been mistaken for a cause that was found later.
-        """
-        both = ((e, n) for e in base.model.effects for n, *_ in e.refinements() if n in e.refined())
-        starts = in_parallel(lambda one: self._maxima.less(base, one[1:], one[0]), list(both))
-        return self._maxima.better(starts, base)
+    A refinement that was adopted with fewer causes may have been mistaken for a cause that was found later.
+    """
+    both = ((e, n) for e in base.model.effects for n, *_ in e.refinements() if n in e.refined())
+    return better(in_parallel(lambda one: less(base, one[1:], one[0]), list(both)), base)
 
 
 def demanded_form(
@@ -76,3 +68,27 @@ def demanded_form(
     if best is None or not chi2_tail(max(base.sse - best.sse, 0.0), more_degrees(best, base)) < level:
         return None
     return best
+
+
+def is_identified(fitted: Fit, before: Fit | None = None) -> bool:
+    """Return whether every parameter of all refined effects differs significantly from its null, within its bounds.
+
+    Parameters
+    ----------
+    before
+        The fit that was refined: a parameter that was at its bound there is no objection to another form.
+    """
+    there = before.at_bound if before is not None else ()
+    for one in fitted.model.effects:
+        if not one.refined():
+            continue
+        for n, info in one.parameters().items():
+            name = f"{one.name}.{n}"
+            if name not in fitted.free or name in there:
+                continue
+            if name in fitted.at_bound:
+                return False
+            std, away = fitted.std(name), getattr(one, n) - info.null if info.null is not None else np.inf
+            if not np.isfinite(std) or abs(away) < CONFIDENCE_95 * std:
+                return False
+    return True

@@ -1,6 +1,6 @@
-"""Maximum of the likelihood of one model on the trials of a search: from start values, from a fit, in a few steps."""
+"""Maximum of the likelihood of one model on the trials of a search: from afar, with process noise, in a few steps."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -9,14 +9,13 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.search.starts import STARTS
 from fes_pin.identify.fit import GROSS, from_beginnings
 from fes_pin.identify.likelihood import LikelihoodProblem
-from fes_pin.identify.likelihood_fit import LikelihoodFit, at_noise, fit_of, maximise
+from fes_pin.identify.likelihood_fit import LikelihoodFit, at_noise, fit_of, maximise, maximum_from
 from fes_pin.identify.problem import limits_of
 from fes_pin.identify.process_noise import first_guess
 from fes_pin.infer.covariance import moved_with
 from fes_pin.infer.levels import PARAMETER_PENALTY
-from fes_pin.infer.maximise import ROUNDS
 from fes_pin.infer.optimum import minimise
-from fes_pin.infer.problem import completed
+from fes_pin.infer.problem import Unknowns, completed
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import StateSpaceNoise
 from fes_pin.models.stage import Effect
@@ -26,100 +25,87 @@ SCREEN_ITERATIONS = 4
 """Steps of a first fit of a set, at the noise of a smaller one."""
 
 
-class LikelihoodMaxima:
-    """Fits of models to one set of trials."""
+def maximum_from_afar(model: Model, trials: Sequence[Trial], noise: StateSpaceNoise) -> LikelihoodFit:
+    """Return the maximum from the values of a model; after a gross misfit, also from fits to ever longer trials.
 
-    def __init__(self, trials: Sequence[Trial]) -> None:
-        self.trials = tuple(trials)
+    With process noise no misfit is gross: a filter follows the state even of a wrong model.
+    """
+    rough = LikelihoodProblem(model, trials, noise)
+    plain = maximise(LikelihoodProblem(model, trials, noise))
+    if not rough.is_simulated or at_noise(plain, noise).reduced < GROSS:
+        return plain
 
-    def from_start(
-        self,
-        model: Model,
-        noise: StateSpaceNoise,
-        unknowns: list[dict[str, float]] | None = None,
-        rounds: int = ROUNDS,
-        near: bool = False,
-    ) -> LikelihoodFit:
-        """Return the maximum from the values of a model and start values of noise; see `maximise`."""
-        return maximise(LikelihoodProblem(model, self.trials, noise), model.parameters(), unknowns, rounds, near)
+    def again(values: Mapping[str, float], unknowns: Unknowns) -> LikelihoodFit:
+        return maximise(LikelihoodProblem(model.with_parameters(values), trials, noise), unknowns)
 
-    def from_afar(self, model: Model, noise: StateSpaceNoise) -> LikelihoodFit:
-        """Return the maximum from the values of a model; after a gross misfit, also from fits to ever longer trials.
+    return from_beginnings(rough, plain, again)
 
-        With process noise no misfit is gross: a filter follows the state even of a wrong model.
-        """
-        plain, rough = self.from_start(model, noise), LikelihoodProblem(model, self.trials, noise)
-        if not rough.is_simulated or at_noise(plain, noise).reduced < GROSS:
-            return plain
-        return from_beginnings(
-            rough, plain, lambda values, own: self.from_start(model.with_parameters(values), noise, own)
-        )
 
-    def process_noises(self, calm: LikelihoodFit, scales: Sequence[float]) -> list[StateSpaceNoise]:
-        """Return start values of noise, with several sizes of process noise, for a fit without any.
+def process_noises(calm: LikelihoodFit, scales: Sequence[float]) -> list[StateSpaceNoise]:
+    """Return start values of noise, with several sizes of process noise, for a fit without any.
 
-        There are none where readings were low-passed, as no filter includes a low pass of trials.
+    There are none where readings were low-passed, as no filter includes a low pass of trials.
 
-        Parameters
-        ----------
-        scales
-            Sizes of process noise together with white measurement noise, in units of the smallest.
-        """
-        guess = first_guess(calm.model, self.trials)
-        if not guess.std or any(t.low_pass_hz for t in self.trials):
-            return []
-        white = {n: (0.0,) * len(own) for n, own in calm.noise.ar.items()}
-        little = replace(calm.noise, std=guess.std, time=guess.time, still=())
-        return [little, *(replace(guess, std={n: k * v for n, v in guess.std.items()}, ar=white) for k in scales)]
+    Parameters
+    ----------
+    scales
+        Sizes of process noise together with white measurement noise, in units of the smallest.
+    """
+    guess = first_guess(calm.model, calm.trials)
+    if not guess.std or any(t.low_pass_hz for t in calm.trials):
+        return []
+    white = {n: (0.0,) * len(own) for n, own in calm.noise.ar.items()}
+    little = replace(calm.noise, std=guess.std, time=guess.time, still=())
+    return [little, *(replace(guess, std={n: k * v for n, v in guess.std.items()}, ar=white) for k in scales)]
 
-    def likeliest(self, fitted: LikelihoodFit, begun: Sequence[StateSpaceNoise]) -> StateSpaceNoise:
-        """Return the noise, of several start values, that is likeliest after one step at the parameters of a fit."""
-        tried = []
-        for noise in begun:
-            problem = LikelihoodProblem(fitted.model, self.trials, noise)
-            unknowns = completed(problem.start_unknowns(), fitted.unknowns)
-            problem.noise_step(fitted.values, unknowns)
-            tried.append((problem.costs([(fitted.values, unknowns)])[0], problem.noise))
-        return min(tried, key=lambda one: one[0])[1]
 
-    def go_on(self, fitted: LikelihoodFit, rounds: int = ROUNDS) -> LikelihoodFit:
-        """Return the maximum from the values of a fit."""
-        return self.from_start(fitted.model, fitted.noise, fitted.unknowns, rounds, fitted.together)
+def likeliest(fitted: LikelihoodFit, begun: Sequence[StateSpaceNoise]) -> StateSpaceNoise:
+    """Return the noise, of several start values, that is likeliest after one step at the parameters of a fit."""
+    tried = []
+    for noise in begun:
+        problem = LikelihoodProblem(fitted.model, fitted.trials, noise)
+        unknowns = completed(problem.start_unknowns(), fitted.unknowns)
+        problem.noise_step(fitted.values, unknowns)
+        tried.append((problem.costs([(fitted.values, unknowns)])[0], problem.noise))
+    return min(tried, key=lambda one: one[0])[1]
 
-    def look(self, start: Model, base: LikelihoodFit) -> LikelihoodFit:
-        """Return the fit after a few steps from a start, at the noise of another fit."""
-        problem = LikelihoodProblem(start, self.trials, base.noise)
-        found = minimise(problem, start.parameters(), base.unknowns, SCREEN_ITERATIONS)
-        return replace(fit_of(problem, found), together=base.together)
 
-    def better(self, starts: Sequence[Model], base: LikelihoodFit) -> LikelihoodFit | None:
-        """Return the best fit from some starts; None where none has a lower criterion than the base.
+def look(start: Model, base: LikelihoodFit) -> LikelihoodFit:
+    """Return the fit after a few steps from a start, at the noise of another fit."""
+    problem = LikelihoodProblem(start, base.trials, base.noise)
+    found = minimise(problem, start.parameters(), base.unknowns, SCREEN_ITERATIONS)
+    return replace(fit_of(problem, found), together=base.together)
 
-        The best first fits are fitted further if their criterion, at the noise of the base, exceeds that of the base by
-        less than the penalty of a parameter.
-        """
-        looks = sorted(in_parallel(lambda s: self.look(s, base), starts), key=lambda f: f.criterion)
-        worth = [f for f in looks[:STARTS] if f.criterion < base.criterion + PARAMETER_PENALTY]
-        best = min(in_parallel(self.go_on, worth), key=lambda f: f.criterion, default=None)
-        return best if best is not None and best.criterion < base.criterion else None
 
-    def less(self, whole: LikelihoodFit, gone: Sequence[str], effect: Effect) -> Model:
-        """Return the model of a fit with some parameters of an effect at their nulls, without it if these are all.
+def better(starts: Sequence[Model], base: LikelihoodFit) -> LikelihoodFit | None:
+    """Return the best fit from some starts; None where none has a lower criterion than the base.
 
-        The other parameters are moved along the fit's covariance or stay, whichever is likelier: without the gain of an
-        effort, for example, the estimate of inertia is another.
-        """
-        nulls = {f"{effect.name}.{n}": effect.nulls()[n] for n in gone if n in effect.common()}
-        moving = [n for n in nulls if n in whole.free]
-        here = np.array([whole.values[n] for n in whole.free])
-        change = np.array([nulls[n] - whole.values[n] for n in moving])
-        there = here + moved_with(whole.covariance, [whole.free.index(n) for n in moving], change)
-        limits = limits_of(whole.model, self.trials)
-        values = {n: float(np.clip(v, *limits[n])) for n, v in zip(whole.free, there, strict=True)}
-        off = whole.model.with_parameters(nulls)
-        left = off - effect.name if set(gone) >= set(effect.amplitudes()) else off
-        problem = LikelihoodProblem(left, self.trials, whole.noise)
-        unknowns = completed(problem.start_unknowns(), whole.unknowns)
-        moved = left.with_parameters({n: v for n, v in values.items() if n in left.fitted_parameters()})
-        costs = problem.costs([(one.parameters(), unknowns) for one in (left, moved)])
-        return moved if costs[1] < costs[0] else left
+    The best first fits are fitted further if their criterion, at the noise of the base, exceeds that of the base by
+    less than the penalty of a parameter.
+    """
+    looks = sorted(in_parallel(lambda s: look(s, base), starts), key=lambda f: f.criterion)
+    worth = [f for f in looks[:STARTS] if f.criterion < base.criterion + PARAMETER_PENALTY]
+    best = min(in_parallel(lambda f: maximum_from(f, f.trials), worth), key=lambda f: f.criterion, default=None)
+    return best if best is not None and best.criterion < base.criterion else None
+
+
+def less(whole: LikelihoodFit, gone: Sequence[str], effect: Effect) -> Model:
+    """Return the model of a fit with some parameters of an effect at their nulls, without it if these are all.
+
+    The other parameters are moved along the fit's covariance or stay, whichever is likelier: without the gain of an
+    effort, for example, the estimate of inertia is another.
+    """
+    nulls = {f"{effect.name}.{n}": effect.nulls()[n] for n in gone if n in effect.common()}
+    moving = [n for n in nulls if n in whole.free]
+    here = np.array([whole.values[n] for n in whole.free])
+    change = np.array([nulls[n] - whole.values[n] for n in moving])
+    there = here + moved_with(whole.covariance, [whole.free.index(n) for n in moving], change)
+    limits = limits_of(whole.model, whole.trials)
+    values = {n: float(np.clip(v, *limits[n])) for n, v in zip(whole.free, there, strict=True)}
+    off = whole.model.with_parameters(nulls)
+    left = off - effect.name if set(gone) >= set(effect.amplitudes()) else off
+    problem = LikelihoodProblem(left, whole.trials, whole.noise)
+    unknowns = completed(problem.start_unknowns(), whole.unknowns)
+    moved = left.with_parameters({n: v for n, v in values.items() if n in left.fitted_parameters()})
+    costs = problem.costs([(one.parameters(), unknowns) for one in (left, moved)])
+    return moved if costs[1] < costs[0] else left

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 
 from fes_pin.data.schema import IMPOSED
-from fes_pin.diagnosis.decide.significance import level_of
 from fes_pin.diagnosis.errors_ahead import are_large, random_parts
 from fes_pin.diagnosis.held_out import Fold, Found, gains_of
 from fes_pin.diagnosis.remainder.lack_of_fit import lack_of_fit
 from fes_pin.diagnosis.search.likelihood_fits import WHITE, LikelihoodFits
+from fes_pin.diagnosis.search.likelihood_forms import refined_form, simplified_form
 from fes_pin.diagnosis.search.score import Scored
 from fes_pin.identify.likelihood import is_simulated
 from fes_pin.identify.likelihood_fit import LikelihoodFit
@@ -59,27 +59,27 @@ class LikelihoodModels(LikelihoodFits):
             free = "the simulation of the nominal model is not finite at its start values"
             filtered = "the one-step predictions of the nominal model are not finite at its start values"
             raise NominalFitError(free if is_simulated(fitted.noise, fitted.trials) else filtered, fitted)
-        self.family = self.screen.scores(fitted).family(self.seed)
+        self.family = self.library.scores(fitted).family(self.seed)
         return fitted
 
     def extension_p_value(self, fitted: LikelihoodFit) -> float:
         """Return the family-wise p-value of the largest score of a further cause."""
-        scored = [s for s in self.screen.scores(fitted).scored if s.gain > 0.0]
+        scored = [s for s in self.library.scores(fitted).scored if s.gain > 0.0]
         single = min((float(chi2_tail(s.gain, max(len(s.amplitudes), 1))) for s in scored), default=1.0)
         return self.family.adjusted(single)
 
     def scored(self, found: Found) -> list[Scored]:
         """Return the score of every cause in the nominal model, and in the best set of those that it lacks."""
-        more = self.screen.scores(found.best).scored if found.best.model.effects else []
-        return self.screen.scores(found.nominal).scored + more
+        more = self.library.scores(found.best).scored if found.best.model.effects else []
+        return self.library.scores(found.nominal).scored + more
 
     def excess_scatter(self, larger: LikelihoodFit, smaller: LikelihoodFit) -> float:
         """See `infer.scatter.excess_scatter`."""
         return excess_scatter(larger, smaller)
 
     def level(self, fitted: LikelihoodFit) -> float:
-        """See `level_of`."""
-        return level_of(fitted)
+        """See `LikelihoodFit.level`."""
+        return fitted.level
 
     def is_error_of_form(self, larger: LikelihoodFit, gain: float, explained: float) -> bool:
         """Return whether a gain is no more than an error of form may leave, and no process noise takes that up."""
@@ -101,7 +101,7 @@ class LikelihoodModels(LikelihoodFits):
         """
         if self.noise == WHITE:
             return None
-        return self.forms.simplified(fitted) or self.forms.refined(fitted)
+        return simplified_form(fitted) or refined_form(fitted, self.library.measured)
 
 
 LikelihoodSearch = Search[LikelihoodFit, LikelihoodModels]
