@@ -189,7 +189,9 @@ def test_the_benchmarks_that_are_listed_are_those_that_can_be_run():
 
 def test_the_study_format_has_every_key_of_a_diagnosis():
     text = (DOCS / "study_format.md").read_text()
-    files = [ROOT / "fes_pin" / name for name in ("diagnosis/result.py", "diagnosis/recorded.py", "infer/result.py")]
+    files = [
+        ROOT / "fes_pin" / name for name in ("diagnosis/result.py", "diagnosis/errors_ahead.py", "infer/result.py")
+    ]
     files.append(ROOT / "fes_pin/data/results.py")
     every = [node for file in files for node in ast.walk(ast.parse(file.read_text()))]
     records = [

@@ -67,7 +67,7 @@ def predict(
     from fes_pin.data.plausibility import ToPredict
     from fes_pin.data.tabular import check_table, table_bytes
     from fes_pin.diagnosis.plausibility import check_study
-    from fes_pin.diagnosis.trajectories import trial_table
+    from fes_pin.diagnosis.replay import trial_table
     from fes_pin.identify.stored import load_log
     from fes_pin.models.predict import predict as run
     from fes_pin.models.store import load_model

@@ -11,9 +11,8 @@ from fes_pin.data.asked import asked
 from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.show import frame, table_html
 from fes_pin.data.study import Study
-from fes_pin.diagnosis.diagnosis import measured_study, split
+from fes_pin.diagnosis.diagnosis import few_trials, measured_study, split
 from fes_pin.diagnosis.plausibility import check_study
-from fes_pin.diagnosis.recorded import few_trials
 from fes_pin.diagnosis.testable import Testable, testable_causes
 from fes_pin.infer.result import shown
 from fes_pin.models.catalogue import Source, catalogue_of

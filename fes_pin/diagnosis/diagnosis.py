@@ -19,11 +19,9 @@ from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.estimators import searched
 from fes_pin.diagnosis.logged import LogFaults, likelier, with_timing_of, with_words
-from fes_pin.diagnosis.long_records import searched_part, thinned
+from fes_pin.diagnosis.long_records import in_parts, searched_part, thinned
 from fes_pin.diagnosis.misread import NAME as MISREAD
-from fes_pin.diagnosis.parts import in_parts
 from fes_pin.diagnosis.plausibility import check_study
-from fes_pin.diagnosis.recorded import few_trials
 from fes_pin.diagnosis.reported import diagnosis_of, unfitted
 from fes_pin.diagnosis.restate import Run, StudyConditions, restated_study, with_misread
 from fes_pin.diagnosis.result import Diagnosis
@@ -32,6 +30,7 @@ from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodModels, 
 from fes_pin.diagnosis.testable import given_away
 from fes_pin.identify.feedback import is_fed_back, is_stimulus_fed_back
 from fes_pin.identify.recording import improves, low_pass_of
+from fes_pin.infer.held_out import FOLDS
 from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
@@ -271,4 +270,7 @@ def split(study: Study) -> tuple[list[Trial], list[Trial]]:
     return train, test
 
 
-__all__ = ["diagnose_joint", "split"]
+def few_trials(count: int) -> list[str]:
+    """Return a warning that the names rest on few trials; none if there are many."""
+    few = f"the names rest on {count} trial{'s' if count > 1 else ''}, fewer than {FOLDS}: more may change them"
+    return [few] * (count < FOLDS)

@@ -14,6 +14,7 @@ from fes_pin.identify.process_noise import driving_size, first_guess
 from fes_pin.infer.held_out import FOLDS, Errors
 from fes_pin.infer.levels import AVERAGED_S, SMALL_SHARE
 from fes_pin.infer.noise import NoiseModel
+from fes_pin.infer.result import shown
 from fes_pin.models.autoregression import weights_ahead
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import StateSpaceNoise
@@ -45,6 +46,16 @@ class RandomPart:
     std: float
     time_constant_s: float
     share: float
+
+    def record(self) -> dict[str, float | None]:
+        """As JSON files have it."""
+        sizes = {"std": self.std, "time_constant_s": self.time_constant_s, "share_percent": 100.0 * self.share}
+        return {n: shown(value) for n, value in sizes.items()}
+
+    def words(self, unit: str) -> str:
+        """Return it in words; `unit` is that of the effort."""
+        share = f"{100.0 * self.share:.2g} % of what drives the rig"
+        return f"{self.std:.3g} {unit}, {share}, changing within {self.time_constant_s:.2g} s"
 
 
 @dataclass(frozen=True)

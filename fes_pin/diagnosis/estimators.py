@@ -117,6 +117,3 @@ def _has_coloured_noise(fitted: LikelihoodFit) -> bool:
     """
     is_coloured = any(fitted.noise.time[n] > step_s(fitted.noise, fitted.trials) for n in fitted.noise.acting)
     return is_coloured and all(t.kind != IMPOSED and fitted.model.rig.unknowns(t.kind) for t in fitted.trials)
-
-
-__all__ = ["WHITE_PROCESS_NOISE", "found_with_white_process_noise", "judged_again", "least_error", "searched"]

@@ -1,12 +1,20 @@
-"""Records longer than a search can hold: the part that is searched, and the warning that says so."""
+"""Trials before they are searched: the part of long records that a search takes, and few trials cut into parts.
+
+Parts of a trial can be held out, and are then predicted by fits to the others.
+"""
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
 from fes_pin.data.schema import RigSchema
+from fes_pin.data.stuck import piece
 from fes_pin.data.trial import Trial, derived_trial
+from fes_pin.infer.levels import HORIZON_S
 from fes_pin.infer.noise import noise_step, thin, thinning
+from fes_pin.models.compile.layout import WIDTH
+from fes_pin.models.rigs.base import Rig
 
 MOST_SAMPLES = 120_000
 """Samples of all trials together that a search takes. Sensitivities to every cause of the library take about 10 kB a
@@ -15,6 +23,9 @@ MOST_DRIVEN = 60_000
 """The same for a rig in closed loop, before samples are averaged. A search by the likelihood predicts them some
 thousand times, and a step of 4 ms estimates what one of 1 ms does in a quarter of the time: dry friction of 20 N as
 20.09 N or 20.06 N, an offset of -3 N as -3.24 N or -3.34 N (`scripts/benchmark slide`)."""
+
+SHORTEST_S = 10.0 * HORIZON_S
+"""Least length of a part, s: an error over the horizon is judged on as much."""
 
 
 def searched_part(
@@ -87,3 +98,21 @@ def _about(values: np.ndarray, count: int, side: int) -> np.ndarray:
 
 def _size(trials: Sequence[Trial]) -> int:
     return sum(map(len, trials))
+
+
+def in_parts(rig: Rig, trials: Sequence[Trial]) -> list[Trial]:
+    """Return the trials, cut into parts of equal length if there are fewer than half as many as run in one batch.
+
+    Each part begins at a state of its own, which is estimated from its first samples. Trials of a rig that begins at
+    rest are not cut.
+    """
+    most = WIDTH // max(len(trials), 1)
+    return [part for trial in trials for part in _cut(trial, most if rig.unknowns(trial.kind) else 1)]
+
+
+def _cut(trial: Trial, most: int) -> list[Trial]:
+    count = min(most, int(trial.duration / SHORTEST_S))
+    if count < 2:
+        return [trial]
+    ends = np.linspace(0, len(trial), count + 1).round().astype(int)
+    return [piece(trial, slice(int(a), int(b)), k) for k, (a, b) in enumerate(pairwise(ends))]

@@ -235,6 +235,3 @@ def _step(fitted: Fit, trial: Trial, name: str, size: float, steps: int = STEPS,
             break
     r = without_locals(part, _linearized(fitted, now).residual[:, None])[:, 0]
     return _Step(rig.stated(now)[name] - begun, std, float(r @ r) / max(len(r), 1))
-
-
-__all__ = ["Misread", "find_misread", "restated_trials"]

@@ -1,6 +1,6 @@
-"""Every trial of a study with the predictions of its nominal and its extended model."""
+"""Every trial of a study with the predictions of its nominal and its extended model, and all samples as one table."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -63,7 +63,7 @@ def replayed_trials(diagnosis: Diagnosis) -> tuple[Replay, ...]:
     made = []
     for trial, before, after in zip(trials, nominal, extended, strict=True):
         outputs = tuple(n for n in diagnosis.model.rig.outputs(trial.kind) if n in trial)
-        one, other = (trial_error_percent(trial, simulated, outputs, noise) for simulated in (before, after))
+        one, other = (percent_of_spread(*squares_of(trial, m, outputs, noise)) for m in (before, after))
         made.append(Replay(trial, before, after, outputs, one, other, bool(diagnosis.causes)))
     return tuple(made)
 
@@ -92,11 +92,6 @@ def _shown(readings: np.ndarray, trial: Trial, name: str) -> np.ndarray:
     return within(readings, most if most > 0.0 else 1.0)
 
 
-def trial_error_percent(measured: Trial, simulated: Trial, outputs: Sequence[str], noise: NoiseModel) -> float:
-    """Return E of a prediction of one trial, percent."""
-    return percent_of_spread(*squares_of(measured, simulated, outputs, noise))
-
-
 def squares_of(measured: Trial, simulated: Trial, outputs: Sequence[str], noise: NoiseModel) -> tuple[float, float]:
     """Return the squared error of a trial, and the measurement's squares about its mean, in units of the noise."""
     squares = spread = 0.0
@@ -105,3 +100,38 @@ def squares_of(measured: Trial, simulated: Trial, outputs: Sequence[str], noise:
         squares += float(np.sum(measured.residual(simulated, name) ** 2)) / variance
         spread += float(np.sum((measured[name] - measured[name].mean()) ** 2)) / variance
     return squares, spread
+
+
+def trajectories(diagnosis: Diagnosis) -> tuple[list[str], dict[str, np.ndarray]]:
+    """Return measured, predicted and residual samples of all trials.
+
+    Returns
+    -------
+    trials : list of str
+        The trial of each row.
+    columns : dict of ndarray, shape (n,)
+        `time_s`; the inputs; for each output its reading, `<output>_nominal`, `<output>_extended`, and
+        `<output>_residual`: the reading minus the extended model. NaN where a trial has no such column. For a rig in
+        closed loop, predictions are those over the horizon of the diagnosis.
+    """
+    trials: list[Trial] = []
+    rows: list[dict[str, np.ndarray]] = []
+    for one in replayed_trials(diagnosis):
+        columns = {"time_s": one.measured.time, **one.measured.columns}
+        for name in diagnosis.model.rig.outputs(one.measured.kind):
+            columns[f"{name}_nominal"], columns[f"{name}_extended"] = one.nominal[name], one.extended[name]
+            if name in one.measured:
+                columns[f"{name}_residual"] = one.measured.residual(one.extended, name)
+        trials.append(one.measured)
+        rows.append(columns)
+    return trial_table(trials, rows)
+
+
+def trial_table(
+    trials: Sequence[Trial], rows: Sequence[Mapping[str, np.ndarray]]
+) -> tuple[list[str], dict[str, np.ndarray]]:
+    """Return several trials as one long table: the trial of each row, and columns, NaN where a trial has none."""
+    names = dict.fromkeys(n for columns in rows for n in columns)
+    absent = [np.full(len(columns["time_s"]), np.nan) for columns in rows]
+    words = [trial.name for trial, columns in zip(trials, rows, strict=True) for _ in columns["time_s"]]
+    return words, {n: np.concatenate([c.get(n, a) for c, a in zip(rows, absent, strict=True)]) for n in names}

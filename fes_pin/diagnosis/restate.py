@@ -10,8 +10,8 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.conditions import Conditions, Restated
 from fes_pin.diagnosis.errors_ahead import errors_ahead, free_errors
 from fes_pin.diagnosis.held_out import folds_of, refit
+from fes_pin.diagnosis.long_records import in_parts
 from fes_pin.diagnosis.misread import NAME, Misread, find_misread, restated_trials
-from fes_pin.diagnosis.parts import in_parts
 from fes_pin.diagnosis.remainder.lack_of_fit import lack_of_fit
 from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodModels, LikelihoodSearch
@@ -116,6 +116,3 @@ def _errors_of_halves(made: Made, trial: Trial) -> tuple[Errors, Errors]:
     odd = halves(pieces)[0]
     squares = np.where(odd, by_half[1].squares, by_half[0].squares)  # each piece by the value of the other half
     return plain, Errors(squares, plain.spread, plain.noise)
-
-
-__all__ = ["StudyConditions", "restated_study", "with_misread"]

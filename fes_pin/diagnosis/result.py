@@ -1,13 +1,13 @@
 """The result of a diagnosis: named causes with their significance and gain, lack of fit, errors; and it in words."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from fes_pin.data.log import Log
 from fes_pin.data.results import Result
-from fes_pin.diagnosis import recorded
+from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.errors_ahead import AheadErrors, RandomPart
 from fes_pin.diagnosis.experiment import NextExperiment
 from fes_pin.identify.error_measures import FREE, ONE_STEP
@@ -121,9 +121,9 @@ class Diagnosis(Result):
         topics = [
             ("noise of the readings alone", f"E {percent(self.ceiling_percent)}"),
             ("falls", "by itself: free errors are meaningless" if self.is_falling else ""),
-            *((f"random {r.name}", recorded.in_words(r, unit)) for r in self.random),
+            *((f"random {r.name}", r.words(unit)) for r in self.random),
             ("lack of fit", self.reason or f"{state} ({probability(left.p_value)}{where})"),
-            ("left out as spikes", recorded.left_out_text(self.left_out, self.study.trials) if self.left_out else ""),
+            ("left out as spikes", left_out_text(self.left_out, self.study.trials) if self.left_out else ""),
             *(
                 (f"{c.name} chosen again", f"in {k[0]} of {k[1]} folds, each without its trials")
                 for c in self.causes
@@ -157,8 +157,18 @@ class Diagnosis(Result):
             **({"reason": self.reason} if self.reason else {}),
             **({"log": log_table(self.log)} if self.log != Log() else {}),
             **({"library": library} if library else {}),
-            **recorded.ahead_record(self.ahead, self.is_driven, self.random),
+            **self._ahead_record(),
         }
+
+    def _ahead_record(self) -> dict[str, Any]:
+        """Return the horizon, and of a driven rig its process noise; no key without errors over a horizon."""
+        if self.ahead is None:
+            return {}
+        horizon = {"horizon_s": shown(self.ahead.horizon_s)}
+        if not self.is_driven:
+            return horizon
+        errors, random = self.ahead.extended_held_out or self.ahead.extended, {r.name: r.record() for r in self.random}
+        return {**horizon, "horizon_ceiling_percent": shown(errors.noise), "random": random}
 
     def _model(self, which: str) -> dict[str, Any]:
         fitted, (fit, held_out), ahead = getattr(self, which), getattr(self, f"{which}_error"), self.ahead
@@ -168,3 +178,17 @@ class Diagnosis(Result):
             errors |= {n: shown(getattr(own, n)) for n in ("one_step", "horizon", "free")}
         parameters = {n: ParameterEstimate.of(fitted, n, "").record() for n in fitted.free}
         return {"parameters": parameters, "error_percent": errors}
+
+
+def left_out_text(left_out: Mapping[str, Mapping[str, Sequence[int]]], trials: Sequence[Trial]) -> str:
+    """Return in words how many samples of each column were taken for spikes, and in which trials if they are few."""
+    lengths = {t.name: len(t) for t in trials}
+    found: dict[str, dict[str, int]] = {}
+    for trial, columns in left_out.items():
+        for name, samples in columns.items():
+            found.setdefault(name, {})[trial] = len(samples)
+    return ", ".join(
+        f"{sum(counts.values())} of {sum(lengths[t] for t in counts)} samples of {name} in "
+        + (" and ".join(counts) if len(counts) <= 2 else f"{len(counts)} trials")
+        for name, counts in found.items()
+    )

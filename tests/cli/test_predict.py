@@ -13,7 +13,8 @@ from diagnosis.hidden import study_of
 from fes_pin.data.study import read_study, write_study
 from fes_pin.data.tabular import table_bytes
 from fes_pin.data.trial import write_trial
-from fes_pin.diagnosis.replay import trial_error_percent
+from fes_pin.diagnosis.replay import squares_of
+from fes_pin.infer.held_out import percent_of_spread
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.predict import predict
 from fes_pin.models.store import save_model
@@ -48,7 +49,7 @@ def test_all_trials_of_a_study_are_predicted_under_their_own_conditions(made, mo
             for name, values in predicted.columns.items():
                 assert np.allclose(rows[name], values, rtol=0, atol=1e-12)
                 assert np.allclose(rows[f"{name}_residual"], trial[name] - values, rtol=0, atol=1e-12)
-                error = trial_error_percent(trial, predicted, [name], {})
+                error = percent_of_spread(*squares_of(trial, predicted, [name], {}))
             assert line == f"{trial.name}: E {error:.3g} %"
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.errors_ahead import RandomPart
-from fes_pin.diagnosis.recorded import in_words, left_out_text
+from fes_pin.diagnosis.result import left_out_text
 from fes_pin.infer.text import quantity
 
 
@@ -28,7 +28,7 @@ def test_a_quantity_is_rounded_to_what_it_means(value, std, words):
 
 def test_what_acts_at_random_is_told_in_units_of_the_effort():
     wind = RandomPart("effort", 0.12, 0.3, 0.04)
-    assert in_words(wind, "N m") == "0.12 N m, 4 % of what drives the rig, changing within 0.3 s"
+    assert wind.words("N m") == "0.12 N m, 4 % of what drives the rig, changing within 0.3 s"
 
 
 def test_spikes_are_counted_by_column_and_trials_are_named_if_they_are_few():
