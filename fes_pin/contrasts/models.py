@@ -12,10 +12,10 @@ from fes_pin.diagnosis.search.library import Library
 from fes_pin.diagnosis.search.likelihood_forms import demanded_form
 from fes_pin.diagnosis.search.starts import STARTS, number_of_forms, refinements
 from fes_pin.infer.distributions import chi2_tail
-from fes_pin.infer.fits import Candidate, FittedSets, more_degrees
+from fes_pin.infer.fits import Candidate, FittedSets, Names, more_degrees
 from fes_pin.infer.levels import CLAIM_LEVEL, DRIVEN_LEVEL, MOST_ITEMS
 from fes_pin.infer.scatter import excess_scatter
-from fes_pin.infer.search import Names, Policy, Search, SearchResult
+from fes_pin.infer.search import Policy, Search, SearchResult
 from fes_pin.infer.spread import ByUnit, Spread
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect

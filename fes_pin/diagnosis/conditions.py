@@ -15,8 +15,9 @@ from typing import Generic
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.misread import Misread, restated_trials, takes_most
+from fes_pin.infer.fits import F
 from fes_pin.infer.levels import PARAMETER_PENALTY, SEPARABLE
-from fes_pin.infer.search import F, M, Search, SearchResult
+from fes_pin.infer.search import M, Search, SearchResult
 from fes_pin.models.model import Model
 from fes_pin.workers import attempted
 

@@ -4,33 +4,36 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Generic, Self, TypeVar
+from typing import Generic, Protocol, Self, TypeVar
 
 from fes_pin.infer.family import Family
 from fes_pin.infer.levels import CLAIM_LEVEL, MOST_CAUSES
-from fes_pin.infer.search import Fitted, Names
+
+Names = tuple[str, ...]
+"""Names of the candidates of a set, in alphabetical order."""
+
+
+class Fitted(Protocol):
+    """A fit of a set of candidates."""
+
+    @property
+    def sse(self) -> float:
+        """Twice the negative log-likelihood, up to a constant."""
+
+    @property
+    def criterion(self) -> float:
+        """The same with a penalty for each degree of freedom."""
+
+    @property
+    def degrees(self) -> int:
+        """Degrees of freedom."""
+
 
 F = TypeVar("F", bound=Fitted)
 S = TypeVar("S")
 
 
-@dataclass(frozen=True)
-class Candidate(Generic[S]):
-    """A candidate by which a set may be extended.
-
-    Attributes
-    ----------
-    gain
-        Gain in twice the log-likelihood by the score test; 0 where none is made.
-    start
-        Start of a fit with the candidate.
-    """
-
-    gain: float
-    start: S
-
-
-class FittedSets(ABC, Generic[F, S]):
+class Sets(ABC, Generic[F]):
     """Fits of sets of candidates to the same data, which a front end makes.
 
     The methods that are not abstract suit linear models, whose fits have all converged.
@@ -56,18 +59,17 @@ class FittedSets(ABC, Generic[F, S]):
         self._converged: set[Names] = set()
         self._begun: set[tuple[Names, Hashable]] = set()
 
-    @property
-    def own(self) -> Self:
-        """These models, with the type of their front end."""
-        return self
+    def pair(self) -> tuple[Self, "Sets[F]"]:
+        """Return these sets with the type of their front end, and as sets: a search needs both."""
+        return self, self
 
     @abstractmethod
-    def candidates(self, base: F) -> Mapping[str, Candidate[S]]:
-        """Return the candidates by which a set may be extended."""
+    def nominal(self) -> F:
+        """Fit the nominal model and the family of tests; raise an error where the fit is not finite."""
 
     @abstractmethod
-    def begin(self, base: F, starts: Mapping[Names, S]) -> Mapping[Names, F]:
-        """Return first fits of sets that extend a base, each from its start."""
+    def extend(self, base: Names, most: int | None = None) -> None:
+        """Fit a set with each further candidate, or with the `most` of largest score."""
 
     @abstractmethod
     def without(self, names: Names, name: str) -> F:
@@ -84,10 +86,6 @@ class FittedSets(ABC, Generic[F, S]):
     def step_gain(self, fitted: F) -> float:
         """Return the gain of a further step of a fit by its slope and curvature."""
         return 0.0
-
-    def form_of(self, fitted: F) -> frozenset[Hashable]:
-        """Return the forms of the candidates in a fit, where they have several."""
-        return frozenset()
 
     def is_possible(self, fitted: F) -> bool:
         """Return whether every size of a fit is physically possible."""
@@ -129,31 +127,6 @@ class FittedSets(ABC, Generic[F, S]):
     def begin_again(self, names: Names) -> bool:
         """Fit a set and the nominal model with another kind of noise; return False where none lowers the criterion."""
         return False
-
-    def extend(self, base: Names, most: int | None = None) -> None:
-        """Fit a set with each further candidate, or with the `most` of largest score.
-
-        A fitted set is started again where candidates of the base have another form than in that set.
-        """
-        fitted = self.fits[base]
-        known, forms = self.candidates(fitted), self.form_of(fitted)
-        chosen = sorted(known, key=lambda n: (-known[n].gain, n))[:most]
-        starts = {tuple(sorted((*base, n))): known[n].start for n in chosen}
-        missing = {k: s for k, s in starts.items() if (k, forms) not in self._begun and not self._has(k, forms)}
-        self._begun.update((k, forms) for k in missing)
-        self._add(fitted, missing)
-
-    def _has(self, names: Names, forms: frozenset[Hashable]) -> bool:
-        return names in self.fits and forms <= self.form_of(self.fits[names])
-
-    def _add(self, base: F, starts: Mapping[Names, S]) -> None:
-        """Start fits of sets in parallel; of several fits of a set the one of lowest criterion is kept."""
-        for names, best in self.begin(base, starts).items():
-            if names not in self.fits or best.criterion < self.fits[names].criterion:
-                self.fits[names] = best
-                self._converged.discard(names)
-        for size in sorted({len(n) for n in starts}):
-            self.converge(size)
 
     def converge(self, size: int, without: Sequence[Names] = ()) -> None:
         """Fit the best sets of a size, and those near the best, until they converge, except some."""
@@ -204,6 +177,63 @@ class FittedSets(ABC, Generic[F, S]):
         """Return the sets of a size, lowest criterion first; those with physically impossible sizes come last."""
         absurd = {n for n in self._converged if not self.is_possible(self.fits[n])}
         return sorted((n for n in self.fits if len(n) == size), key=lambda n: (n in absurd, self.fits[n].criterion, n))
+
+
+@dataclass(frozen=True)
+class Candidate(Generic[S]):
+    """A candidate by which a set may be extended.
+
+    Attributes
+    ----------
+    gain
+        Gain in twice the log-likelihood by the score test; 0 where none is made.
+    start
+        Start of a fit with the candidate.
+    """
+
+    gain: float
+    start: S
+
+
+class FittedSets(Sets[F], Generic[F, S]):
+    """Fits of sets, of which each is begun at starts of its candidates."""
+
+    @abstractmethod
+    def candidates(self, base: F) -> Mapping[str, Candidate[S]]:
+        """Return the candidates by which a set may be extended."""
+
+    @abstractmethod
+    def begin(self, base: F, starts: Mapping[Names, S]) -> Mapping[Names, F]:
+        """Return first fits of sets that extend a base, each from its start."""
+
+    def form_of(self, fitted: F) -> frozenset[Hashable]:
+        """Return the forms of the candidates in a fit, where they have several."""
+        return frozenset()
+
+    def extend(self, base: Names, most: int | None = None) -> None:
+        """Fit a set with each further candidate, or with the `most` of largest score.
+
+        A fitted set is started again where candidates of the base have another form than in that set.
+        """
+        fitted = self.fits[base]
+        known, forms = self.candidates(fitted), self.form_of(fitted)
+        chosen = sorted(known, key=lambda n: (-known[n].gain, n))[:most]
+        starts = {tuple(sorted((*base, n))): known[n].start for n in chosen}
+        missing = {k: s for k, s in starts.items() if (k, forms) not in self._begun and not self._has(k, forms)}
+        self._begun.update((k, forms) for k in missing)
+        self._add(fitted, missing)
+
+    def _has(self, names: Names, forms: frozenset[Hashable]) -> bool:
+        return names in self.fits and forms <= self.form_of(self.fits[names])
+
+    def _add(self, base: F, starts: Mapping[Names, S]) -> None:
+        """Start fits of sets in parallel; of several fits of a set the one of lowest criterion is kept."""
+        for names, best in self.begin(base, starts).items():
+            if names not in self.fits or best.criterion < self.fits[names].criterion:
+                self.fits[names] = best
+                self._converged.discard(names)
+        for size in sorted({len(n) for n in starts}):
+            self.converge(size)
 
 
 def more_degrees(larger: Fitted, smaller: Fitted) -> int:

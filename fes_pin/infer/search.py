@@ -12,103 +12,19 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
+from fes_pin.infer.fits import F, Names, Sets, more_degrees
 from fes_pin.infer.levels import UNUSUAL_LEVEL
 from fes_pin.workers import OutOfTime, Progress, seconds_left, time_limit
 
-Names = tuple[str, ...]
-"""Names of the candidates of a set, in alphabetical order."""
-
-
-class Fitted(Protocol):
-    """A fit of a set of candidates."""
-
-    @property
-    def sse(self) -> float:
-        """Twice the negative log-likelihood, up to a constant."""
-
-    @property
-    def criterion(self) -> float:
-        """The same with a penalty for each degree of freedom."""
-
-    @property
-    def degrees(self) -> int:
-        """Degrees of freedom."""
-
-
-F = TypeVar("F", bound=Fitted)
 M = TypeVar("M")
 M_co = TypeVar("M_co", covariant=True)
 
 
-class Models(Protocol[F, M_co]):
-    """The fitted sets of one problem, and the rules by which its front end judges them.
+class Paired(Protocol[F, M_co]):
+    """Sets that know the type of their front end."""
 
-    Attributes
-    ----------
-    fits
-        Fits by the names of their candidates; `()` is the nominal model.
-    """
-
-    fits: dict[Names, F]
-
-    @property
-    def own(self) -> M_co:
-        """These models, with the type of their front end."""
-
-    @property
-    def most_candidates(self) -> int | None:
-        """Most candidates in a set; None for no bound."""
-
-    def nominal(self) -> F:
-        """Fit the nominal model and the family of tests; raise an error where the fit is not finite."""
-
-    def extend(self, base: Names, most: int | None = None) -> None:
-        """Fit a set with each further candidate, or with the `most` of largest score."""
-
-    def converge(self, size: int, without: Sequence[Names] = ()) -> None:
-        """Fit the best sets of a size until they converge, except some."""
-
-    def converge_rivals(self, names: Names, name: str) -> None:
-        """Converge the sets that have another candidate in the place of one, and come near under one noise."""
-
-    def ranked(self, size: int) -> list[Names]:
-        """Return the sets of a size, lowest criterion first; those that are physically impossible last."""
-
-    def near(self, size: int, without: Sequence[Names] = ()) -> list[Names]:
-        """Return the sets of a size that are near the best, best first, except some."""
-
-    def without(self, names: Names, name: str) -> F:
-        """Return the fit of a set without one candidate."""
-
-    def is_possible(self, fitted: F) -> bool:
-        """Return whether every size of a fit is physically possible."""
-
-    def p_value(self, larger: F, smaller: F, gain: float | None = None) -> float:
-        """Return the family-wise p-value of the gain of a larger set, or of a given gain, corrected for scatter."""
-
-    def noise_p_value(self, gain: float, degrees: int) -> float:
-        """Return the family-wise p-value of a gain in twice the log-likelihood against the noise."""
-
-    def extension_p_value(self, fitted: F) -> float:
-        """Return the family-wise p-value of the best further candidate's score; 0 where every candidate is fitted."""
-
-    def level(self, fitted: F) -> float:
-        """Return the family-wise level of a claim."""
-
-    def is_error_of_form(self, larger: F, gain: float, explained: float) -> bool:
-        """Return whether a gain is no more than an error in the form of the other candidates may leave."""
-
-    def predicts_better(self, larger: F, smaller: F) -> bool:
-        """Return whether a larger set has smaller errors of prediction."""
-
-    def leaves_noise(self, fitted: F) -> bool:
-        """Return whether a fit has no lack of fit."""
-
-    def better_form(self, fitted: F) -> F | None:
-        """Return the same set in another form that is significant; None where none is."""
-
-    def begin_again(self, names: Names) -> bool:
-        """Fit a set and the nominal model with another kind of noise; return False where none lowers the criterion."""
+    def pair(self) -> tuple[M_co, Sets[F]]:
+        """Return them with that type, and as sets."""
 
 
 @dataclass(frozen=True)
@@ -166,8 +82,8 @@ class Search(Generic[F, M]):
         Whether a limit of time ended the search, so that the result is the best set so far.
     """
 
-    def __init__(self, models: Models[F, M], progress: Progress, policy: Policy | None = None) -> None:
-        self.models, self._sets = models.own, models
+    def __init__(self, models: Paired[F, M], progress: Progress, policy: Policy | None = None) -> None:
+        self.models, self._sets = models.pair()
         self.progress, self.policy = progress, policy or Policy()
         self.was_stopped, self._end = False, math.inf
         self._formed: set[Names] = set()
@@ -283,8 +199,8 @@ class Search(Generic[F, M]):
         if names in self._formed:
             return False
         larger, smaller = self._sets.fits[names], self._sets.fits[best]
-        degrees = max(larger.degrees - smaller.degrees, 1)
-        return self._sets.noise_p_value(2.0 * (smaller.sse - larger.sse), degrees) < self._sets.level(larger)
+        doubled = 2.0 * (smaller.sse - larger.sse)
+        return self._sets.noise_p_value(doubled, more_degrees(larger, smaller)) < self._sets.level(larger)
 
     def _is_accepted(self, names: Names, best: Names) -> bool:
         """Return whether a set is physically possible and improves on the best smaller one."""

@@ -11,11 +11,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
+from fes_pin.infer.fits import F
 from fes_pin.infer.held_out import is_supported
 from fes_pin.infer.result import Evidence, Gain, Remainder
-from fes_pin.infer.search import Fitted, M, Search, SearchResult
-
-F = TypeVar("F", bound=Fitted)
+from fes_pin.infer.search import M, Search, SearchResult
 
 CAUSES_FOUND, UNEXPLAINED, ADEQUATE, STOPPED = "causes_found", "unexplained", "adequate", "stopped"
 

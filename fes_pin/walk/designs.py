@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from fes_pin.body.build import GRAVITY
-from fes_pin.infer.search import Names
+from fes_pin.infer.fits import Names
 from fes_pin.walk.disturb import compressed, disturbed_waves, misplaced, tissue, white
 from fes_pin.walk.effects import walk_library
 from fes_pin.walk.likelihood import MEAN_ARM_M, MEAN_FORCE, MEAN_TWIST_NM, WalkNoise, fit_walk, rotation

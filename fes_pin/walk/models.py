@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fes_pin.infer.fits import Candidate, FittedSets
+from fes_pin.infer.fits import Candidate, FittedSets, Names
 from fes_pin.infer.levels import POSSIBLE_SIZES, STRONG_EVIDENCE, WALK_LEVEL
-from fes_pin.infer.search import Names, Policy, Search, SearchResult
+from fes_pin.infer.search import Policy, Search, SearchResult
 from fes_pin.walk.designs import Designs
 from fes_pin.walk.likelihood import Fitted, fit_many
 from fes_pin.walk.nulls import Nulls, simulated_nulls

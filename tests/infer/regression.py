@@ -12,14 +12,14 @@ import numpy as np
 from fes_pin.infer.covariance import covariance_of
 from fes_pin.infer.distributions import chi2_tail, f_tail
 from fes_pin.infer.family import Family
-from fes_pin.infer.fits import Candidate, FittedSets
+from fes_pin.infer.fits import Candidate, FittedSets, Names
 from fes_pin.infer.held_out import Errors, added_likelihood, deal, held_out_gain
 from fes_pin.infer.levels import SEPARABLE
 from fes_pin.infer.optimum import Optimum
 from fes_pin.infer.problem import Linearized, normal_equations, whitened_sse
 from fes_pin.infer.projection import Products, Projection
 from fes_pin.infer.result import Evidence
-from fes_pin.infer.search import Names, SearchResult
+from fes_pin.infer.search import SearchResult
 from fes_pin.infer.verdict import Verdict, Weighed
 
 COUNT = 60

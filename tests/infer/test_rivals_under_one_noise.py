@@ -27,6 +27,9 @@ class Sets(FittedSets):
         self._converged = {(), ("a",)}
         self.asked = []
 
+    def nominal(self):
+        raise NotImplementedError
+
     def candidates(self, base):
         raise NotImplementedError
 

@@ -29,9 +29,8 @@ class Models:
     def __init__(self):
         self.fits = {(): self.fit(())}
 
-    @property
-    def own(self):
-        return self
+    def pair(self):
+        return self, self
 
     def fit(self, names):
         sse = COST[names]

@@ -18,10 +18,10 @@ from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.problem import limits_of
 from fes_pin.infer.covariance import least_squares_step
+from fes_pin.infer.fits import Names
 from fes_pin.infer.levels import FORM_SHARE
 from fes_pin.infer.optimum import minimise
 from fes_pin.infer.problem import normal_equations
-from fes_pin.infer.search import Names
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import StateSpaceNoise
 from fes_pin.workers import in_parallel

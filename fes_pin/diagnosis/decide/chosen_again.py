@@ -23,11 +23,11 @@ import numpy as np
 
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.covariance import least_squares_step
+from fes_pin.infer.fits import Names
 from fes_pin.infer.levels import PARAMETER_PENALTY
 from fes_pin.infer.problem import normal_equations
 from fes_pin.infer.scatter import at_rest
 from fes_pin.infer.scoring import LITTLE
-from fes_pin.infer.search import Names
 
 
 @dataclass(frozen=True)

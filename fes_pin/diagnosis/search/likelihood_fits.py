@@ -19,12 +19,11 @@ from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit, at_noise, maximise, maximum_from
 from fes_pin.identify.process_noise import first_guess, stilled, without_memory
 from fes_pin.infer.covariance import step_gain
-from fes_pin.infer.fits import Candidate, FittedSets
+from fes_pin.infer.fits import Candidate, FittedSets, Names
 from fes_pin.infer.maximise import ROUNDS
 from fes_pin.infer.optimize import WORTH
 from fes_pin.infer.problem import Unknowns, normal_equations
 from fes_pin.infer.scoring import LITTLE
-from fes_pin.infer.search import Names
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import StateSpaceNoise
 from fes_pin.models.stage import Effect

@@ -1,7 +1,6 @@
 """Forms of the causes of a fitted set: one refinement more or one fewer, and whether refinements are identified."""
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TypeVar
 
 import numpy as np
 
@@ -10,12 +9,9 @@ from fes_pin.diagnosis.search.starts import STARTS, number_of_forms, refinements
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood_fit import LikelihoodFit, maximum_from
 from fes_pin.infer.distributions import chi2_quantile, chi2_tail
-from fes_pin.infer.fits import more_degrees
+from fes_pin.infer.fits import F, more_degrees
 from fes_pin.infer.levels import CONFIDENCE_95
-from fes_pin.infer.search import Fitted
 from fes_pin.workers import in_parallel
-
-F = TypeVar("F", bound=Fitted)
 
 
 def refined_form(base: LikelihoodFit, measured: Mapping[str, np.ndarray]) -> LikelihoodFit | None:
