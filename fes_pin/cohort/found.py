@@ -33,16 +33,12 @@ def find_studies(places: Sequence[Path]) -> dict[str, Path]:
 
 
 def _named(folders: Sequence[Path]) -> dict[str, Path]:
-    parts = [[p for p in f.parts if p not in ("/", "\\")] for f in folders]
-    depth = [1] * len(folders)
-    while True:
-        names = ["-".join(p[-d:]) or "study" for p, d in zip(parts, depth, strict=True)]
-        count = Counter(names)
-        again = [k for k, n in enumerate(names) if count[n] > 1 and depth[k] < len(parts[k])]
-        if not again:
-            return {_unique(n, k, count): f for k, (n, f) in enumerate(zip(names, folders, strict=True))}
-        for k in again:
-            depth[k] += 1
+    parts = [tuple(p for p in f.parts if p not in ("/", "\\")) for f in folders]
+    count = Counter(own[-d:] for own in parts for d in range(1, len(own) + 1))
+    ends = [next((own[-d:] for d in range(1, len(own)) if count[own[-d:]] == 1), own) for own in parts]
+    names = ["-".join(end) or "study" for end in ends]
+    many = Counter(names)
+    return {_unique(n, k, many): f for k, (n, f) in enumerate(zip(names, folders, strict=True))}
 
 
 def _unique(name: str, number: int, count: Counter[str]) -> str:

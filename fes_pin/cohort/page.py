@@ -1,11 +1,10 @@
 """The page of a cohort: which causes in which studies, what is common to them, and each study's own report."""
 
 import math
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import Any
 
-from fes_pin.cohort.pool import pooled
+from fes_pin.cohort.tables import Row, by_parameter
 from fes_pin.data.provenance import Provenance, today, versions
 from fes_pin.identify.error_measures import E_WORDS
 from fes_pin.infer.levels import CONFIDENCE_95
@@ -25,7 +24,6 @@ from fes_pin.view.page import (
 )
 from fes_pin.view.sections import answers, provenance_parts, stage_mark
 
-PageRow = Mapping[str, Any]
 FOREST = 40
 """Studies of one forest plot; of more only the pooled value is drawn."""
 MODELS = (
@@ -36,27 +34,21 @@ MODELS = (
 """Words about the errors of studies."""
 
 
-def cohort_html(
-    studies: Sequence[PageRow],
-    causes: Sequence[PageRow],
-    pooled_: Sequence[PageRow],
-    prevalence: Sequence[PageRow],
-    seed: int,
-    command: str = "",
-) -> str:
-    """The page, complete in one file; it links the reports that lie next to it."""
+def cohort_html(tables: Mapping[str, Sequence[Row]], seed: int, command: str = "") -> str:
+    """The page of the tables of a cohort, complete in one file; it links the reports that lie next to it."""
+    studies, prevalence = tables["studies"], tables["prevalence"]
     good = [r for r in studies if r["verdict"] != "failed"]
     parts = [
         _head(studies, good, prevalence),
         section("Which causes, and in how many studies", *_prevalence(prevalence, len(good))),
-        section("How large they are in the population", *_pooled(causes, pooled_)),
+        section("How large they are in the population", *_pooled(tables["causes"], tables["pooled"])),
         section("Studies", *_studies(studies)),
         section("Where this comes from", *provenance_parts(Provenance(today(), versions(), {}, seed, command))),
     ]
     return document("Cohort", parts)
 
 
-def _head(studies: Sequence[PageRow], good: Sequence[PageRow], prevalence: Sequence[PageRow]) -> Markup:
+def _head(studies: Sequence[Row], good: Sequence[Row], prevalence: Sequence[Row]) -> Markup:
     counts = Counter(r["verdict"] for r in good)
     failed = len(studies) - len(good)
     if prevalence:
@@ -82,7 +74,7 @@ def _head(studies: Sequence[PageRow], good: Sequence[PageRow], prevalence: Seque
     )
 
 
-def _prevalence(rows: Sequence[PageRow], studies: int) -> list[Markup]:
+def _prevalence(rows: Sequence[Row], studies: int) -> list[Markup]:
     if not rows:
         return [element("p", "None.")]
     found = ("share [95 %]", "median gain", "only cause in its set in", "false discovery rate below 5 % in")
@@ -106,7 +98,7 @@ def _prevalence(rows: Sequence[PageRow], studies: int) -> list[Markup]:
     return [html_table(head, cells, (2, 3, 4, 5, 6)), element("p", words, class_="soft")]
 
 
-def _pooled(causes: Sequence[PageRow], rows: Sequence[PageRow]) -> list[Markup]:
+def _pooled(causes: Sequence[Row], rows: Sequence[Row]) -> list[Markup]:
     if not rows:
         return [element("p", "No value is known from two studies or more.")]
     words = (
@@ -117,18 +109,17 @@ def _pooled(causes: Sequence[PageRow], rows: Sequence[PageRow]) -> list[Markup]:
     )
     head = ("of", "parameter", "studies", "mean [95 %]", "tau", "next study [95 %]", "I²", "all alike")
     out = [element("p", words, class_="soft"), html_table(head, [_pooled_cells(r) for r in rows], (2, 3, 4, 5, 6, 7))]
-    values: dict[tuple[str, str], list[PageRow]] = defaultdict(list)
-    for row in causes:
-        values[row["cause"], row["parameter"]].append(row)
+    means = {(r["cause"], r["parameter"]): r for r in rows}
     drawn, shown = [], set()
-    for (cause, parameter), many in values.items():
+    for (cause, parameter), many in by_parameter(causes).items():
         if len(many) > 1 and cause not in shown:
             shown.add(cause)  # the first parameter is what gives a cause its size
-            drawn.append(figure(_forest(parameter, many), f"{cause}, {parameter}", file=f"{cause}_{parameter}"))
+            forest = _forest(parameter, many, means.get((cause, parameter)))
+            drawn.append(figure(forest, f"{cause}, {parameter}", file=f"{cause}_{parameter}"))
     return [*out, element("div", joined(drawn), class_="grid")] if drawn else out
 
 
-def _pooled_cells(r: PageRow) -> list[Content]:
+def _pooled_cells(r: Row) -> list[Content]:
     error = (r["high"] - r["low"]) / 4.0
     bounds = [rounded(r[n], error) for n in ("next_low", "next_high") if math.isfinite(r[n])]
     return [
@@ -143,7 +134,7 @@ def _pooled_cells(r: PageRow) -> list[Content]:
     ]
 
 
-def _forest(parameter: str, rows: Sequence[PageRow]) -> Drawing:
+def _forest(parameter: str, rows: Sequence[Row], mean: Row | None) -> Drawing:
     """Values of a parameter study by study with their 95 % intervals, and the pooled mean below."""
     known = [r for r in rows if math.isfinite(r["value"])]
     drawn = [r for r in known if math.isfinite(r["std"])] if len(known) <= FOREST else []
@@ -151,13 +142,12 @@ def _forest(parameter: str, rows: Sequence[PageRow]) -> Drawing:
     for r in drawn:
         half = CONFIDENCE_95 * r["std"]
         lines.append((r["study"], r["value"], r["value"] - half, r["value"] + half, "measured"))
-    mean = pooled([r["value"] for r in known], [r["std"] for r in known])
     if mean is not None:
-        lines.append(("pooled", mean.mean, mean.low, mean.high, "extended"))
+        lines.append(("pooled", mean["mean"], mean["low"], mean["high"], "extended"))
     return intervals_drawing(lines, parameter)
 
 
-def _studies(rows: Sequence[PageRow]) -> list[Markup]:
+def _studies(rows: Sequence[Row]) -> list[Markup]:
     head = ("study", "verdict", "causes", "E free", "E ahead", "left")
     cells: list[list[Content]] = []
     for r in rows:
@@ -175,7 +165,7 @@ def _studies(rows: Sequence[PageRow]) -> list[Markup]:
     ]
 
 
-def _errors(row: PageRow, name: str) -> str:
+def _errors(row: Row, name: str) -> str:
     """E of the nominal and of the extended model; of one alone where both are the same."""
     pair = [percent(row[f"{model}_{name}_percent"]) for model in ("nominal", "extended")]
     return " \u2192 ".join(dict.fromkeys(pair))

@@ -31,7 +31,7 @@ class PooledEffect:
 
     Attributes
     ----------
-    count
+    studies
         Number of studies.
     mean, low, high
         Of the population's mean, with its 95 % interval.
@@ -45,7 +45,7 @@ class PooledEffect:
         p-value that all studies have one value (Cochran's Q).
     """
 
-    count: int
+    studies: int
     mean: float
     low: float
     high: float
@@ -81,7 +81,7 @@ def pooled(values: Sequence[float], stds: Sequence[float]) -> PooledEffect | Non
     reach = float(t.ppf(0.975, k - 2)) * math.hypot(math.sqrt(square), error) if k > 2 else math.inf
     q = _cochran(y, s, 0.0)
     return PooledEffect(
-        count=k,
+        studies=k,
         mean=mu * size,
         low=(mu - half) * size,
         high=(mu + half) * size,
@@ -103,9 +103,7 @@ def _between(y: np.ndarray, s: np.ndarray) -> float:
     wanted = len(y) - 1.0
     if _cochran(y, s, 0.0) <= wanted:
         return 0.0
-    most = float(np.var(y, ddof=1)) + 1e-12
-    while _cochran(y, s, most) > wanted:
-        most *= 2.0
+    most = 2.0 * float(np.var(y, ddof=1))  # the sum is at most k - 1 from the variance of y on
     return float(brentq(lambda x: _cochran(y, s, x) - wanted, 0.0, most, xtol=1e-14))
 
 

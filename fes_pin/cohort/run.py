@@ -1,7 +1,7 @@
 """A cohort from its studies to its tables and its page; a run that was killed goes on where it was."""
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,7 +9,7 @@ from typing import Any
 
 from fes_pin.cohort.cluster import on_cluster
 from fes_pin.cohort.found import find_studies
-from fes_pin.cohort.keep import STATE, Kept, Store
+from fes_pin.cohort.keep import STATE, Store
 from fes_pin.cohort.local import Task, in_processes
 from fes_pin.cohort.one import Answer, Work, diagnose_one
 from fes_pin.cohort.page import cohort_html
@@ -20,7 +20,8 @@ from fes_pin.cohort.tables import (
     nominal_rows,
     pooled_rows,
     prevalence_rows,
-    study_rows,
+    study_row,
+    with_rates,
 )
 from fes_pin.data.errors import InputError
 from fes_pin.data.outputs import Outputs
@@ -166,12 +167,15 @@ def _check_outputs(outputs: Outputs, out: Path, folders: Sequence[Path]) -> None
 
 
 def _cohort(store: Store, names: Iterable[str], catalogue: Catalogue) -> Cohort:
-    def kept() -> Iterator[Kept]:  # read again for each table: no more than one record is held
-        return (one for name in names if (one := store.get(name)) is not None)
-
-    studies, causes = study_rows(kept()), cause_rows(kept(), catalogue)
+    studies, causes, nominal = list[Row](), list[Row](), list[Row]()
+    for name in names:
+        if (one := store.get(name)) is not None:  # no more than one record is held
+            studies.append(study_row(one))
+            causes += cause_rows(one)
+            nominal += nominal_rows(one)
     good = sum(r["verdict"] != "failed" for r in studies)
-    return Cohort(studies, causes, pooled_rows(causes, nominal_rows(kept()), good), prevalence_rows(causes, good))
+    causes = with_rates(causes, good * len(catalogue.effects))
+    return Cohort(studies, causes, pooled_rows([*causes, *nominal], good), prevalence_rows(causes, good))
 
 
 def _files(made: Cohort, seed: int, command: str) -> dict[str, str | bytes]:
@@ -181,7 +185,7 @@ def _files(made: Cohort, seed: int, command: str) -> dict[str, str | bytes]:
         for suffix in SUFFIXES:
             with suppress(InputError):  # Parquet where it can be written
                 out[name + suffix] = table_bytes(columns, name + suffix)
-    out["cohort.html"] = cohort_html(made.studies, made.causes, made.pooled, made.prevalence, seed, command)
+    out["cohort.html"] = cohort_html(vars(made), seed, command)
     return out
 
 

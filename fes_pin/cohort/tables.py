@@ -9,7 +9,6 @@ from fes_pin.cohort.keep import Kept
 from fes_pin.cohort.pool import discovery_rates, pooled, share_interval
 from fes_pin.identify.error_measures import MEASURES
 from fes_pin.infer.levels import UNUSUAL_LEVEL
-from fes_pin.models.catalogue import Catalogue
 
 Row = Mapping[str, Any]
 
@@ -17,12 +16,8 @@ ERRORS = {f"{model}_{n}_percent": (model, n) for model in ("nominal", "extended"
 """Columns of errors E, by model and name in `diagnosis.json`: see `identify.error_measures`."""
 
 
-def study_rows(kept: Iterable[Kept]) -> list[Row]:
-    """Return the result of each study; its error if it failed, and None or NaN for values that were not computed."""
-    return [_study(one) for one in kept]
-
-
-def _study(one: Kept) -> Row:
+def study_row(one: Kept) -> Row:
+    """Return the result of a study; its error if it failed, and None or NaN for values that were not computed."""
     found = one.record
     return {
         "study": one.name,
@@ -41,16 +36,13 @@ def _number(value: Any) -> float:
     return math.nan if value is None else float(value)
 
 
-def cause_rows(kept: Iterable[Kept], catalogue: Catalogue) -> list[Row]:
-    """Every parameter of every cause of every study, with the false discovery rate over the cohort."""
-    rows: list[Row] = []
-    tests = 0
-    for one in kept:
-        if not one.record:
-            continue
-        tests += len(catalogue.effects)
-        for cause in one.record.get("causes", ()):
-            rows += _cause(one.name, cause)
+def cause_rows(one: Kept) -> list[Row]:
+    """Return every parameter of every cause of a study."""
+    return [row for cause in one.record.get("causes", ()) for row in _cause(one.name, cause)]
+
+
+def with_rates(rows: Sequence[Row], tests: int) -> list[Row]:
+    """Return the rows of causes with their false discovery rates; `tests` as `discovery_rates` takes them."""
     named = {(r["study"], r["cause"]): r["p_value"] for r in rows}
     rates = dict(zip(named, discovery_rates(list(named.values()), tests).tolist(), strict=True))
     return [{**r, "false_discovery_rate": rates[r["study"], r["cause"]]} for r in rows]
@@ -77,33 +69,31 @@ def _cause(study: str, cause: Mapping[str, Any]) -> list[Row]:
     ]
 
 
-def nominal_rows(kept: Iterable[Kept]) -> list[Row]:
-    """Every parameter of every extended model but those of its causes: what all studies have."""
-    out: list[Row] = []
-    for one in kept:
-        known = one.record.get("extended", {}).get("parameters", {})
-        out += [
-            {"study": one.name, "parameter": n, "value": _number(v["value"]), "std": _number(v["std"])}
-            for n, v in known.items()
-            if "." not in n
-        ]
-    return out
+def nominal_rows(one: Kept) -> list[Row]:
+    """Return every parameter of an extended model but those of its causes: what all studies have."""
+    known = one.record.get("extended", {}).get("parameters", {})
+    return [
+        {"cause": "", "parameter": n, "value": _number(v["value"]), "std": _number(v["std"])}
+        for n, v in known.items()
+        if "." not in n
+    ]
 
 
-def pooled_rows(causes: Sequence[Row], nominal: Sequence[Row], studies: int) -> list[Row]:
-    """Pooled values of every parameter that at least two studies have; causes first."""
+def by_parameter(rows: Iterable[Row]) -> dict[tuple[str, str], list[Row]]:
+    """Return rows by cause and parameter."""
     groups: dict[tuple[str, str], list[Row]] = defaultdict(list)
-    for row in causes:
+    for row in rows:
         groups[row["cause"], row["parameter"]].append(row)
-    for row in nominal:
-        groups["", row["parameter"]].append(row)
+    return groups
+
+
+def pooled_rows(rows: Iterable[Row], studies: int) -> list[Row]:
+    """Return pooled values of every parameter of causes, and nominal, that at least two studies have; causes first."""
     out: list[Row] = []
-    for (cause, parameter), rows in groups.items():
-        found = pooled([r["value"] for r in rows], [r["std"] for r in rows])
-        if found is None:
-            continue
-        known = {n: v for n, v in vars(found).items() if n != "count"}
-        out.append({"cause": cause, "parameter": parameter, "studies": found.count, "of": studies, **known})
+    for (cause, parameter), many in by_parameter(rows).items():
+        found = pooled([r["value"] for r in many], [r["std"] for r in many])
+        if found is not None:
+            out.append({"cause": cause, "parameter": parameter, "of": studies, **vars(found)})
     return sorted(out, key=lambda r: (r["cause"] == "", r["cause"]))
 
 
