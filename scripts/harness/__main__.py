@@ -43,6 +43,7 @@ def main(
     stored: Annotated[bool, typer.Option("--stored", help="Run nothing: the store's answers, of any code.")] = False,
     compare: Annotated[Path | None, typer.Option(help="Another store: both on the same studies.")] = None,
     check: Annotated[bool, typer.Option("--check", help="Exit code 1 if worse than the committed page.")] = False,
+    regression: Annotated[bool, typer.Option("--regression", help="The answers of a ten-line regression.")] = False,
     onto_page: Annotated[bool, typer.Option("--page", help="Write the counts into docs/accuracy.md.")] = False,
 ) -> None:
     """Hide known causes in studies, and count what the answers make of them."""
@@ -52,10 +53,14 @@ def main(
     bad = False
     for name in generators:
         items = planned(name, count, seed, nulls, only or [])
-        label = Path(name).name
+        label = Path(name).name + page.BY_REGRESSION * regression
         file = store / f"{label}.jsonl" if store else None
         known = rows_of(file, None)
-        rows = [known[i.key] for i in items if i.key in known] if stored else run(name, items, file, studies, workers)
+        rows = (
+            [known[i.key] for i in items if i.key in known]
+            if stored
+            else run(name, items, file, studies, workers, regression)
+        )
         typer.echo(f"\n{label}\n\n{shown(rows)}")
         if compare:
             typer.echo("\n".join(["", *compared(rows, rows_of(compare / f"{label}.jsonl", None))]))
@@ -66,7 +71,11 @@ def main(
         if onto_page:
             if len(rows) < len(items):
                 raise typer.BadParameter(f"{label}: {len(rows)} of {len(items)} studies have an answer in the store")
-            command = f"scripts/accuracy {name} --count {count} --seed {seed}" + " --nulls" * nulls
+            command = (
+                f"scripts/accuracy {name} --count {count} --seed {seed}"
+                + " --nulls" * nulls
+                + " --regression" * regression
+            )
             page.write(label, command, rows)
     if bad:
         raise typer.Exit(1)

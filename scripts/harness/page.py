@@ -13,6 +13,10 @@ from harness.table import HEAD, counts, interval, lines_of, table
 
 DOCS = Path(__file__).parents[2] / "docs"
 DATA, PAGE = DOCS / "data" / "accuracy.json", DOCS / "accuracy.md"
+JOINT = ("inertia_scale", "damping")
+"""Parameters whose errors the page shows."""
+BY_REGRESSION = ", regression"
+"""What stands behind the name of a generator whose studies were answered by regression."""
 BEGIN, END = "<!-- written by scripts/accuracy --page -->", "<!-- end -->"
 
 
@@ -32,8 +36,9 @@ def write(name: str, command: str, rows: Sequence[Row]) -> None:
     """
     (code,) = {row.code for row in rows}
     data = {**read(), name: {"command": command, "code": code[:12], **counts(rows)}}
-    order = [*GENERATORS, *sorted(data.keys() - GENERATORS.keys())]
-    data = {known: data[known] for known in order if known in data}
+    known = [one for name in GENERATORS for one in (name, name + BY_REGRESSION)]
+    order = [*known, *sorted(data.keys() - {*known})]
+    data = {one: data[one] for one in order if one in data}
     DATA.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
     PAGE.write_text(with_tables(PAGE.read_text(encoding="utf-8"), data), encoding="utf-8")
 
@@ -54,6 +59,7 @@ def tables(data: Mapping[str, Any]) -> str:
         "without an answer",
         "95 % intervals that hold the truth",
         "error E, nominal to extended",
+        "inertia, damping off by",
         "processor time",
     )
     return "\n\n".join([table(("generator", *HEAD), lines), table(head, runs)])
@@ -66,5 +72,6 @@ def _measured(found: Mapping[str, Any]) -> list[str | int]:
         found["unanswered"],
         interval(held, count) if count else "",
         f"{errors[0]:g} to {errors[1]:g} %" if errors else "",
+        ", ".join(f"{found['off'][name][1]:g} %" for name in JOINT if name in found["off"]),
         f"{found['cpu_s']:g} s",
     ]

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import fes_pin as fp
 from fes_pin.data.sources import code_hash
+from harness import regression as regressions
 from harness.generator import Item, Truth, generator_of
 from harness.row import Row, judged
 
@@ -36,7 +37,9 @@ def rows_of(file: Path | None, code: str | None) -> dict[str, Row]:
     return {row.key: row for row in rows if code in (None, row.code)}
 
 
-def run(name: str, items: Sequence[Item], store: Path | None, studies: Path | None, workers: int) -> list[Row]:
+def run(
+    name: str, items: Sequence[Item], store: Path | None, studies: Path | None, workers: int, regression: bool = False
+) -> list[Row]:
     """Answers to the studies of a generator, in their order; those that the store has of this code are not made again.
 
     Parameters
@@ -47,11 +50,13 @@ def run(name: str, items: Sequence[Item], store: Path | None, studies: Path | No
         File of one line an answer; nothing is stored without.
     studies
         Folder where the studies are kept, and taken from where they are there; by default none is kept.
+    regression
+        The answers are those of `harness.regression` instead of the package's.
     """
-    done = rows_of(store, code_hash())
+    done = rows_of(store, _code(regression))
     todo = [item for item in items if item.key not in done]
     began = time.monotonic()
-    for count, row in enumerate(_answers(name, todo, studies, workers), 1):
+    for count, row in enumerate(_answers(name, todo, studies, workers, regression), 1):
         done[row.key] = row
         if store:
             store.parent.mkdir(parents=True, exist_ok=True)
@@ -63,16 +68,23 @@ def run(name: str, items: Sequence[Item], store: Path | None, studies: Path | No
     return [done[item.key] for item in items]
 
 
-def _answers(name: str, todo: Sequence[Item], studies: Path | None, workers: int) -> Iterable[Row]:
+def _code(regression: bool) -> str:
+    """Hash of the code that answers."""
+    if not regression:
+        return code_hash()
+    return hashlib.sha256(Path(regressions.__file__).read_bytes()).hexdigest()
+
+
+def _answers(name: str, todo: Sequence[Item], studies: Path | None, workers: int, regression: bool) -> Iterable[Row]:
     if workers < 2:
-        yield from (answered(name, item, studies) for item in todo)
+        yield from (answered(name, item, studies, regression) for item in todo)
         return
     with ProcessPoolExecutor(workers) as pool:
-        for one in as_completed([pool.submit(answered, name, item, studies) for item in todo]):
+        for one in as_completed([pool.submit(answered, name, item, studies, regression) for item in todo]):
             yield one.result()
 
 
-def answered(name: str, item: Item, studies: Path | None = None) -> Row:
+def answered(name: str, item: Item, studies: Path | None = None, regression: bool = False) -> Row:
     """Make a study, or read it where it was made before, ask for its answer, and judge that."""
     generator = generator_of(name)
     with ExitStack() as stack:
@@ -84,11 +96,11 @@ def answered(name: str, item: Item, studies: Path | None = None) -> Row:
             fp.write_study(study, folder)
             (folder / TRUTH).write_text(json.dumps(asdict(truth)), encoding="utf-8")
         truth = Truth(**json.loads((folder / TRUTH).read_text(encoding="utf-8")))
-        known = {"study": _hashed(folder), "code": code_hash()}
+        known = {"study": _hashed(folder), "code": _code(regression)}
         study = fp.read_study(folder)
         began = time.process_time()
         try:
-            found = generator.ask(study)
+            found = regressions.regressed(study) if regression else generator.ask(study)
         except Exception as error:
             said = f"{type(error).__name__}: {error}"
             return Row(item.key, item.hidden, truth.part or item.part, item.outside, error=said, **known)
