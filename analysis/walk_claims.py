@@ -24,7 +24,7 @@ from fes_pin.body.measured_walk import data_folder
 from fes_pin.body.passive import PassiveLegs
 from fes_pin.data.errors import InputError
 from fes_pin.data.motion import read_coordinates, read_ground_reaction
-from fes_pin.walk.dynamics import about, centre_of_mass, required
+from fes_pin.walk.dynamics import about
 from fes_pin.walk.motion import motion_of, pelvis_to_hip
 from fes_pin.walk.plates import plates_of
 
@@ -55,8 +55,8 @@ def walk(columns_of, side="right"):
 
 
 def residual(motion, plates):
-    centre = centre_of_mass(motion)
-    return about(plates.total, centre) - about(required(motion), centre)
+    centre = motion.centre
+    return about(plates.total, centre) - about(motion.required, centre)
 
 
 def free():
@@ -97,8 +97,8 @@ for side in ("left", "right"):
     for foot, rows in pressed.single_supports():
         if foot == side:
             rooted = rooted_motion(moved, coordinates, rows)
-            centre = centre_of_mass(moved)[rows]
-            standing.append(about(pressed.total[rows], centre) - about(required(rooted), centre))
+            centre = moved.centre[rows]
+            standing.append(about(pressed.total[rows], centre) - about(rooted.required, centre))
 row("19 joints on a resting forefoot", np.concatenate(standing))
 
 # %% The foot in two parts
@@ -215,7 +215,7 @@ print("all joints together, percent: " + ", ".join(f"{n} {v:.1f}" for n, v in to
 # Muscles were not recorded: where they pull, nothing tells their torque from the passive one. What can be said is how
 # much of the measured torque the published passive legs would be.
 torque, _ = joint_torques(motion, plates.feet)
-names = list(motion.joint_names)
+names = list(motion.body.joint_names)
 passive = np.array([PassiveLegs().torque(q, names) for q in motion.q[:, 7:]])
 print("\npassive torque of healthy legs (Riener and Edrich) in the measured one; swing: the foot carries no load")
 print(f"{'joint':30s}{'torque':>9s}{'passive':>9s}{'explained, %':>14s}{'correlation':>13s}")
@@ -234,8 +234,8 @@ print(
 # %% The picture
 OUT.mkdir(exist_ok=True)
 figure, axes = plt.subplots(2, 2, figsize=(11, 6.4), layout="constrained")
-centre = centre_of_mass(motion)
-needed, read = about(required(motion), centre), about(plates.total, centre)
+centre = motion.centre
+needed, read = about(motion.required, centre), about(plates.total, centre)
 for panel, channel, word in ((axes[0, 0], 2, "vertical force (N)"), (axes[0, 1], 0, "forward force (N)")):
     panel.plot(motion.time, read[:, channel], color="#17191c", label="measured")
     panel.plot(motion.time, needed[:, channel], color="#d55e00", label="required by the motion")

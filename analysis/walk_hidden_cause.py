@@ -21,7 +21,7 @@ import numpy as np
 import fes_pin as fp
 from fes_pin.body.measured_walk import data_folder
 from fes_pin.view.walk_playback import show_reactions
-from fes_pin.walk.dynamics import about, centre_of_mass, required
+from fes_pin.walk.dynamics import about
 from fes_pin.walk.recording import recordings_of
 
 sys.path.insert(0, str(Path(inspect.getfile(fp)).parents[1] / "scripts"))
@@ -54,10 +54,10 @@ print(f"believed body {believed.mass_kg:.1f} kg, extended body {found.mass_kg:.1
 # %% The same walk, by the believed body and by the extended one
 (recording,) = recordings_of(study)
 motion, plates = recording.motion, recording.plates
-centre = centre_of_mass(motion)
-read, needed = about(plates.total, centre), about(required(motion), centre)
+centre = motion.centre
+read, needed = about(plates.total, centre), about(motion.required, centre)
 (again,) = recordings_of(study, body=found)
-extended = about(required(again.motion), centre)
+extended = about(again.motion.required, centre)
 
 
 def rms(values):

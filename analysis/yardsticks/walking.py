@@ -11,7 +11,8 @@ from fes_pin.body.gait import postures_of_walk
 from fes_pin.body.joints import SIDES
 from fes_pin.data.motion import OPTIONAL
 from fes_pin.data.smooth import low_pass, rates
-from fes_pin.walk.motion import Motion, has_rates
+from fes_pin.walk.dynamics import Motion
+from fes_pin.walk.motion import has_rates
 from fes_pin.walk.plates import LOADED_N
 
 
@@ -33,7 +34,7 @@ def rooted_motion(free: Motion, columns: Mapping[str, np.ndarray], rows: slice) 
     taken = {f"q_{n}": np.zeros(len(free.time)) for n in OPTIONAL}
     for name in (n for n in columns if n.startswith("q_")):
         taken[name] = columns[name] if has_rates(columns) else low_pass(columns[name], free.dt)
-    angles = np.asarray(postures_of_walk(taken, free.body.stance)[list(free.joint_names)])
+    angles = np.asarray(postures_of_walk(taken, free.body.stance)[list(free.body.joint_names)])
     q, v, a = free.q[rows].copy(), np.zeros_like(free.v[rows]), np.zeros_like(free.a[rows])
     q[:, 7:], v[:, 6:], a[:, 6:] = (each[rows] for each in (angles, *rates(angles, free.time)))
     data = free.model.createData()
@@ -69,7 +70,7 @@ def joint_torques(
     Returns
     -------
     torque
-        (n, 19) N m in the order of `motion.joint_names`.
+        (n, 19) N m in the order of `motion.body.joint_names`.
     left
         (n, 6) force and moment about the world's origin that the motion requires and no plate measured.
     """

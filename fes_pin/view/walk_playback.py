@@ -5,8 +5,7 @@ import pinocchio as pin
 
 from fes_pin.view.arrows import Arrow
 from fes_pin.view.viewer import FRAMES_A_SECOND, BodyScene
-from fes_pin.walk.dynamics import centre_of_mass, required
-from fes_pin.walk.motion import Motion
+from fes_pin.walk.dynamics import Motion
 from fes_pin.walk.plates import LOADED_N, Plates
 from fes_pin.walk.result import WalkDiagnosis
 
@@ -43,7 +42,7 @@ def show_reactions(motion: Motion, plates: Plates, caption: str = "") -> BodySce
     part = motion.part(rows)
     way = _way(motion)[rows]
     read = Arrow(*_arrow(plates.total[rows], way), READ)
-    needed = Arrow(*_arrow(required(part), way), REQUIRED)
+    needed = Arrow(*_arrow(part.required, way), REQUIRED)
     words = "ground reaction of both feet: read (black), required by the motion (orange); 1 m is 500 N"
     scene = BodyScene(motion.body, f"{caption}: {words}" if caption else words, fps=round(1.0 / (every * motion.dt)))
     scene.opacity = SEEN_THROUGH
@@ -56,9 +55,8 @@ def show_reactions(motion: Motion, plates: Plates, caption: str = "") -> BodySce
 
 def _way(motion: Motion) -> np.ndarray:
     """Return the mean path of the walk, (n, 3) m: a straight line at steady speed, on the ground."""
-    centre = centre_of_mass(motion)
     line = np.stack([np.ones_like(motion.time), motion.time - motion.time[0]], axis=1)
-    way = line @ np.linalg.lstsq(line, centre, rcond=None)[0]
+    way = line @ np.linalg.lstsq(line, motion.centre, rcond=None)[0]
     way[:, 2] = 0.0
     return way
 

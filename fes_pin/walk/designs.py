@@ -105,7 +105,7 @@ class Designs:
 
     def _turn(self, left: np.ndarray) -> None:
         turn = rotation(left, self.strides.harmonics)
-        weight = GRAVITY * sum(p[0] for p in self.as_read.trials[0].parameters.values())
+        weight = GRAVITY * sum(p[0] for p in self.as_read.trials[0].motion.parameters.values())
         means = np.r_[np.full(3, MEAN_FORCE * weight), np.full(2, MEAN_ARM_M * weight), MEAN_TWIST_NM] ** 2
         if not self.strides.whole:  # soft tissue does not return to its initial place
             means = means + np.mean(self.tissue[..., 0] ** 2, axis=0)
@@ -155,7 +155,7 @@ class Designs:
 
     def signals(self, names: Names, trial: WalkTrial) -> np.ndarray:
         """Return columns of a set along a trial: (n, 6, p)."""
-        empty = np.zeros((len(trial.centre), 6, 0))
+        empty = np.zeros((len(trial.needed), 6, 0))
         return np.concatenate([empty, *(self.forms[n].columns(trial) for n in names)], axis=2)
 
     def plausible(self, names: Names) -> np.ndarray:

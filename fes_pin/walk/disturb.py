@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from fes_pin.data.motion import TRANSLATIONS
-from fes_pin.walk.dynamics import about, centre_of_mass, required
+from fes_pin.walk.dynamics import about
 from fes_pin.walk.recording import WalkRecording
 from fes_pin.walk.strides import Strides
 
@@ -84,7 +84,7 @@ def _responses(
 
     def residual(own: dict[str, np.ndarray]) -> np.ndarray:
         motion = recording.moved(clock, {n: c + own.get(n, 0.0) for n, c in columns.items()}).part(inside)
-        return about(total - required(motion), centre_of_mass(motion))
+        return about(total - motion.required, motion.centre)
 
     base = residual({})
     return strides.first(np.stack([residual(one) - base for one in errors(list(columns), turn)], axis=2))

@@ -1,30 +1,111 @@
-"""Inverse dynamics of the whole body: the ground reaction that a motion requires, and its segments' share in it."""
+"""Motion of a body that is let go of the ground, and its inverse dynamics: the ground reaction that it requires."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
 
+from fes_pin.body.build import GRAVITY, Body
 from fes_pin.body.joints import SEGMENT_NAMES
-from fes_pin.walk.motion import Motion
 
 
-def required(motion: Motion) -> np.ndarray:
-    """Return the ground reaction that the motion requires: (n, 6) force, N, and moment about the world's origin, N m.
+def free_model(body: Body) -> pin.Model:
+    """The body's model let go of the ground: a free joint under the stance forefoot, then the 19."""
+    model = pin.buildModelFromXML(body.urdf, pin.JointModelFreeFlyer())
+    model.gravity.linear = np.array([0.0, 0.0, -GRAVITY])
+    return model
 
-    It is given by the first six rows of Pinocchio's `rnea`, the efforts of the free joint, at the world's origin.
+
+@dataclass(frozen=True)
+class Motion:
+    """A body's motion, sample by sample.
+
+    Attributes
+    ----------
+    body, model
+        The body, and its model with a free joint at the stance forefoot.
+    time
+        (n,) s.
+    q, v, a
+        (n, 26), (n, 25), (n, 25) as Pinocchio has them: the free joint in its own frame, then the joints.
     """
-    model, data = motion.model, motion.model.createData()
-    root = (pin.rnea(model, data, q, v, a)[:6] for q, v, a in zip(motion.q, motion.v, motion.a, strict=True))
-    return np.array([_root_pose(q).act(pin.Force(one)).vector for q, one in zip(motion.q, root, strict=True)])
+
+    body: Body
+    model: pin.Model = field(repr=False)
+    time: np.ndarray = field(repr=False)
+    q: np.ndarray = field(repr=False)
+    v: np.ndarray = field(repr=False)
+    a: np.ndarray = field(repr=False)
+
+    @property
+    def dt(self) -> float:
+        """Time step, s."""
+        return float(self.time[-1] - self.time[0]) / (len(self.time) - 1)
+
+    def part(self, rows: np.ndarray | slice) -> Motion:
+        """Some of the samples."""
+        return replace(self, time=self.time[rows], q=self.q[rows], v=self.v[rows], a=self.a[rows])
+
+    @cached_property
+    def required(self) -> np.ndarray:
+        """The required ground reaction: (n, 6) force, N, and moment about the world's origin, N m.
+
+        It is given by the first six rows of Pinocchio's `rnea`, the efforts of the free joint, at the world's origin.
+        """
+        model, data = self.model, self.model.createData()
+        root = (pin.rnea(model, data, q, v, a)[:6] for q, v, a in zip(self.q, self.v, self.a, strict=True))
+        return np.array([_root_pose(q).act(pin.Force(one)).vector for q, one in zip(self.q, root, strict=True)])
+
+    @cached_property
+    def centre(self) -> np.ndarray:
+        """The body's centre of mass: (n, 3) m."""
+        data = self.model.createData()
+        return np.array([pin.centerOfMass(self.model, data, q) for q in self.q])
+
+    @cached_property
+    def poses(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        """Every segment's link frame: orientation (n, 3, 3) and origin (n, 3) m in the world."""
+        model, data = self.model, self.model.createData()
+        frames = {s: model.getFrameId(s) for s in SEGMENT_NAMES}
+        turn = {s: np.empty((len(self.time), 3, 3)) for s in frames}
+        origin = {s: np.empty((len(self.time), 3)) for s in frames}
+        for k, q in enumerate(self.q):
+            pin.framesForwardKinematics(model, data, q)
+            for s, frame in frames.items():
+                turn[s][k], origin[s][k] = data.oMf[frame].rotation, data.oMf[frame].translation
+        return {s: (turn[s], origin[s]) for s in frames}
+
+    @cached_property
+    def regressors(self) -> dict[str, np.ndarray]:
+        """The required ground reaction per unit of each segment's mass parameters.
+
+        By segment, (n, 6, 10): columns m, m c (3), Ixx, Ixy, Iyy, Ixz, Iyz, Izz about the link's origin, in its axes.
+        They are the root's rows of Pinocchio's `computeJointTorqueRegressor`, carried to the world's origin.
+        """
+        model, data = self.model, self.model.createData()
+        rows = np.array(
+            [
+                _root_pose(q).toDualActionMatrix() @ pin.computeJointTorqueRegressor(model, data, q, v, a)[:6]
+                for q, v, a in zip(self.q, self.v, self.a, strict=True)
+            ]
+        )
+        return {s: rows[:, :, 10 * (j - 1) : 10 * j] for s, j in self._carriers().items()}
+
+    @cached_property
+    def parameters(self) -> dict[str, np.ndarray]:
+        """Each segment's ten mass parameters as believed, in the order of `regressors`: (10,)."""
+        return {s: self.model.inertias[j].toDynamicParameters() for s, j in self._carriers().items()}
+
+    def _carriers(self) -> dict[str, int]:
+        """Return the joint of each segment."""
+        return {s: self.model.frames[self.model.getFrameId(s)].parentJoint for s in SEGMENT_NAMES}
 
 
 def _root_pose(q: np.ndarray) -> pin.SE3:
     return pin.XYZQUATToSE3(q[:7])
-
-
-def centre_of_mass(motion: Motion) -> np.ndarray:
-    """Return the body's centre of mass: (n, 3) m."""
-    data = motion.model.createData()
-    return np.array([pin.centerOfMass(motion.model, data, q) for q in motion.q])
 
 
 def about(wrench: np.ndarray, point: np.ndarray) -> np.ndarray:
@@ -33,47 +114,3 @@ def about(wrench: np.ndarray, point: np.ndarray) -> np.ndarray:
     moved = wrench.copy()
     moved[:, 3:] -= np.cross(np.broadcast_to(arm, wrench[:, :3].shape), wrench[:, :3], axis=1)
     return moved
-
-
-def segment_poses(motion: Motion) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Return every segment's link frame: orientation (n, 3, 3) and origin (n, 3) m in the world."""
-    model, data = motion.model, motion.model.createData()
-    frames = {s: model.getFrameId(s) for s in SEGMENT_NAMES}
-    turn = {s: np.empty((len(motion.time), 3, 3)) for s in frames}
-    origin = {s: np.empty((len(motion.time), 3)) for s in frames}
-    for k, q in enumerate(motion.q):
-        pin.framesForwardKinematics(model, data, q)
-        for s, frame in frames.items():
-            turn[s][k], origin[s][k] = data.oMf[frame].rotation, data.oMf[frame].translation
-    return {s: (turn[s], origin[s]) for s in frames}
-
-
-def segment_regressors(motion: Motion) -> dict[str, np.ndarray]:
-    """Return the required ground reaction per unit of each segment's mass parameters.
-
-    It is given by the root's rows of Pinocchio's `computeJointTorqueRegressor`, carried to the world's origin.
-
-    Returns
-    -------
-    dict of ndarray
-        By segment, (n, 6, 10): columns m, m c (3), Ixx, Ixy, Iyy, Ixz, Iyz, Izz about the link's origin, in its axes.
-    """
-    model, data = motion.model, motion.model.createData()
-    rows = np.array(
-        [
-            _root_pose(q).toDualActionMatrix() @ pin.computeJointTorqueRegressor(model, data, q, v, a)[:6]
-            for q, v, a in zip(motion.q, motion.v, motion.a, strict=True)
-        ]
-    )
-    return {s: rows[:, :, 10 * (j - 1) : 10 * j] for s, j in _carriers(model).items()}
-
-
-def segment_parameters(motion: Motion) -> dict[str, np.ndarray]:
-    """Return each segment's ten mass parameters as believed, in the order of `segment_regressors`: (10,)."""
-    inertias = motion.model.inertias
-    return {s: inertias[j].toDynamicParameters() for s, j in _carriers(motion.model).items()}
-
-
-def _carriers(model: pin.Model) -> dict[str, int]:
-    """Return the joint of each segment."""
-    return {s: model.frames[model.getFrameId(s)].parentJoint for s in SEGMENT_NAMES}

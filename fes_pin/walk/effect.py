@@ -122,4 +122,4 @@ def segment_form(cause: str, site: str, parameters: tuple[str, ...], plausible: 
 
 
 def _regressed(trial: WalkTrial, change: SegmentChange) -> np.ndarray:
-    return np.sum([trial.regressors[s] @ d for s, d in change(trial.parameters).items()], axis=0)
+    return np.sum([trial.regressors[s] @ d for s, d in change(trial.motion.parameters).items()], axis=0)

@@ -10,7 +10,7 @@ from fes_pin.data.trial import Trial
 from fes_pin.infer.levels import STRONG_EVIDENCE
 from fes_pin.infer.search import SearchResult
 from fes_pin.walk.designs import Designs
-from fes_pin.walk.dynamics import about, required
+from fes_pin.walk.dynamics import about
 from fes_pin.walk.models import WalkFit, WalkModels
 from fes_pin.walk.recording import WalkRecording
 from fes_pin.walk.walk_trial import WalkTrial
@@ -73,11 +73,11 @@ def _to_make(usual: WalkRecording, speed: float) -> Trial:
 
 def _planned(usual: WalkTrial, speed: float, carried_kg: float) -> WalkTrial:
     """Return a trial at a share of the usual speed and with a load at the trunk; plates measure what it requires."""
-    motion, trunk = usual.motion, usual.parameters["trunk"]
+    motion, trunk = usual.motion, usual.motion.parameters["trunk"]
     q = motion.q if speed else np.tile(motion.q[:1], (len(motion.q), 1))
     slow = replace(motion, q=q, v=speed * motion.v, a=speed**2 * motion.a)
     load = usual.regressors["trunk"] @ (carried_kg * trunk / trunk[0])
-    needed = required(slow) + about(load, -usual.centre)
+    needed = slow.required + about(load, -motion.centre)
     shares = usual.load_shares if speed else {"left": np.zeros(len(q)), "right": np.ones(len(q))}
     feet = {side: share[:, None] * needed for side, share in shares.items()}
     loaded = {side: share > 0.0 for side, share in shares.items()}

@@ -27,7 +27,7 @@ def extended_body(models: WalkModels, best: WalkFit) -> Body:
     """
     designs = models.designs
     body = designs.recordings[0].motion.body
-    believed = designs.as_read.trials[0].parameters
+    believed = designs.as_read.trials[0].motion.parameters
     found = {s: p.copy() for s, p in believed.items()}
     for name, sizes in models.sizes(best).items():
         change = designs.forms[name].segments

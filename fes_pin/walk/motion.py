@@ -1,21 +1,20 @@
-"""Measured walking as motion of a body that is let go of the ground: Pinocchio's q, v, a in every sample."""
-
-from __future__ import annotations
+"""Measured walking as motion of the whole body, from OpenSim's coordinates."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 import pinocchio as pin
 
-from fes_pin.body.build import GRAVITY, Body
+from fes_pin.body.build import Body
 from fes_pin.body.gait import pelvis_turns, postures_of_walk
 from fes_pin.body.skeleton import TO_WORLD
 from fes_pin.data.errors import InputError
 from fes_pin.data.motion import OPTIONAL, REQUIRED
 from fes_pin.data.numbers import numbers
 from fes_pin.data.smooth import CUTOFF_HZ, low_pass, rates
+from fes_pin.walk.dynamics import Motion, free_model
 
 PELVIS_TO_HIP = np.array([-0.0402431, -0.0376247, 0.0475290])
 """Right hip centre in OpenSim's pelvis, in standing heights: gait2354 scaled to an adult of 1.80 m."""
@@ -48,49 +47,6 @@ class Session:
 
 OVER_GROUND = Session()
 """Without a treadmill, at the usual low pass."""
-
-
-def free_model(body: Body) -> pin.Model:
-    """The body's model let go of the ground: a free joint under the stance forefoot, then the 19."""
-    model = pin.buildModelFromXML(body.urdf, pin.JointModelFreeFlyer())
-    model.gravity.linear = np.array([0.0, 0.0, -GRAVITY])
-    return model
-
-
-@dataclass(frozen=True)
-class Motion:
-    """A body's motion, sample by sample.
-
-    Attributes
-    ----------
-    body, model
-        The body, and its model with a free joint at the stance forefoot.
-    time
-        (n,) s.
-    q, v, a
-        (n, 26), (n, 25), (n, 25) as Pinocchio has them: the free joint in its own frame, then the joints.
-    """
-
-    body: Body
-    model: pin.Model = field(repr=False)
-    time: np.ndarray = field(repr=False)
-    q: np.ndarray = field(repr=False)
-    v: np.ndarray = field(repr=False)
-    a: np.ndarray = field(repr=False)
-
-    @property
-    def dt(self) -> float:
-        """Time step, s."""
-        return float(self.time[-1] - self.time[0]) / (len(self.time) - 1)
-
-    @property
-    def joint_names(self) -> tuple[str, ...]:
-        """The 19 joints in the order of `q[:, 7:]`."""
-        return tuple(self.model.names[2:])
-
-    def part(self, rows: np.ndarray | slice) -> Motion:
-        """Some of the samples."""
-        return replace(self, time=self.time[rows], q=self.q[rows], v=self.v[rows], a=self.a[rows])
 
 
 def pelvis_to_hip(body: Body, table: Mapping | None = None) -> np.ndarray:

@@ -5,8 +5,7 @@ from scipy.ndimage import uniform_filter1d
 
 from fes_pin.body.joints import SIDES
 from fes_pin.data.errors import InputError
-from fes_pin.walk.dynamics import centre_of_mass, required, segment_poses
-from fes_pin.walk.motion import Motion
+from fes_pin.walk.dynamics import Motion
 from fes_pin.walk.plates import LOADED_N, Plates, stretches
 
 FAR_M = 1.5
@@ -38,10 +37,9 @@ def check_together(motion: Motion, plates: Plates) -> None:
     up = plates.total[:, 2]
     if np.mean(up) < 0.0:
         raise InputError(f"the ground pushes up: the mean vertical force is {np.mean(up):.0f} N", column="r_Fy")
-    centre = centre_of_mass(motion)
     for side in SIDES:
         rows = plates.loaded[side]
-        apart = np.linalg.norm((plates.pressure[side] - centre)[rows, :2], axis=1)
+        apart = np.linalg.norm((plates.pressure[side] - motion.centre)[rows, :2], axis=1)
         if len(apart) and np.median(apart) > FAR_M:
             raise InputError(
                 f"the {side} foot's centre of pressure lies {np.median(apart):.3g} m from the body: expected m, in the "
@@ -56,9 +54,8 @@ def _check_sides(motion: Motion, plates: Plates) -> None:
     supports = plates.single_supports()
     if not supports:
         return
-    poses = segment_poses(motion)
     above = {name: "shank" if name == motion.body.stance else "hindfoot" for name in SIDES}  # links begin at the joint
-    ankles = {name: poses[f"{name}_{link}"][1] for name, link in above.items()}  # towards the ground
+    ankles = {name: motion.poses[f"{name}_{link}"][1] for name, link in above.items()}  # towards the ground
 
     def apart(name: str, side: str, rows: slice) -> float:
         return float(np.sum(np.linalg.norm((ankles[name] - plates.pressure[side])[rows, :2], axis=1)))
@@ -80,7 +77,7 @@ def carried_along(motion: Motion, plates: Plates) -> slice:
         No stretch is long enough.
     """
     size = max(1, round(MEAN_S / motion.dt))
-    needed, up = (uniform_filter1d(x[:, 2], size, mode="nearest") for x in (required(motion), plates.total))
+    needed, up = (uniform_filter1d(x[:, 2], size, mode="nearest") for x in (motion.required, plates.total))
     share = up / np.maximum(needed, LOADED_N)
     in_the_air = needed < LOADED_N  # where nothing is to be carried
     carried = (share > CARRIED) & (up > LOADED_N)

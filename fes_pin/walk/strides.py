@@ -100,7 +100,7 @@ def strides_of(trials: Sequence[WalkTrial], cutoff_hz: float) -> Strides:
 
 
 def _stands(trial: WalkTrial) -> bool:
-    return bool(np.std(np.gradient(trial.centre, trial.dt, axis=0), axis=0).max() < STILL_MPS)
+    return bool(np.std(np.gradient(trial.motion.centre, trial.motion.dt, axis=0), axis=0).max() < STILL_MPS)
 
 
 def _phase(time: np.ndarray, contacts: Mapping[str, np.ndarray]) -> np.ndarray:

@@ -5,15 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from fes_pin.walk.dynamics import (
-    about,
-    centre_of_mass,
-    required,
-    segment_parameters,
-    segment_poses,
-    segment_regressors,
-)
-from fes_pin.walk.motion import Motion
+from fes_pin.walk.dynamics import Motion, about
 from fes_pin.walk.plates import Plates
 
 
@@ -34,14 +26,9 @@ class WalkTrial:
     plates: Plates = field(repr=False)
 
     @cached_property
-    def centre(self) -> np.ndarray:
-        """The believed centre of mass: (n, 3) m."""
-        return centre_of_mass(self.motion)
-
-    @cached_property
     def needed(self) -> np.ndarray:
         """The reaction that the motion requires: (n, 6)."""
-        return about(required(self.motion), self.centre)
+        return about(self.motion.required, self.motion.centre)
 
     @cached_property
     def residual(self) -> np.ndarray:
@@ -51,18 +38,18 @@ class WalkTrial:
     @cached_property
     def measured(self) -> np.ndarray:
         """Both feet together: (n, 6)."""
-        return about(self.plates.total, self.centre)
+        return about(self.plates.total, self.motion.centre)
 
     @cached_property
     def rate(self) -> np.ndarray:
         """How fast the plates' reading changes, about the centre of mass where it is: (n, 6) per s."""
         read = about(self.plates.total, self.plates.way)
-        return about(np.gradient(read, self.dt, axis=0), self.centre - self.plates.way)
+        return about(np.gradient(read, self.motion.dt, axis=0), self.motion.centre - self.plates.way)
 
     @cached_property
     def feet(self) -> dict[str, np.ndarray]:
         """Measured reaction of each foot: (n, 6)."""
-        return {side: about(wrench, self.centre) for side, wrench in self.plates.feet.items()}
+        return {side: about(wrench, self.motion.centre) for side, wrench in self.plates.feet.items()}
 
     @cached_property
     def load_shares(self) -> dict[str, np.ndarray]:
@@ -83,25 +70,10 @@ class WalkTrial:
 
     @cached_property
     def regressors(self) -> dict[str, np.ndarray]:
-        """By segment, (n, 6, 10); see `segment_regressors`."""
-        return {s: about(y, self.centre) for s, y in segment_regressors(self.motion).items()}
-
-    @cached_property
-    def parameters(self) -> dict[str, np.ndarray]:
-        """By segment, (10,): the believed mass parameters."""
-        return segment_parameters(self.motion)
-
-    @cached_property
-    def poses(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-        """Every segment's orientation and origin; see `segment_poses`."""
-        return segment_poses(self.motion)
-
-    @property
-    def dt(self) -> float:
-        """Time step, s."""
-        return self.motion.dt
+        """By segment, (n, 6, 10); see `Motion.regressors`; moments about the believed centre of mass."""
+        return {s: about(y, self.motion.centre) for s, y in self.motion.regressors.items()}
 
     def force_at(self, point: np.ndarray, direction: np.ndarray) -> np.ndarray:
         """Return the wrench of 1 N along world directions at points: (n, 6); `point`, `direction` (n, 3)."""
         along = np.broadcast_to(direction, point.shape)
-        return np.hstack([along, np.cross(point - self.centre, along)])
+        return np.hstack([along, np.cross(point - self.motion.centre, along)])

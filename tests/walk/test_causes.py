@@ -68,7 +68,7 @@ def test_the_columns_of_a_cause_take_it_away(gait, clean, tmp_path, cause, site,
 def test_a_force_at_the_pelvis_acts_midway_between_the_hips(clean):
     from fes_pin.walk.effects.external_force import place_of
 
-    origin, thigh = clean.poses["pelvis"][1], clean.poses["left_thigh"][1]  # both hips, on a right foot
+    origin, thigh = clean.motion.poses["pelvis"][1], clean.motion.poses["left_thigh"][1]  # both hips, on a right foot
     apart = clean.motion.body.height_m * 0.095
     assert np.allclose(np.linalg.norm(origin - thigh, axis=1), apart, rtol=1e-3)
     point = place_of(clean, "pelvis")

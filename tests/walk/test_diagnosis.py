@@ -15,7 +15,6 @@ from fes_pin.cohort.one import Work, diagnose_one
 from fes_pin.data.study import read_study
 from fes_pin.view.report import report_html
 from fes_pin.walk.diagnosis import diagnose_walk
-from fes_pin.walk.dynamics import required, segment_parameters
 from fes_pin.walk.extended import extended_body, with_segments
 from fes_pin.walk.likelihood import WalkNoise, fit_walk
 from fes_pin.walk.motion import motion_of
@@ -189,15 +188,13 @@ def test_the_measured_walk_is_honestly_unexplained(walk, tmp_path):
 
 def test_the_extended_body_requires_what_the_column_says(measured, hip):
     motion, columns = measured
-    parameters = segment_parameters(motion)
+    parameters = motion.parameters
     heavier = with_segments(motion.body, {"trunk": 1.1 * parameters["trunk"]})
     assert isinstance(heavier, Body)
     assert heavier.mass_kg == pytest.approx(motion.body.mass_kg + 0.1 * parameters["trunk"][0])
     moved = motion_of(heavier, motion.time, columns, hip)
-    from fes_pin.walk.dynamics import segment_regressors
-
-    column = segment_regressors(motion)["trunk"] @ parameters["trunk"]
-    assert np.abs(required(moved) - required(motion) - 0.1 * column).max() < 1e-6
+    column = motion.regressors["trunk"] @ parameters["trunk"]
+    assert np.abs(moved.required - motion.required - 0.1 * column).max() < 1e-6
 
 
 def test_the_extended_body_is_the_diagnosiss(heavy):

@@ -10,14 +10,7 @@ from yardsticks.walking import joint_torques, pressure_and_free_moment, rooted_m
 from fes_pin.body.build import Body
 from fes_pin.body.skeleton import TO_WORLD
 from fes_pin.data.errors import InputError
-from fes_pin.walk.dynamics import (
-    about,
-    centre_of_mass,
-    required,
-    segment_parameters,
-    segment_poses,
-    segment_regressors,
-)
+from fes_pin.walk.dynamics import about
 from fes_pin.walk.motion import PELVIS_TO_HIP, Session, motion_of
 
 pytestmark = pytest.mark.shared
@@ -71,7 +64,7 @@ def own_centre_accelerations(motion, segment):
 def test_where_the_models_agree_segments_push_as_simbodys(measured, tracks):
     """Trunk, pelvis and thighs are the same bodies on the same joints: their share of the force is to 1 N RMS."""
     motion, _ = measured
-    masses = {s: p[0] for s, p in segment_parameters(motion).items()}
+    masses = {s: p[0] for s, p in motion.parameters.items()}
     share = sum(masses[ours] * (own_centre_accelerations(motion, ours) - tracks[theirs][3])
                 for ours, theirs in CARRIERS.items())  # fmt: skip
     assert (rms(share) < 0.1).all()  # measured: 0.001 N
@@ -80,10 +73,10 @@ def test_where_the_models_agree_segments_push_as_simbodys(measured, tracks):
 def test_the_rest_of_the_required_force_is_the_sliding_knee(measured, simbody, tracks):
     """Below the knee OpenSim's shank slides and its toes turn about an oblique axis: that is the whole difference."""
     motion, _ = measured
-    ours = required(motion)
+    ours = motion.required
     off = ours[:, :3] - simbody[:, :3]
     assert (rms(off) < [4.0, 1.0, 3.0]).all()  # measured: 3.7, 0.7, 2.8 N
-    masses = {s: p[0] for s, p in segment_parameters(motion).items()}
+    masses = {s: p[0] for s, p in motion.parameters.items()}
     below = 0.0
     for segment, theirs in SLIDING.items():
         turn, omega, alpha, acc, _ = tracks[theirs]
@@ -104,7 +97,7 @@ def test_the_rest_of_the_required_force_is_the_sliding_knee(measured, simbody, t
 def test_required_reaction_does_not_depend_on_the_foot_that_the_tree_stands_on(measured, segments, hip):
     motion, columns = measured
     other = motion_of(Body.from_segments(segments, "left"), motion.time, columns, hip)
-    assert np.abs(required(other) - required(motion)).max() < 1e-4
+    assert np.abs(other.required - motion.required).max() < 1e-4
 
 
 def test_a_belt_changes_no_force(measured, segments, hip):
@@ -112,17 +105,17 @@ def test_a_belt_changes_no_force(measured, segments, hip):
     moved = motion_of(
         Body.from_segments(segments), motion.time, columns, hip, Session(belt_speed_mps=1.135, start_s=motion.time[0])
     )
-    assert np.abs(required(moved)[:, :3] - required(motion)[:, :3]).max() < 1e-4
+    assert np.abs(moved.required[:, :3] - motion.required[:, :3]).max() < 1e-4
     way = 1.135 * (motion.time - motion.time[0])
-    assert np.allclose(centre_of_mass(moved)[:, 0] - centre_of_mass(motion)[:, 0], way, atol=1e-9)
+    assert np.allclose(moved.centre[:, 0] - motion.centre[:, 0], way, atol=1e-9)
 
 
 def test_regressors_add_up_and_are_those_of_each_segment_alone(measured):
     motion, _ = measured
     part = motion.part(slice(0, 40, 7))
-    regressors, parameters = segment_regressors(part), segment_parameters(part)
+    regressors, parameters = part.regressors, part.parameters
     total = sum(regressors[s] @ parameters[s] for s in regressors)
-    assert np.abs(total - required(part)).max() < 1e-9
+    assert np.abs(total - part.required).max() < 1e-9
     model, data = motion.model, motion.model.createData()
     joint = model.frames[model.getFrameId("trunk")].parentJoint
     for k in range(len(part.time)):
@@ -136,7 +129,7 @@ def test_joint_torques_are_opensims(with_plates, walk):
     """The lumbar joint to 1e-3 N m; in the legs OpenSim does not filter the plates, and its knee slides."""
     motion, plates = with_plates
     torque, left = joint_torques(motion, plates.feet)
-    assert np.abs(left - (required(motion) - plates.total)).max() < 1e-9
+    assert np.abs(left - (motion.required - plates.total)).max() < 1e-9
     table = np.genfromtxt(walk / "reference/grf_id_mtpfree.csv", delimiter=",", names=True)
     for ours, theirs, sign, within in (
         ("lumbar_extension", "lumbar_extension", 1, 1e-3),
@@ -147,12 +140,12 @@ def test_joint_torques_are_opensims(with_plates, walk):
         ("right_ankle_dorsiflexion", "ankle_angle_r", 1, 3.0),
     ):
         reference = sign * np.interp(motion.time, table["time"], table[f"ID_{theirs}_moment"])
-        assert rms(torque[:, motion.joint_names.index(ours)] - reference) < within, ours
+        assert rms(torque[:, motion.body.joint_names.index(ours)] - reference) < within, ours
 
 
 def test_required_reaction_in_single_support_is_near_the_plates(with_plates):
     motion, plates = with_plates
-    needed = required(motion)
+    needed = motion.required
     supports = plates.single_supports()
     assert [side for side, _ in supports] == ["left", "right", "left", "right"]
     ends = [(motion.time[rows.start], motion.time[rows.stop - 1]) for _, rows in supports]
@@ -176,15 +169,15 @@ def test_a_forefoot_that_rests_on_the_ground_costs_several_times_the_residual(wi
             continue
         rooted = rooted_motion(motion, own, rows)
         assert not rooted.v[:, :6].any()
-        com = centre_of_mass(motion)[rows]
+        com = motion.centre[rows]
         measured_here = about(plates.total[rows], com)
-        off = rms(about(required(rooted), com) - measured_here)
-        free = rms(about(required(motion)[rows], com) - measured_here)
+        off = rms(about(rooted.required, com) - measured_here)
+        free = rms(about(motion.required[rows], com) - measured_here)
         assert off[2] > 3.0 * free[2]
 
 
 def test_segment_poses_are_simbodys(measured, tracks):
-    poses = segment_poses(measured[0])
+    poses = measured[0].poses
     for ours, theirs in CARRIERS.items():
         assert np.abs(poses[ours][0] - tracks[theirs][0]).max() < 1e-5
 

@@ -35,7 +35,7 @@ class LaboratoryTilt(WalkEffect):
 
 
 def _tilted(trial: WalkTrial, axes: tuple[int, ...]) -> np.ndarray:
-    mass = sum(p[0] for p in trial.parameters.values())
-    out = np.zeros((len(trial.centre), 6, len(axes)))
+    mass = sum(p[0] for p in trial.motion.parameters.values())
+    out = np.zeros((len(trial.needed), 6, len(axes)))
     out[:, axes, range(len(axes))] = -mass * GRAVITY
     return out

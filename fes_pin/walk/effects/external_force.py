@@ -42,10 +42,10 @@ class ExternalForce(WalkEffect):
 def place_of(trial: WalkTrial, place: str) -> np.ndarray:
     """Where a force acts that is named by a place of `PLACES`: (n, 3) m."""
     segment, offset = PLACES[place]
-    turn, origin = trial.poses[segment]
+    turn, origin = trial.motion.poses[segment]
     if segment == "pelvis":  # links begin at the joint towards the ground: the pelvis's at the stance hip
         other = "left" if trial.motion.body.stance == "right" else "right"
-        origin = 0.5 * (origin + trial.poses[f"{other}_thigh"][1])
+        origin = 0.5 * (origin + trial.motion.poses[f"{other}_thigh"][1])
     return origin + turn @ np.array(offset)
 
 

@@ -27,4 +27,4 @@ class MarkerNoise(WalkEffect):
 
 
 def _smoothed(trial: WalkTrial) -> np.ndarray:
-    return -np.gradient(np.gradient(trial.needed, trial.dt, axis=0), trial.dt, axis=0)[:, :, None]
+    return -np.gradient(np.gradient(trial.needed, trial.motion.dt, axis=0), trial.motion.dt, axis=0)[:, :, None]

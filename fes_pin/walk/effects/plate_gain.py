@@ -41,4 +41,4 @@ def _part(trial: WalkTrial, side: str, axes: tuple[int, ...]) -> np.ndarray:
     if axes == AXES:
         return trial.true_feet[side]
     force = trial.true_feet[side][:, :3] * np.isin(AXES, axes)
-    return np.hstack([force, np.cross(trial.plates.pressure[side] - trial.centre, force)])
+    return np.hstack([force, np.cross(trial.plates.pressure[side] - trial.motion.centre, force)])

@@ -59,7 +59,7 @@ def _unloaded(trial: WalkTrial, sides: tuple[str, ...], axis: int) -> tuple[np.n
     """What the plates read while nobody stands on them, which is what they always read: the least of both."""
     values = []
     for side in sides:
-        free = ~near(trial.plates.loaded[side], int(np.ceil(SETTLED_S / trial.dt)))
+        free = ~near(trial.plates.loaded[side], int(np.ceil(SETTLED_S / trial.motion.dt)))
         if not free.any():
             return None
         values.append(float(np.mean(trial.feet[side][free, axis])))
