@@ -105,19 +105,14 @@ class Plan:
     why: str
     separates: tuple[str, str]
     trial: Trial | None = None
-    FILES: ClassVar[tuple[str, ...]] = ("file",)
-    """Keys of a `[[trial]]` that name `NEXT_FILE`."""
 
-    def trial_record(self) -> dict[str, Any] | None:
-        """Return the trial as JSON files have it; its columns are in `NEXT_FILE`."""
-        if (one := self.trial) is None:
-            return None
-        conditions = {n: shown(v) for n, v in one.conditions.items()}
-        return {**dict.fromkeys(self.FILES, NEXT_FILE), "kind": one.kind, **conditions}
-
-    def record(self) -> dict[str, Any]:
-        """Return the experiment as JSON files have it."""
-        return {"why": self.why, "separates": list(self.separates), "trial": self.trial_record()}
+    def record(self, files: Sequence[str] = ("file",)) -> dict[str, Any]:
+        """Return the experiment as JSON files have it; `files` are the keys of a `[[trial]]` that name `NEXT_FILE`."""
+        trial = None
+        if (one := self.trial) is not None:
+            conditions = {n: shown(v) for n, v in one.conditions.items()}
+            trial = {**dict.fromkeys(files, NEXT_FILE), "kind": one.kind, **conditions}
+        return {"why": self.why, "separates": list(self.separates), "trial": trial}
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)

@@ -11,14 +11,13 @@ import numpy as np
 
 from fes_pin.body.build import GRAVITY
 from fes_pin.infer.fits import Names
-from fes_pin.walk.disturb import compressed, disturbed_waves, misplaced, tissue, white
+from fes_pin.walk.disturb import compressed, disturbed, misplaced, tissue, white
 from fes_pin.walk.effects import walk_library
 from fes_pin.walk.likelihood import MEAN_ARM_M, MEAN_FORCE, MEAN_TWIST_NM, WalkNoise, fit_walk, rotation
 from fes_pin.walk.recording import WalkRecording
 from fes_pin.walk.strides import Strides, strides_of
 from fes_pin.walk.walk_trial import WalkTrial
 
-TISSUE_DRAWS, WHITE_DRAWS = 40, 64
 TAKEN = 0.3
 """Standard deviation of errors in the motion, as a share of a wave of the required reaction: soft tissue
 moves by 10 mm and more where a trunk moves by 20 to 40 (A. Leardini et al., Gait Posture 21:212, 2005)."""
@@ -85,17 +84,17 @@ class Designs:
     @cached_property
     def landmarks(self) -> np.ndarray:
         """Residuals by the ordinary error of each coordinate's zero: (coordinates, 6, k)."""
-        return misplaced(self._first, self.strides)
+        return disturbed(self._first, self.strides, misplaced, self.seed)
 
     @cached_property
     def tissue(self) -> np.ndarray:
         """Residuals by soft tissue: (draws, 6, k)."""
-        return disturbed_waves(self._first, self.strides, tissue, TISSUE_DRAWS, self.seed)
+        return disturbed(self._first, self.strides, tissue, self.seed)
 
     @cached_property
     def shaken(self) -> np.ndarray:
         """Residuals of a stride by white noise of one unit: (draws, 6, k)."""
-        return disturbed_waves(self._first, self.strides, white, WHITE_DRAWS, self.seed)
+        return disturbed(self._first, self.strides, white, self.seed)
 
     def turned(self, residual: np.ndarray) -> Designs:
         """Return the same with channels rotated for the residual of a set, (1, 6, k)."""

@@ -1,6 +1,6 @@
 """Changes of the residual by errors in the coordinates: soft tissue, white noise, misplaced landmarks."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import numpy as np
 
@@ -9,6 +9,8 @@ from fes_pin.walk.dynamics import about
 from fes_pin.walk.recording import WalkRecording
 from fes_pin.walk.strides import Strides
 
+TISSUE_DRAWS, WHITE_DRAWS = 40, 64
+"""Numbers of simulated errors."""
 PAD_S = 0.3
 """Time before and after a stride, so that the filter's ends do not matter."""
 TISSUE_M, TISSUE_RAD = 0.002, 0.01
@@ -25,54 +27,33 @@ segment's frame is the mean of several (U. Della Croce et al., Gait Posture 21:2
 SMALL_N = 1.0
 """Ordinary errors with a smaller residual in all waves together are left out, N or N m."""
 
-CoordinateErrors = Iterator[dict[str, np.ndarray]]
-Disturbance = Callable[[np.ndarray, bool, np.random.Generator], np.ndarray]
-"""Function of the phase in the stride, (n,), whether a coordinate is an angle, and a generator: its error, (n,)."""
+Disturbance = Callable[[np.ndarray, np.ndarray, np.random.Generator], np.ndarray]
+"""Function of the phase in the stride, (n,), of whether each coordinate is an angle, (c,), and of a generator: errors
+of the coordinates, (draws, c, n)."""
 
 
-def tissue(phase: np.ndarray, angle: bool, random: np.random.Generator) -> np.ndarray:
-    """Return an error that repeats in each stride."""
-    out = np.zeros(len(phase))
-    for h in range(1, TISSUE_WAVES + 1):
-        a, b = random.normal(size=2) / h
-        out += a * np.cos(2.0 * np.pi * h * phase) + b * np.sin(2.0 * np.pi * h * phase)
-    return (TISSUE_RAD if angle else TISSUE_M) * out
+def tissue(phase: np.ndarray, angle: np.ndarray, random: np.random.Generator) -> np.ndarray:
+    """Return errors that repeat in each stride."""
+    h = np.arange(1, TISSUE_WAVES + 1)
+    sizes = random.normal(size=(TISSUE_DRAWS, len(angle), TISSUE_WAVES, 2)) / h[:, None]
+    turn = 2.0 * np.pi * np.outer(h, phase)
+    waves = sizes[..., 0] @ np.cos(turn) + sizes[..., 1] @ np.sin(turn)
+    return np.where(angle, TISSUE_RAD, TISSUE_M)[:, None] * waves
 
 
-def white(phase: np.ndarray, angle: bool, random: np.random.Generator) -> np.ndarray:
+def white(phase: np.ndarray, angle: np.ndarray, random: np.random.Generator) -> np.ndarray:
     """Return white noise as of markers with 1 mm."""
-    return 1e-3 * random.normal(size=len(phase)) / (CLUSTER_M if angle else 1.0)
+    noise = random.normal(size=(WHITE_DRAWS, len(angle), len(phase)))
+    return 1e-3 * noise / np.where(angle, CLUSTER_M, 1.0)[:, None]
 
 
-def disturbed_waves(recording: WalkRecording, strides: Strides, kind: Disturbance, draws: int, seed: int) -> np.ndarray:
-    """Return changes of the residual's waves in the first stride by random errors of all coordinates: (draws, 6, k)."""
-    random = np.random.default_rng(seed)
-
-    def errors(names: list[str], phase: np.ndarray) -> CoordinateErrors:
-        for _ in range(draws):
-            yield {n: kind(phase, _is_angle(n), random) for n in names}
-
-    return _responses(recording, strides, errors)
+def misplaced(phase: np.ndarray, angle: np.ndarray, random: np.random.Generator) -> np.ndarray:
+    """Return the ordinary error of each coordinate's zero, one coordinate after the other."""
+    return np.diag(np.where(angle, LANDMARK_RAD, LANDMARK_M))[:, :, None] * np.ones_like(phase)
 
 
-def misplaced(recording: WalkRecording, strides: Strides) -> np.ndarray:
-    """Return changes of the residual's waves by the ordinary error of each coordinate's zero: (coordinates, 6, k)."""
-
-    def errors(names: list[str], phase: np.ndarray) -> CoordinateErrors:
-        for n in names:
-            yield {n: np.full(len(phase), LANDMARK_RAD if _is_angle(n) else LANDMARK_M)}
-
-    return _responses(recording, strides, errors)
-
-
-def _is_angle(name: str) -> bool:
-    return name.removeprefix("q_") not in TRANSLATIONS
-
-
-def _responses(
-    recording: WalkRecording, strides: Strides, errors: Callable[[list[str], np.ndarray], CoordinateErrors]
-) -> np.ndarray:
-    """Return changes of the residual's waves in the first stride by errors of the coordinates: (errors, 6, k)."""
+def disturbed(recording: WalkRecording, strides: Strides, kind: Disturbance, seed: int) -> np.ndarray:
+    """Return changes of the residual's waves in the first stride by errors of the coordinates: (draws, 6, k)."""
     _, rows, phase = strides.windows[0]
     time = recording.motion.time[rows]
     near = (recording.time >= time[0] - PAD_S) & (recording.time <= time[-1] + PAD_S)
@@ -82,12 +63,14 @@ def _responses(
     inside = (clock >= time[0] - 1e-9) & (clock <= time[-1] + 1e-9)
     total = recording.plates.total[rows]
 
-    def residual(own: dict[str, np.ndarray]) -> np.ndarray:
-        motion = recording.moved(clock, {n: c + own.get(n, 0.0) for n, c in columns.items()}).part(inside)
+    def residual(errors: np.ndarray | float) -> np.ndarray:
+        moved = dict(zip(columns, np.stack(list(columns.values())) + errors, strict=True))
+        motion = recording.moved(clock, moved).part(inside)
         return about(total - motion.required, motion.centre)
 
-    base = residual({})
-    return strides.first(np.stack([residual(one) - base for one in errors(list(columns), turn)], axis=2))
+    angle = np.array([n.removeprefix("q_") not in TRANSLATIONS for n in columns])
+    base, draws = residual(0.0), kind(turn, angle, np.random.default_rng(seed))
+    return strides.first(np.stack([residual(one) - base for one in draws], axis=2))
 
 
 def compressed(columns: np.ndarray) -> np.ndarray:

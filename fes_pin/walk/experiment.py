@@ -1,7 +1,6 @@
 """The next experiment of walking or standing: the simple trial that distinguishes two causes best."""
 
-from dataclasses import dataclass, replace
-from typing import ClassVar
+from dataclasses import replace
 
 import numpy as np
 
@@ -27,15 +26,11 @@ PLANS = {
 """Trials that are compared: share of the usual speed, and load at the trunk, kg."""
 
 
-@dataclass(frozen=True)
-class NextWalk(Plan):
-    """A trial to do next; its columns are the coordinates of the motion to make, `q_<coordinate>`."""
+def next_walk(models: WalkModels, found: SearchResult[WalkFit], cause: str) -> Plan | None:
+    """Return the trial that separates a cause from its nearest rival of another name; None if it has no rival.
 
-    FILES: ClassVar[tuple[str, ...]] = ("coordinates", "file")
-
-
-def next_walk(models: WalkModels, found: SearchResult[WalkFit], cause: str) -> NextWalk | None:
-    """Return the trial that separates a cause from its nearest rival of another name; None if it has no rival."""
+    Its columns are the coordinates of the motion to make, `q_<coordinate>`.
+    """
     designs, best = models.designs, found.best
     own = {n for n in best.names if designs.forms[n].cause == cause}
     near = [(r.criterion, set(r.names) - set(best.names), n) for n in own for r in models.near_rivals(found, n)]
@@ -56,9 +51,9 @@ def next_walk(models: WalkModels, found: SearchResult[WalkFit], cause: str) -> N
             f"{pair[0]} and {pair[1]} look alike in standing, in slower walking and under a known weight: "
             "weigh the plates with known masses, or measure the body by other means"
         )
-        return NextWalk(why, pair)
+        return Plan(why, pair)
     why = f"{words} (it separates {pair[0]} from {pair[1]} by {np.sqrt(scores[words]):.1f} standard deviations)"
-    return NextWalk(why, pair, _to_make(designs.recordings[0], PLANS[words][0]))
+    return Plan(why, pair, _to_make(designs.recordings[0], PLANS[words][0]))
 
 
 def _to_make(usual: WalkRecording, speed: float) -> Trial:

@@ -8,12 +8,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from fes_pin.infer.family import SimulatedFamily
 from fes_pin.infer.fits import Candidate, FittedSets, Names
 from fes_pin.infer.levels import POSSIBLE_SIZES, STRONG_EVIDENCE, WALK_LEVEL
 from fes_pin.infer.search import Policy, Search, SearchResult
 from fes_pin.walk.designs import Designs
 from fes_pin.walk.likelihood import Fitted, fit_many
-from fes_pin.walk.nulls import Nulls, simulated_nulls
+from fes_pin.walk.nulls import simulated_nulls
 from fes_pin.workers import check_limit
 
 POLICY = Policy(beam=4, fitted=None)
@@ -65,7 +66,9 @@ class WalkModels(FittedSets[WalkFit, None]):
     Attributes
     ----------
     null
-        Results of simulated residuals without a cause. None before the noise is known: the evidence alone decides then.
+        Family of gains without a cause. None before the noise is known: the evidence alone decides then.
+    spread
+        Scatter of the values of forms without a cause; see `simulated_nulls`.
     readings
         For forms whose parameter a trial shows directly, its value and standard deviation.
     """
@@ -73,14 +76,15 @@ class WalkModels(FittedSets[WalkFit, None]):
     def __init__(self, designs: Designs) -> None:
         super().__init__()
         self.designs = designs
-        self.null: Nulls | None = None
+        self.null: SimulatedFamily | None = None
+        self.spread: dict[str, np.ndarray] = {}
         self.most_candidates = MOST_FOR_NOISE
         self.readings = dict(_read_off(designs))
 
     def with_noise_of(self, best: WalkFit) -> WalkModels:
         """Return the same sets with channels rotated for the residual of one set, and the null in its noise."""
         other = WalkModels(self.designs.turned(self.designs.residual(best.names, best.fitted.values)))
-        other.null = simulated_nulls(other.designs, other.fit(best.names).fitted.variance)
+        other.null, other.spread = simulated_nulls(other.designs, other.fit(best.names).fitted.variance)
         other.most_candidates = FittedSets.most_candidates
         return other
 
@@ -123,7 +127,7 @@ class WalkModels(FittedSets[WalkFit, None]):
 
     def noise_p_value(self, gain: float, degrees: int) -> float:
         """Return the p-value of a gain over all forms by the simulated null; 0 before the noise is known."""
-        return float(gain <= 0.0) if self.null is None else self.null.family.p_value(gain)
+        return float(gain <= 0.0) if self.null is None else self.null.p_value(gain)
 
     def level(self, fitted: WalkFit) -> float:
         """See `WALK_LEVEL`."""
@@ -141,8 +145,7 @@ class WalkModels(FittedSets[WalkFit, None]):
     def deviations(self, one: WalkFit) -> dict[str, np.ndarray]:
         """Return their standard deviations, widened where values scatter more in simulations of soft tissue."""
         stds = np.sqrt(np.diag(one.fitted.covariance))
-        spread = self.null.spread if self.null else {}
-        return {n: v * np.maximum(spread.get(n, 1.0), 1.0) for n, v in self._by_form(one, stds)}
+        return {n: v * np.maximum(self.spread.get(n, 1.0), 1.0) for n, v in self._by_form(one, stds)}
 
     def _by_form(self, one: WalkFit, values: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
         ends = np.cumsum([len(self.designs.forms[n].parameters) for n in one.names])

@@ -1,7 +1,5 @@
 """Simulated null of a walk: distribution of the largest gain, and scatter of values, without a cause."""
 
-from dataclasses import dataclass, field
-
 import numpy as np
 
 from fes_pin.infer.family import SimulatedFamily
@@ -16,24 +14,16 @@ FLOOR_SHARE = 0.3
 """Share of the fitted noise, in amplitude, that is simulated in addition to soft tissue."""
 
 
-@dataclass(frozen=True)
-class Nulls:
-    """Results of simulated residuals without a cause.
+def simulated_nulls(designs: Designs, variance: np.ndarray) -> tuple[SimulatedFamily, dict[str, np.ndarray]]:
+    """Return results of the library on residuals without a cause, in noise of this variance, (1, 6, k).
 
-    Attributes
-    ----------
-    family
+    Returns
+    -------
+    family : SimulatedFamily
         Family of the gains in evidence of all forms.
-    spread
+    spread : dict of ndarray
         For each form, (p,) root mean square of value over standard deviation: 1 if the intervals are right.
     """
-
-    family: SimulatedFamily
-    spread: dict[str, np.ndarray] = field(repr=False)
-
-
-def simulated_nulls(designs: Designs, variance: np.ndarray) -> Nulls:
-    """Return the results of the library on residuals without a cause, in noise of this variance, (1, 6, k)."""
     drawn = _without_a_cause(designs, variance)
     none = np.zeros((*variance.shape, 0))
     alone = [f.deviance for f in fit_many(drawn, none, np.zeros(0), designs.noise, SIMULATED_ROUNDS)]
@@ -44,7 +34,7 @@ def simulated_nulls(designs: Designs, variance: np.ndarray) -> Nulls:
         best = np.maximum(best, np.subtract(alone, [f.deviance for f in fitted]))
         z = [f.values / np.sqrt(np.diag(f.covariance)) for f in fitted]
         spread[name] = np.sqrt(np.mean(np.square(z), axis=0))
-    return Nulls(SimulatedFamily(best), spread)
+    return SimulatedFamily(best), spread
 
 
 def _without_a_cause(designs: Designs, variance: np.ndarray) -> np.ndarray:

@@ -12,7 +12,6 @@ from fes_pin.infer.result import CROSS_VALIDATED, FITTED, Cause, Explained, show
 from fes_pin.infer.text import percent, probability
 from fes_pin.walk.effect import WalkEffect
 from fes_pin.walk.effects import EFFECTS
-from fes_pin.walk.experiment import NextWalk
 from fes_pin.walk.extended import extended_body
 from fes_pin.walk.judge import CHANNELS
 from fes_pin.walk.models import WalkFit, WalkModels
@@ -41,7 +40,6 @@ class WalkDiagnosis(Result):
     nominal_error: tuple[float, float | None]
     extended_error: tuple[float, float | None]
     ceiling_percent: float
-    next_experiment: NextWalk | None = None
     models: WalkModels
     best: WalkFit
     MODEL: ClassVar[str] = "the walking model"
@@ -92,7 +90,7 @@ class WalkDiagnosis(Result):
             "extended": {"parameters": parameters, "error_percent": extended},
             "noise": self._noise(),
             "ceiling_percent": shown(self.ceiling_percent),
-            "next_experiment": self.next_experiment.record() if self.next_experiment else None,
+            "next_experiment": plan.record(("coordinates", "file")) if (plan := self.next_experiment) else None,
             "cutoff_hz": self.cutoff_hz,
         }
 

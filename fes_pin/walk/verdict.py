@@ -1,7 +1,7 @@
 """The verdict on causes of a walk: those that are named, with their size, significance and equivalents."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import cache
 
 from fes_pin.infer.distributions import chi2_tail, normal_quantile
 from fes_pin.infer.held_out import is_supported
@@ -22,17 +22,10 @@ SURELY = normal_quantile(1.0 - CLAIM_LEVEL)
 """Standard deviations by which marker noise must exceed that."""
 
 
-@dataclass(frozen=True)
-class WalkWeighed(Weighed):
-    """Evidence of a walk on each form of a set; `other_leg` is its gain on the other leg, None for one leg."""
-
-    other_leg: Mapping[str, float | None]
+Judgement = State[WalkFit, WalkModels, Weighed]
 
 
-Judgement = State[WalkFit, WalkModels, WalkWeighed]
-
-
-class WalkVerdict(Verdict[WalkFit, WalkModels, WalkWeighed]):
+class WalkVerdict(Verdict[WalkFit, WalkModels, Weighed]):
     """The verdict on what a search over sets of forms found.
 
     The likelihood of held-out strides must support a cause: it counts errors of soft tissue, landmarks and plates in
@@ -49,17 +42,17 @@ class WalkVerdict(Verdict[WalkFit, WalkModels, WalkWeighed]):
     def __init__(self, search: WalkSearch) -> None:
         super().__init__(search)
         self.models, self.errors = search.models, StrideErrors(search.models)
+        self.other_leg = cache(self._other_leg)
 
-    def weigh(self, found: SearchResult[WalkFit]) -> WalkWeighed:
-        """Return the evidence of held-out strides, of the other leg and of the test of lack of fit on a set."""
+    def weigh(self, found: SearchResult[WalkFit]) -> Weighed:
+        """Return the evidence of held-out strides and of the test of lack of fit on a set."""
         designs, best, less = self.models.designs, found.best, found.without
         many = designs.strides.count > 1
         p_value, where = lack_of_fit(designs, best)
-        return WalkWeighed(
+        return Weighed(
             gains={n: self.errors.gain(without, best, many) for n, without in less.items()},
             evidence={n: self.errors.evidence(without, best) for n, without in less.items()} if many else {},
             lack_of_fit=Remainder(p_value < CLAIM_LEVEL, p_value, where),
-            other_leg={n: other_leg(designs, self.models.fit((n,))) if self._is_of_either(n) else None for n in less},
         )
 
     def unsupported(self, state: Judgement) -> list[str]:
@@ -68,15 +61,17 @@ class WalkVerdict(Verdict[WalkFit, WalkModels, WalkWeighed]):
 
     def _is_supported(self, state: Judgement, name: str) -> bool:
         weighed, p_value, alone = state.weighed, state.found.p_values[name], len(state.names) == 1
-        other = weighed.other_leg[name]
+        other = self.other_leg(name)
         if p_value >= (WALK_LEVEL if weighed.evidence else CERTAIN_LEVEL) or (other is not None and other <= 0.0):
             return False
         return not weighed.evidence or is_supported(weighed.evidence[name], weighed.gains[name], alone)
 
-    def _is_of_either(self, name: str) -> bool:
-        """Return whether a form belongs to neither leg alone; a clock belongs to no leg."""
-        form = self.models.designs.forms[name]
-        return not form.site.startswith(("left", "right")) and not form.shifts
+    def _other_leg(self, name: str) -> float | None:
+        """Return the gain of a form on the other leg; None of one leg's form, and of a clock's, which is of no leg."""
+        designs = self.models.designs
+        form = designs.forms[name]
+        of_none = form.site.startswith(("left", "right")) or form.shifts
+        return None if of_none else other_leg(designs, self.models.fit((name,)))
 
     def lack_of_fit(self, state: Judgement) -> Remainder:
         """Return the lack of fit: the residual repeats in every stride, or held-out strides rejected a cause."""
@@ -104,7 +99,7 @@ class WalkVerdict(Verdict[WalkFit, WalkModels, WalkWeighed]):
             gain_fit=self.errors.gain(found.without[name], best, False).percent,
             gain_held_out=gain if weighed.evidence else replace(gain, on=FITTED),
             evidence=weighed.evidence.get(name),
-            further={"other_leg": weighed.other_leg[name]},
+            further={"other_leg": self.other_leg(name)},
         )
 
 
