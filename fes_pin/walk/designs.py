@@ -13,7 +13,7 @@ from fes_pin.body.build import GRAVITY
 from fes_pin.infer.fits import Names
 from fes_pin.walk.disturb import compressed, disturbed, misplaced, tissue, white
 from fes_pin.walk.effects import walk_library
-from fes_pin.walk.likelihood import MEAN_ARM_M, MEAN_FORCE, MEAN_TWIST_NM, WalkNoise, fit_walk, rotation
+from fes_pin.walk.likelihood import MEAN_ARM_M, MEAN_FORCE, MEAN_TWIST_NM, WalkNoise, fit_many, rotation
 from fes_pin.walk.recording import WalkRecording
 from fes_pin.walk.strides import Strides, strides_of
 from fes_pin.walk.walk_trial import WalkTrial
@@ -124,7 +124,8 @@ class Designs:
         form, later = self.forms[self.shift], 0.0
         trials, y, rate = self.as_read.trials, self.as_read.y, self.as_read.x[self.shift]
         for _ in range(SHIFT_ROUNDS):
-            found = fit_walk(self.noise.rotated(y), self.noise.rotated(rate), self.plausible((self.shift,)), self.noise)
+            aim, columns = self.noise.rotated(y)[None], self.noise.rotated(rate)[None]
+            (found,) = fit_many(aim, columns, self.plausible((self.shift,))[None], self.noise)
             step = float(np.clip(found.values[0], -0.05, 0.05))
             later = float(np.clip(later + step, -0.2, 0.2))
             trials = [r.trial(later) for r in self.recordings]

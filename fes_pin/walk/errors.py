@@ -7,7 +7,7 @@ import numpy as np
 from fes_pin.infer.held_out import Errors, added_likelihood, held_out_gain
 from fes_pin.infer.result import Evidence, Gain
 from fes_pin.walk.designs import Designs
-from fes_pin.walk.likelihood import fit_walk
+from fes_pin.walk.likelihood import fit_many
 from fes_pin.walk.models import WalkFit, WalkModels
 
 ARM = 0.1
@@ -68,12 +68,9 @@ def _residual_by_stride(designs: Designs, one: WalkFit, held_out: bool) -> np.nd
     y, x = designs.by_stride(one.names)
     if not (one.names and held_out):
         return y - x @ one.fitted.values
-    out = []
-    for k in range(len(y)):
-        others = np.arange(len(y)) != k
-        mean_y, mean_x = (designs.noise.rotated(v[others].mean(axis=0, keepdims=True)) for v in (y, x))
-        out.append(y[k] - x[k] @ fit_walk(mean_y, mean_x, designs.plausible(one.names), designs.noise).values)
-    return np.array(out)
+    rest_y, rest_x = (designs.noise.rotated((v.sum(axis=0) - v) / (len(v) - 1))[:, None] for v in (y, x))
+    fits = fit_many(rest_y, rest_x, np.tile(designs.plausible(one.names), (len(y), 1)), designs.noise)
+    return y - np.array([columns @ fitted.values for columns, fitted in zip(x, fits, strict=True)])
 
 
 def _whitened(residual: np.ndarray, designs: Designs, best: WalkFit) -> np.ndarray:

@@ -98,39 +98,23 @@ def rotation(left: np.ndarray, harmonics: np.ndarray) -> np.ndarray:
     return vectors.T * scale
 
 
-def fit_walk(y: np.ndarray, x: np.ndarray, prior: np.ndarray, noise: WalkNoise) -> Fitted:
-    """Fit effects and noise together.
+def fit_many(y: np.ndarray, x: np.ndarray, prior: np.ndarray, noise: WalkNoise, rounds: int = ROUNDS) -> list[Fitted]:
+    """Fit effects and noise together, many fits at once.
 
     Parameters
     ----------
     y, x
-        (n, 6, k) and (n, 6, k, p), contrasts of strides in rotated channels.
+        (b, n, 6, k) and (b, n, 6, k, p), waves in rotated channels; `x` of shape (1, n, 6, k, p) for all fits.
     prior
-        (p,): prior standard deviation of each effect's size.
-    noise
-        The noise model of all fits.
-    """
-    return fit_many(y[None], x, prior, noise)[0]
-
-
-def fit_many(y: np.ndarray, x: np.ndarray, prior: np.ndarray, noise: WalkNoise, rounds: int = ROUNDS) -> list[Fitted]:
-    """Make many fits of `fit_walk` at once.
-
-    Parameters
-    ----------
-    y
-        (b, n, 6, k).
-    x, prior
-        (n, 6, k, p) and (p,) for all fits, or (b, n, 6, k, p) and (b, p).
+        (b, p), or (1, p) for all fits: prior standard deviation of each effect's size.
     noise
         The noise model of all fits.
     rounds
         Alternations of weights and effects.
     """
     count, p, size = len(y), x.shape[-1], y[0].size
-    scaled = x * (prior if prior.ndim == 1 else prior[:, None, None, None])
-    scaled = scaled.reshape(1 if prior.ndim == 1 else count, size, p)
-    nuisance = noise.nuisance[: y.shape[1]].reshape(size, -1)
+    scaled = (x * prior[:, None, None, None]).reshape(len(x), size, p)
+    nuisance = noise.nuisance.reshape(size, -1)
     flat = np.concatenate([scaled, np.broadcast_to(nuisance, (len(scaled), *nuisance.shape))], axis=2)
     spectra = Spectra(y, noise)
     aim = y.reshape(count, size, 1)
@@ -184,32 +168,23 @@ class Spectra:
 
     def update(self, squares: np.ndarray) -> np.ndarray:
         """Return variances (b, n, 6, k) after one round from expected squared residuals of the same shape."""
-        slope, curve = self._scores(squares)
-        moved = np.linalg.solve(curve, slope[:, :, None])[:, :, 0]
-        self.level += np.clip(moved[:, :6], -2.0, 2.0)
-        self.step = self.step + np.clip(moved[:, 6:], -2.0, 2.0)
-        if self.falling:
-            self.step = np.minimum(self.step, 0.0)
-        return self._variance(squares.shape)
-
-    def _scores(self, squares: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return slope (b, p) and expected curvature (b, p, p) of the log-likelihood by levels and steps."""
         known = self._variance(squares.shape)[..., self.waves]
         share = self._smooth()[:, None] / known
         gain = self._by_wave(share * 0.5 * (squares[..., self.waves] / known - 1.0))
         slope = np.concatenate([gain.sum(axis=2), gain.sum(axis=1) @ self.steps - self.step / STEP_SD**2], axis=1)
-        return slope, self.curvature(share)
+        moved = np.clip(np.linalg.solve(self.curvature(share), slope[:, :, None])[:, :, 0], -2.0, 2.0)
+        self.level, self.step = self.level + moved[:, :6], self.step + moved[:, 6:]
+        if self.falling:
+            self.step = np.minimum(self.step, 0.0)
+        return self._variance(squares.shape)
 
     def curvature(self, share: np.ndarray) -> np.ndarray:
         """Return the expected curvature (b, p, p) by levels and steps, from shares (b, n, 6, waves) in variances."""
         weight = self._by_wave(0.5 * share**2) + 1e-9
-        count, size = self.step.shape
-        curve = np.zeros((count, 6 + size, 6 + size))
-        curve[:, range(6), range(6)] = weight.sum(axis=2)
-        curve[:, :6, 6:] = weight @ self.steps
-        curve[:, 6:, :6] = curve[:, :6, 6:].transpose(0, 2, 1)
-        curve[:, 6:, 6:] = (self.steps.T * weight.sum(axis=1)[:, None]) @ self.steps + np.eye(size) / STEP_SD**2
-        return curve
+        steps, cross = self.steps, weight @ self.steps
+        levels = weight.sum(axis=2)[:, :, None] * np.eye(6)
+        both = (steps.T * weight.sum(axis=1)[:, None]) @ steps + np.eye(steps.shape[1]) / STEP_SD**2
+        return np.block([[levels, cross], [cross.transpose(0, 2, 1), both]])
 
     def penalty(self) -> np.ndarray:
         """Return twice the negative log prior of the steps, (b,)."""

@@ -69,8 +69,8 @@ class WalkModels(FittedSets[WalkFit, None]):
         Family of gains without a cause. None before the noise is known: the evidence alone decides then.
     spread
         Scatter of the values of forms without a cause; see `simulated_nulls`.
-    readings
-        For forms whose parameter a trial shows directly, its value and standard deviation.
+    limits
+        For each form, the limits of its parameters: sizes that are physically possible.
     """
 
     def __init__(self, designs: Designs) -> None:
@@ -79,7 +79,7 @@ class WalkModels(FittedSets[WalkFit, None]):
         self.null: SimulatedFamily | None = None
         self.spread: dict[str, np.ndarray] = {}
         self.most_candidates = MOST_FOR_NOISE
-        self.readings = dict(_read_off(designs))
+        self.limits = dict(_limits(designs))
 
     def with_noise_of(self, best: WalkFit) -> WalkModels:
         """Return the same sets with channels rotated for the residual of one set, and the null in its noise."""
@@ -160,28 +160,23 @@ class WalkModels(FittedSets[WalkFit, None]):
         found = fit_many(np.broadcast_to(y, (len(group), *y.shape)), x, prior, noise)
         out = []
         for names, fitted in zip(group, found, strict=True):
-            possible = bool((np.abs(fitted.believed) <= POSSIBLE_SIZES * self.designs.plausible(names)).all())
-            owners = [n for n in names for _ in forms[n].parameters]
-            possible &= all(self._may_be(n, v) for n, v in zip(owners, fitted.believed.tolist(), strict=True))
+            low, high = np.array([self.limits[n] for n in names for _ in forms[n].parameters]).reshape(-1, 2).T
+            possible = ((low <= fitted.believed) & (fitted.believed <= high)).all()
             out.append(WalkFit(names, fitted, fitted.deviance if possible else math.inf))
         return out
-
-    def _may_be(self, name: str, value: float) -> bool:
-        """Return whether a value has a meaning, and agrees with its direct reading where there is one."""
-        if self.designs.forms[name].positive and value < 0.0:
-            return False
-        known = self.readings.get(name)
-        return known is None or abs(value - known[0]) <= POSSIBLE_SIZES * known[1]
 
 
 WalkSearch = Search[WalkFit, WalkModels]
 """A search over sets of forms of one study."""
 
 
-def _read_off(designs: Designs) -> Iterator[tuple[str, tuple[float, float]]]:
-    """Yield forms whose parameter a trial shows directly: the mean over trials, and its standard deviation."""
+def _limits(designs: Designs) -> Iterator[tuple[str, tuple[float, float]]]:
+    """Yield forms with the limits of their parameters; where trials show a parameter directly, near their mean."""
     for name, form in designs.forms.items():
+        high = POSSIBLE_SIZES * form.plausible
+        low = 0.0 if form.positive else -high
         found = [form.reading(trial) for trial in designs.as_read.trials] if form.reading else []
-        known = [one for one in found if one is not None]
-        if known:
-            yield name, (float(np.mean([value for value, _ in known])), known[0][1])
+        if known := [one for one in found if one is not None]:
+            middle, reach = float(np.mean([value for value, _ in known])), POSSIBLE_SIZES * known[0][1]
+            low, high = max(low, middle - reach), min(high, middle + reach)
+        yield name, (low, high)

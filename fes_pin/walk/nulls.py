@@ -25,12 +25,12 @@ def simulated_nulls(designs: Designs, variance: np.ndarray) -> tuple[SimulatedFa
         For each form, (p,) root mean square of value over standard deviation: 1 if the intervals are right.
     """
     drawn = _without_a_cause(designs, variance)
-    none = np.zeros((*variance.shape, 0))
-    alone = [f.deviance for f in fit_many(drawn, none, np.zeros(0), designs.noise, SIMULATED_ROUNDS)]
+    none = np.zeros((1, *variance.shape, 0))
+    alone = [f.deviance for f in fit_many(drawn, none, np.zeros((1, 0)), designs.noise, SIMULATED_ROUNDS)]
     best, spread = np.full(SIMULATED, -np.inf), {}
     for name in designs.forms:
         x = designs.noise.rotated(designs.as_read.x[name])
-        fitted = fit_many(drawn, x, designs.plausible((name,)), designs.noise, SIMULATED_ROUNDS)
+        fitted = fit_many(drawn, x[None], designs.plausible((name,))[None], designs.noise, SIMULATED_ROUNDS)
         best = np.maximum(best, np.subtract(alone, [f.deviance for f in fitted]))
         z = [f.values / np.sqrt(np.diag(f.covariance)) for f in fitted]
         spread[name] = np.sqrt(np.mean(np.square(z), axis=0))

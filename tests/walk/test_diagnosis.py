@@ -16,7 +16,7 @@ from fes_pin.data.study import read_study
 from fes_pin.view.report import report_html
 from fes_pin.walk.diagnosis import diagnose_walk
 from fes_pin.walk.extended import extended_body, with_segments
-from fes_pin.walk.likelihood import WalkNoise, fit_walk
+from fes_pin.walk.likelihood import WalkNoise, fit_many
 from fes_pin.walk.motion import motion_of
 from fes_pin.walk.white_noise import white_level
 
@@ -220,7 +220,7 @@ def test_the_fit_is_generalized_least_squares_with_the_noises_own_spectrum():
     z = []
     for _ in range(300):
         y = 2.0 * x[..., 0] + sd * random.normal(size=x.shape[:3])
-        found = fit_walk(y, x, np.array([100.0]), noise)
+        (found,) = fit_many(y[None], x[None], np.array([[100.0]]), noise)
         z.append((found.values[0] - 2.0) / np.sqrt(found.covariance[0, 0]))
     assert abs(np.mean(z)) < 0.2
     assert 0.88 < np.mean(np.abs(z) < 1.96) < 0.98
@@ -229,11 +229,12 @@ def test_the_fit_is_generalized_least_squares_with_the_noises_own_spectrum():
 def test_an_effect_that_is_not_there_costs_evidence():
     random = np.random.default_rng(1)
     harmonics = np.array([0, *(h for h in range(1, 9) for _ in range(2))])
-    noise, none = noise_of(harmonics), np.zeros((1, 6, len(harmonics), 0))
+    noise, none = noise_of(harmonics), np.zeros((1, 1, 6, len(harmonics), 0))
     gains = []
     for _ in range(50):
-        y, x = random.normal(size=(1, 6, len(harmonics))), random.normal(size=(1, 6, len(harmonics), 1))
-        gains.append(fit_walk(y, none, np.zeros(0), noise).deviance - fit_walk(y, x, np.array([1.0]), noise).deviance)
+        y, x = random.normal(size=(1, 1, 6, len(harmonics))), random.normal(size=(1, 1, 6, len(harmonics), 1))
+        (alone,), (fitted,) = fit_many(y, none, np.zeros((1, 0)), noise), fit_many(y, x, np.ones((1, 1)), noise)
+        gains.append(alone.deviance - fitted.deviance)
     assert np.mean(gains) < -2.0
 
 
