@@ -6,6 +6,9 @@ name, under which a page may give it another shade on a dark ground.
 
 import numpy as np
 
+from fes_pin.data.schema import without_unit
+from fes_pin.data.units import own_unit
+
 STAGES = {"nerve": "#0072b2", "muscle": "#d55e00", "joint": "#00855f", "rig": "#8f6800", "sensor": "#a8477f"}
 """Colour of each stage of the signal path; three are darkened, to be read as text on white."""
 COLOURS = {
@@ -17,16 +20,8 @@ COLOURS = {
 WIDTHS = {"extended": 4.0, "nominal": 1.8, "measured": 0.9}
 """Widths of curves: simulations behind, the measurement in front."""
 
-LABELS = {
-    "angle_rad": ("angle", "rad"),
-    "force_n": ("force", "N"),
-    "torque_nm": ("torque", "N m"),
-    "length_m": ("length", "m"),
-    "pulse_width_us": ("pulse width", "µs"),
-    "stim": ("pulses", ""),
-    "activation": ("activation", ""),
-    "time_s": ("time", "s"),
-}
+WORDS = {"position": "angle", "velocity": "rate", "stim": "pulses"}
+"""Columns of a revolute joint, and of pulses, whose names are others on a page."""
 
 
 def quantity(column: str, position_unit: str = "rad") -> tuple[str, str]:
@@ -39,10 +34,10 @@ def quantity(column: str, position_unit: str = "rad") -> tuple[str, str]:
     position_unit
         "rad" for a revolute joint, "m" for a prismatic one.
     """
-    place, effort = ("angle", "N m") if position_unit == "rad" else ("position", "N")
-    own = {n: (place, position_unit) for n in ("position", "angle")}
-    own |= {n: ("rate", f"{position_unit}/s") for n in ("velocity", "rate")} | {"effort": ("effort", effort)}
-    return (own | LABELS).get(column, (column.replace("_", " "), ""))
+    revolute = position_unit == "rad"
+    column = {"angle": "position", "rate": "velocity"}.get(column, column)
+    name = "position" if column == "position" and not revolute else WORDS.get(column, without_unit(column))
+    return name.replace("_", " "), own_unit(column, revolute).replace("us", "µs")
 
 
 def label(column: str, position_unit: str = "rad") -> str:

@@ -22,7 +22,7 @@ import pinocchio as pin
 from fes_pin.body.build import Body
 from fes_pin.body.ground import LEVEL_M, sole
 from fes_pin.body.inputs import Inputs
-from fes_pin.body.joints import JOINTS, SIDES
+from fes_pin.body.joints import JOINTS, SIDES, BodyJoint
 from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.linearize import ground_normal
 from fes_pin.body.modes import Mode
@@ -174,14 +174,12 @@ def show_mode(linear: LinearBody, mode: Mode) -> BodyScene:
     """
     body = instance(linear, LinearBody, "linear").body
     instance(mode, Mode, "mode")
-    q = np.array([linear.whole_posture.get(name, 0.0) for name in body.joint_names])
-    shape = np.zeros(len(q))
-    for name, value in zip(mode.joint_names, mode.one_degree, strict=True):
-        shape[body.joint_names.index(name)] = MODE_SWING_DEG * value
+    q = np.asarray(body.angles(linear.whole_posture, check=False))
+    shape = np.asarray(body.rates(dict(zip(mode.joint_names, MODE_SWING_DEG * mode.one_degree, strict=True))))
     count = int(MODE_PERIOD_S * FRAMES_A_SECOND)
     phases = np.sin(2.0 * np.pi * np.arange(count + 1) / count)
     caption = f"{mode.name}; to and fro, not to scale; {said_of(linear)}"
-    return BodyScene(body, caption=caption, slope=linear.slope).play(np.asarray(q) + phases[:, None] * shape)
+    return BodyScene(body, caption=caption, slope=linear.slope).play(q + phases[:, None] * shape)
 
 
 def show_posture(linear: LinearBody) -> BodyScene:
@@ -256,12 +254,10 @@ def show_walk(
 
 def _put_down(body: Body, q: np.ndarray, turn: np.ndarray) -> pin.SE3:
     """Return the pose of the stance foot: the pelvis is oriented as given, the lowest sole touches the floor."""
-    data = body.model.createData()
-    pin.framesForwardKinematics(body.model, data, q)
-    pelvis = data.oMf[body.model.getFrameId("pelvis")]
-    other = data.oMi[body.model.getJointId("left_hip_flexion" if body.stance == "right" else "right_hip_flexion")]
-    rotation = turn @ pelvis.rotation.T
-    middle = rotation @ (0.5 * (pelvis.translation + other.translation))
+    held, hip = body.placement("pelvis", q)  # links begin at the joint towards the ground
+    _, other = body.placement("left_thigh" if body.stance == "right" else "right_thigh", q)
+    rotation = turn @ held.T
+    middle = rotation @ (0.5 * (hip + other))
     lowest = min(float((rotation @ sole(body, q, side, heel=True).T)[2].min()) for side in SIDES)
     return pin.SE3(rotation, np.array([-middle[0], -middle[1], -lowest]))
 
@@ -286,20 +282,17 @@ def show_influence(linear: LinearBody, inputs, names: str | Sequence[str]) -> Bo
         share = size[joint.name] / greatest if greatest > 0.0 else 0.0
         if share < 0.01:
             continue
-        scene.balls.append((_centre(linear.body, joint.name, posture), 0.05 + 0.06 * share, _red(share)))
+        scene.balls.append((_centre(linear.body, joint, posture), 0.05 + 0.06 * share, _red(share)))
         said += [f"{r} {torque[r]:+.0f} N m" for r in joint.revolutes if abs(torque.get(r, 0.0)) >= 0.01 * greatest]
     how = "full recruitment" if strength is None else f"full recruitment at {strength:g} of a healthy person's strength"
     scene.caption = f"{' and '.join(inputs.names)}, {how}: {', '.join(said) or 'no torque'}; {said_of(linear)}"
     return scene
 
 
-def _centre(body: Body, joint: str, posture: Mapping[str, float]) -> np.ndarray:
+def _centre(body: Body, joint: BodyJoint, posture: Mapping[str, float]) -> np.ndarray:
     """Return the place of a joint in the world, (3,) m; its ball is outside the limb, on the limb's own side."""
-    first = next(j.revolutes[0] for j in JOINTS if j.name == joint)
-    data = body.model.createData()
-    pin.forwardKinematics(body.model, data, body.angles(posture, check=False))
-    outside = {"left": 0.09, "right": -0.09}.get(joint.split("_", maxsplit=1)[0], -0.16)
-    return data.oMi[body.model.getJointId(first)].translation + np.array([0.0, outside, 0.0])
+    outside = {"left": 0.09, "right": -0.09}.get(joint.name.partition("_")[0], -0.16)
+    return body.placement(joint.revolutes[0], posture)[1] + np.array([0.0, outside, 0.0])
 
 
 def _red(share: float) -> int:
