@@ -25,7 +25,7 @@ from fes_pin.body.passive import PassiveLegs
 from fes_pin.data.errors import InputError
 from fes_pin.data.motion import read_coordinates, read_ground_reaction
 from fes_pin.walk.dynamics import about
-from fes_pin.walk.motion import motion_of, pelvis_to_hip
+from fes_pin.walk.motion import Session, motion_of, pelvis_to_hip
 from fes_pin.walk.plates import plates_of
 
 OUT = Path("out")
@@ -48,10 +48,10 @@ def walk(columns_of, side="right"):
     """Motion while the plates were recorded, its coordinates, and the plates; `columns_of` changes coordinates."""
     grf_time, grf = read_ground_reaction(WALK / "grf_raw_600hz.csv")
     time, columns = columns_of()
-    motion = motion_of(BODIES[side], time, columns, HIP)
+    motion = motion_of(BODIES[side], time, columns, HIP, Session())
     inside = (time >= grf_time[0]) & (time <= grf_time[-1])
     own = {n: c[inside] for n, c in columns.items()}
-    return motion.part(inside), own, plates_of(grf_time, grf, time[inside])
+    return motion.part(inside), own, plates_of(grf_time, grf, time[inside], Session())
 
 
 def residual(motion, plates):

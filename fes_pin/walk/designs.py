@@ -11,7 +11,7 @@ import numpy as np
 
 from fes_pin.body.build import GRAVITY
 from fes_pin.infer.fits import Names
-from fes_pin.walk.disturb import compressed, disturbed, misplaced, tissue, white
+from fes_pin.walk.disturb import disturbed, misplaced, tissue, white
 from fes_pin.walk.effects import walk_library
 from fes_pin.walk.likelihood import MEAN_ARM_M, MEAN_FORCE, MEAN_TWIST_NM, WalkNoise, fit_many, rotation
 from fes_pin.walk.recording import WalkRecording
@@ -23,6 +23,8 @@ TAKEN = 0.3
 moves by 10 mm and more where a trunk moves by 20 to 40 (A. Leardini et al., Gait Posture 21:212, 2005)."""
 SHIFT_ENDS_S = 5e-4
 """Step at which the estimation of a shift ends, s."""
+SMALL_N = 1.0
+"""Ordinary errors with a smaller residual in all waves together are left out, N or N m."""
 SHIFT_ROUNDS = 4
 """Most steps of the estimation of a shift of the clock."""
 
@@ -77,14 +79,17 @@ class Designs:
         return Design(trials, self.strides.mean([s.residual for s in trials]), x, later_s)
 
     @cached_property
-    def measured(self) -> np.ndarray:
-        """The measured reaction in every stride: (n, 6, k)."""
-        return self.strides.coefficients([s.measured for s in self.as_read.trials])
+    def _in_every_session(self) -> np.ndarray:
+        """Residuals by ordinary errors of landmarks and plates of one standard deviation: (1, 6, k, m).
 
-    @cached_property
-    def landmarks(self) -> np.ndarray:
-        """Residuals by the ordinary error of each coordinate's zero: (coordinates, 6, k)."""
-        return disturbed(self._first, self.strides, misplaced, self.seed)
+        They are fewer columns than there are errors, of nearly the same covariance.
+        """
+        forms = [(self.as_read.x[n], f.ordinary) for n, f in self.forms.items() if f.ordinary > 0.0]
+        landmarks = np.moveaxis(disturbed(self._first, self.strides, misplaced, self.seed), 0, 2)[None]
+        columns = np.concatenate([landmarks, *(size * columns for columns, size in forms)], axis=3)
+        vectors, sizes, _ = np.linalg.svd(columns.reshape(self.as_read.y.size, -1), full_matrices=False)
+        kept = sizes > SMALL_N
+        return (vectors[:, kept] * sizes[kept]).reshape(*self.as_read.y.shape, -1)
 
     @cached_property
     def tissue(self) -> np.ndarray:
@@ -109,15 +114,9 @@ class Designs:
         if not self.strides.whole:  # soft tissue does not return to its initial place
             means = means + np.mean(self.tissue[..., 0] ** 2, axis=0)
         bare = WalkNoise(self.strides.harmonics, turn, means, self._none())
-        self.ordinary = bare.rotated(compressed(self._in_every_session()))
+        self.ordinary = bare.rotated(self._in_every_session)
         taken = bare.rotated(_taken(self.as_read.trials, self.strides))
         self.noise = replace(bare, nuisance=np.concatenate([taken, self.ordinary], axis=3))
-
-    def _in_every_session(self) -> np.ndarray:
-        """Return residuals by ordinary errors of landmarks and plates of one standard deviation: (1, 6, k, m)."""
-        forms = [(self.as_read.x[n], f.ordinary) for n, f in self.forms.items() if f.ordinary > 0.0]
-        landmarks = np.moveaxis(self.landmarks, 0, 2)[None]
-        return np.concatenate([landmarks, *(size * columns for columns, size in forms)], axis=3)
 
     def _shifted(self) -> Design:
         """Return the design matrix at the delay of the plates that fits best, by repeated linearization."""

@@ -24,8 +24,6 @@ CLUSTER_M = 0.15
 LANDMARK_M, LANDMARK_RAD = 0.005, 0.026
 """Ordinary errors of where a coordinate's zero is, as standard deviations: landmarks are found to 6 to 21 mm, and a
 segment's frame is the mean of several (U. Della Croce et al., Gait Posture 21:226, 2005)."""
-SMALL_N = 1.0
-"""Ordinary errors with a smaller residual in all waves together are left out, N or N m."""
 
 Disturbance = Callable[[np.ndarray, np.ndarray, np.random.Generator], np.ndarray]
 """Function of the phase in the stride, (n,), of whether each coordinate is an angle, (c,), and of a generator: errors
@@ -71,11 +69,3 @@ def disturbed(recording: WalkRecording, strides: Strides, kind: Disturbance, see
     angle = np.array([n.removeprefix("q_") not in TRANSLATIONS for n in columns])
     base, draws = residual(0.0), kind(turn, angle, np.random.default_rng(seed))
     return strides.first(np.stack([residual(one) - base for one in draws], axis=2))
-
-
-def compressed(columns: np.ndarray) -> np.ndarray:
-    """Return fewer columns of nearly the same covariance."""
-    flat = columns.reshape(-1, columns.shape[-1])
-    vectors, sizes, _ = np.linalg.svd(flat, full_matrices=False)
-    kept = sizes > SMALL_N
-    return (vectors[:, kept] * sizes[kept]).reshape(*columns.shape[:-1], -1)

@@ -29,7 +29,8 @@ class StrideErrors:
         height = designs.recordings[0].motion.body.height_m or 1.8
         self._scale = np.r_[np.ones(3), np.full(3, 1.0 / (ARM * height))][:, None]
         self._residual = cache(partial(_residual_by_stride, designs))
-        about_mean = designs.measured * (designs.strides.harmonics > 0)
+        measured = designs.strides.coefficients([s.measured for s in designs.as_read.trials])
+        about_mean = measured * (designs.strides.harmonics > 0)
         self._spread = np.sum((self._scale * about_mean) ** 2, axis=(1, 2))
         y, _ = designs.by_stride(())
         self._differs = np.sum((self._scale * (y - y.mean(axis=0))) ** 2, axis=0) / max(len(y) - 1, 1)

@@ -3,7 +3,8 @@
 import numpy as np
 
 from fes_pin.infer.distributions import f_tail
-from fes_pin.infer.levels import SEEN_DEVIATIONS
+from fes_pin.infer.levels import CLAIM_LEVEL, SEEN_DEVIATIONS
+from fes_pin.infer.result import Remainder
 from fes_pin.walk.designs import Designs
 from fes_pin.walk.likelihood import FLOOR_N, by_frequency
 from fes_pin.walk.models import WalkFit
@@ -38,8 +39,8 @@ def other_leg(designs: Designs, one: WalkFit) -> float | None:
     return 100.0 * (before - after) / before
 
 
-def lack_of_fit(designs: Designs, one: WalkFit) -> tuple[float, str]:
-    """Test whether the residual of a set repeats in every stride: p-value, and channel and wave where it is largest.
+def lack_of_fit(designs: Designs, one: WalkFit) -> Remainder:
+    """Test whether the residual of a set repeats in every stride, and find the channel and wave where it is largest.
 
     A single stride is compared with the residual of 1 mm of marker noise and of the plates.
     """
@@ -56,7 +57,7 @@ def lack_of_fit(designs: Designs, one: WalkFit) -> tuple[float, str]:
     by_wave = np.array([ratio[:, waves == h].sum(axis=1) for h in np.unique(waves)]).T
     channel, wave = np.unravel_index(int(np.argmax(by_wave)), by_wave.shape)
     word = WAVES[wave] if wave < len(WAVES) else f"{wave} times a stride"
-    return p_value, f"{CHANNELS[channel]}, {word}"
+    return Remainder(p_value < CLAIM_LEVEL, p_value, f"{CHANNELS[channel]}, {word}")
 
 
 def not_testable(designs: Designs, one: WalkFit) -> list[str]:

@@ -21,8 +21,6 @@ POLICY = Policy(beam=4, fitted=None)
 """Every form is fitted, so that no score test is needed."""
 MOST_FOR_NOISE = 2
 """Most causes in the set from whose residual the noise is estimated."""
-TOGETHER = 64
-"""Fits that are made at once: as many as fit a processor's cache."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,9 +104,8 @@ class WalkModels(FittedSets[WalkFit, None]):
             groups.setdefault((count, self.designs.shift in names), []).append(names)
         out: dict[Names, WalkFit] = {}
         for group in groups.values():
-            for at in range(0, len(group), TOGETHER):
-                check_limit()
-                out |= {one.names: one for one in self._fit_alike(group[at : at + TOGETHER])}
+            check_limit()
+            out |= {one.names: one for one in self._fit_alike(group)}
         return out
 
     def fit(self, names: Names) -> WalkFit:

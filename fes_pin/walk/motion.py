@@ -45,10 +45,6 @@ class Session:
         return np.outer(self.belt_speed_mps * (time - self.start_s), [1.0, 0.0, 0.0])
 
 
-OVER_GROUND = Session()
-"""Without a treadmill, at the usual low pass."""
-
-
 def pelvis_to_hip(body: Body, table: Mapping | None = None) -> np.ndarray:
     """Right hip centre in OpenSim's pelvis frame and axes: (3,) m.
 
@@ -75,7 +71,7 @@ def motion_of(
     time: np.ndarray,
     columns: Mapping[str, np.ndarray],
     hip: np.ndarray,
-    session: Session = OVER_GROUND,
+    session: Session,
 ) -> Motion:
     """The body's motion from OpenSim's coordinates.
 

@@ -11,7 +11,7 @@ from scipy.ndimage import distance_transform_edt, find_objects, label
 from fes_pin.body.joints import SIDES
 from fes_pin.body.skeleton import TO_WORLD
 from fes_pin.data.smooth import low_pass
-from fes_pin.walk.motion import OVER_GROUND, Session
+from fes_pin.walk.motion import Session
 
 LOADED_N = 20.0
 """A foot stands where its vertical force is above this: the usual threshold on instrumented treadmills."""
@@ -69,7 +69,7 @@ def stretches(where: np.ndarray) -> list[slice]:
 
 
 def plates_of(
-    time: np.ndarray, columns: Mapping[str, np.ndarray], at: np.ndarray, session: Session = OVER_GROUND
+    time: np.ndarray, columns: Mapping[str, np.ndarray], at: np.ndarray, session: Session, later_s: float = 0.0
 ) -> Plates:
     """Return the ground reaction at the motion's times; where the plates were not recorded, as at their nearest time.
 
@@ -81,8 +81,10 @@ def plates_of(
         (n,) s; times of the motion.
     session
         Low pass, which forces and moments about the origin go through, and treadmill.
+    later_s
+        How much later than their clock says the plates are read, s.
     """
-    dt = float(time[-1] - time[0]) / (len(time) - 1)
+    time, dt = time - later_s, float(time[-1] - time[0]) / (len(time) - 1)
     feet, pressure, loaded = {}, {}, {}
     for side in SIDES:
         force, point, free = (

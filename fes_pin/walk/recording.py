@@ -37,12 +37,10 @@ class WalkRecording:
         On one clock; where coordinates are filtered, the filter's ends are cut off.
     time, coordinates
         The coordinates and their clock, as read.
-    plates_time
-        The plates' clock, as read.
     moved
         Function of times and coordinates of the same session: their motion.
     read
-        Function of the plates' clock, and of the times `at` which to read them: the plates.
+        Function of times, and of how much later than their clock says the plates are read: the plates.
     session
         Low pass and treadmill.
     """
@@ -52,14 +50,13 @@ class WalkRecording:
     plates: Plates
     time: np.ndarray = field(repr=False)
     coordinates: Mapping[str, np.ndarray] = field(repr=False)
-    plates_time: np.ndarray = field(repr=False)
     moved: Callable[[np.ndarray, Mapping[str, np.ndarray]], Motion] = field(repr=False)
     read: Callable[..., Plates] = field(repr=False)
     session: Session
 
     def trial(self, later_s: float = 0.0) -> WalkTrial:
         """Return the trial, with the plates read that much later than their clock says."""
-        plates = self.read(self.plates_time - later_s, at=self.motion.time) if later_s else self.plates
+        plates = self.read(self.motion.time, later_s=later_s) if later_s else self.plates
         return WalkTrial(self.name, self.motion, plates)
 
 
@@ -69,7 +66,8 @@ def body_of(study: Study) -> tuple[Body, np.ndarray]:
     Raises
     ------
     InputError
-        The study is of another rig, or its table of segments or URDF cannot be used.
+        The study is of another rig, its table of segments or URDF cannot be used, or a table's masses do not
+        sum to the study's.
     """
     if study.rig != "body":
         raise InputError(f"expected a study of rig body, found {study.rig}", file=study.folder)
@@ -83,23 +81,12 @@ def body_of(study: Study) -> tuple[Body, np.ndarray]:
         path = study.files["segments"]
         body = Body.from_segments(path)
         with errors_of(path):
-            _check_mass(body, study)
+            mass = study.constants.get("mass_kg", body.mass_kg)
+            if abs(mass - body.mass_kg) > MASS_SHARE * body.mass_kg:
+                raise InputError(f"its segments weigh {body.mass_kg:.2f} kg, and the study says mass_kg = {mass:g}")
             return body, pelvis_to_hip(body, json.loads(path.read_text()))
     body = Body.from_subject(study.constants["mass_kg"], study.constants["height_m"])
     return body, pelvis_to_hip(body)
-
-
-def _check_mass(body: Body, study: Study) -> None:
-    """Refuse a body of another mass than the study's.
-
-    Raises
-    ------
-    InputError
-        The masses differ by more than 1 %.
-    """
-    mass = study.constants.get("mass_kg", body.mass_kg)
-    if abs(mass - body.mass_kg) > MASS_SHARE * body.mass_kg:
-        raise InputError(f"its segments weigh {body.mass_kg:.2f} kg, and the study says mass_kg = {mass:g}")
 
 
 def recordings_of(study: Study, *, cutoff_hz: float = CUTOFF_HZ, body: Body | None = None) -> list[WalkRecording]:
@@ -128,15 +115,13 @@ def _recording(trial: Trial, body: Body, hip: np.ndarray, cutoff_hz: float) -> W
     if inside.sum() < FEWEST:
         raise InputError(f"trial {trial.name} has {inside.sum()} samples of motion and reaction together", file=source)
     session = Session(cutoff_hz, trial.conditions.get("belt_speed_mps", 0.0), float(time[0]))
-    moved, read = (
-        partial(motion_of, body, hip=hip, session=session),
-        partial(plates_of, columns=dict(raw), session=session),
-    )
+    moved = partial(motion_of, body, hip=hip, session=session)
+    read = partial(plates_of, raw_time, dict(raw), session=session)
     with errors_of(source):
         motion = moved(time, columns).part(inside)
-        plates = read(raw_time, at=motion.time)
+        plates = read(motion.time)
     with errors_of(reaction):
         check_together(motion, plates)
         rows = carried_along(motion, plates)
     used = motion.part(rows), plates.part(rows)
-    return WalkRecording(trial.name, *used, time, dict(columns), raw_time, moved, read, session)
+    return WalkRecording(trial.name, *used, time, dict(columns), moved, read, session)

@@ -48,11 +48,10 @@ class WalkVerdict(Verdict[WalkFit, WalkModels, Weighed]):
         """Return the evidence of held-out strides and of the test of lack of fit on a set."""
         designs, best, less = self.models.designs, found.best, found.without
         many = designs.strides.count > 1
-        p_value, where = lack_of_fit(designs, best)
         return Weighed(
             gains={n: self.errors.gain(without, best, many) for n, without in less.items()},
             evidence={n: self.errors.evidence(without, best) for n, without in less.items()} if many else {},
-            lack_of_fit=Remainder(p_value < CLAIM_LEVEL, p_value, where),
+            lack_of_fit=lack_of_fit(designs, best),
         )
 
     def unsupported(self, state: Judgement) -> list[str]:

@@ -73,7 +73,7 @@ class WalkTrial:
         """By segment, (n, 6, 10); see `Motion.regressors`; moments about the believed centre of mass."""
         return {s: about(y, self.motion.centre) for s, y in self.motion.regressors.items()}
 
-    def force_at(self, point: np.ndarray, direction: np.ndarray) -> np.ndarray:
-        """Return the wrench of 1 N along world directions at points: (n, 6); `point`, `direction` (n, 3)."""
-        along = np.broadcast_to(direction, point.shape)
+    def force_at(self, point: np.ndarray, force: np.ndarray) -> np.ndarray:
+        """Return the wrench of forces at points: (n, 6); `point` and `force` (n, 3) in the world."""
+        along = np.broadcast_to(force, point.shape)
         return np.hstack([along, np.cross(point - self.motion.centre, along)])

@@ -149,7 +149,7 @@ def test_a_walk_is_the_trials_that_it_is_given(measured):
     (again,) = recordings_of(replace(study, trials=(trial.with_columns(r_Fx=trial["r_Fx"]),)))
     (heavy,) = recordings_of(replace(study, trials=(doubled,)))
     (short,) = recordings_of(replace(study, trials=(trial.first(len(trial) // 2),)))
-    assert np.array_equal(whole.plates_time, again.plates_time) and len(whole.plates_time) > len(trial)
+    assert np.array_equal(whole.plates.total, again.plates.total) and len(whole.read.args[0]) > len(trial)
     up = [plates.plates.feet["right"][:, 2].max() for plates in (whole, heavy)]
     assert up[1] == pytest.approx(2.0 * up[0], rel=0.05)
     assert len(short.motion.time) < len(whole.motion.time) and short.time[-1] < whole.time[-1]

@@ -9,7 +9,7 @@ import pytest
 
 from fes_pin.body.build import Body
 from fes_pin.data.motion import read_coordinates, read_ground_reaction
-from fes_pin.walk.motion import motion_of, pelvis_to_hip
+from fes_pin.walk.motion import Session, motion_of, pelvis_to_hip
 from fes_pin.walk.plates import plates_of
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "scripts"))
@@ -30,7 +30,7 @@ def hip(segments):
 def measured(walk, segments, hip):
     """Motion and coordinates of the walk, all samples."""
     time, columns = read_coordinates(walk / "coords_mtpfree.csv")
-    return motion_of(Body.from_segments(segments), time, columns, hip), columns
+    return motion_of(Body.from_segments(segments), time, columns, hip, Session()), columns
 
 
 @pytest.fixture(scope="session")
@@ -39,7 +39,7 @@ def with_plates(walk, measured):
     motion, _ = measured
     time, columns = read_ground_reaction(walk / "grf_raw_600hz.csv")
     part = motion.part((motion.time >= time[0]) & (motion.time <= time[-1]))
-    return part, plates_of(time, columns, part.time)
+    return part, plates_of(time, columns, part.time, Session())
 
 
 def rms(values):

@@ -17,7 +17,7 @@ from fes_pin.view.report import report_html
 from fes_pin.walk.diagnosis import diagnose_walk
 from fes_pin.walk.extended import extended_body, with_segments
 from fes_pin.walk.likelihood import WalkNoise, fit_many
-from fes_pin.walk.motion import motion_of
+from fes_pin.walk.motion import Session, motion_of
 from fes_pin.walk.white_noise import white_level
 
 pytestmark = pytest.mark.shared
@@ -192,7 +192,7 @@ def test_the_extended_body_requires_what_the_column_says(measured, hip):
     heavier = with_segments(motion.body, {"trunk": 1.1 * parameters["trunk"]})
     assert isinstance(heavier, Body)
     assert heavier.mass_kg == pytest.approx(motion.body.mass_kg + 0.1 * parameters["trunk"][0])
-    moved = motion_of(heavier, motion.time, columns, hip)
+    moved = motion_of(heavier, motion.time, columns, hip, Session())
     column = motion.regressors["trunk"] @ parameters["trunk"]
     assert np.abs(moved.required - motion.required - 0.1 * column).max() < 1e-6
 

@@ -96,7 +96,7 @@ def test_the_rest_of_the_required_force_is_the_sliding_knee(measured, simbody, t
 
 def test_required_reaction_does_not_depend_on_the_foot_that_the_tree_stands_on(measured, segments, hip):
     motion, columns = measured
-    other = motion_of(Body.from_segments(segments, "left"), motion.time, columns, hip)
+    other = motion_of(Body.from_segments(segments, "left"), motion.time, columns, hip, Session())
     assert np.abs(other.required - motion.required).max() < 1e-4
 
 
@@ -190,4 +190,4 @@ def test_a_missing_coordinate_is_named(measured, segments, hip):
     motion, columns = measured
     with pytest.raises(InputError, match="q_knee_angle_l"):
         motion_of(Body.from_segments(segments), motion.time,
-                  {n: c for n, c in columns.items() if n != "q_knee_angle_l"}, hip)  # fmt: skip
+                  {n: c for n, c in columns.items() if n != "q_knee_angle_l"}, hip, Session())  # fmt: skip

@@ -23,10 +23,9 @@ class PlateGain(WalkEffect):
     @classmethod
     def forms(cls) -> Iterator[Form]:
         for site, sides in PLATES.items():
-            yield Form(cls.name, site, ("share",), 0.1, partial(_scaled, sides=sides, axes=AXES))
-            for axis, word in ((2, "vertical"), (0, "forward"), (1, "sideways")):
-                columns = partial(_scaled, sides=sides, axes=(axis,))
-                yield Form(cls.name, f"{site}, {word}", ("share",), 0.1, columns)
+            for axes, word in ((AXES, ""), ((2,), ", vertical"), ((0,), ", forward"), ((1,), ", sideways")):
+                columns = partial(_scaled, sides=sides, axes=axes)
+                yield Form(cls.name, f"{site}{word}", ("share",), 0.1, columns)
 
 
 AXES = (0, 1, 2)
@@ -41,4 +40,4 @@ def _part(trial: WalkTrial, side: str, axes: tuple[int, ...]) -> np.ndarray:
     if axes == AXES:
         return trial.true_feet[side]
     force = trial.true_feet[side][:, :3] * np.isin(AXES, axes)
-    return np.hstack([force, np.cross(trial.plates.pressure[side] - trial.motion.centre, force)])
+    return trial.force_at(trial.plates.pressure[side], force)
