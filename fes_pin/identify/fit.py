@@ -16,7 +16,7 @@ from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import as_number, instance, number, whole
 from fes_pin.data.results import Saveable
 from fes_pin.data.schema import unknown
-from fes_pin.data.show import frame
+from fes_pin.data.show import by_columns, frame
 from fes_pin.data.trial import Trial
 from fes_pin.identify.problem import Problem
 from fes_pin.infer.noise import ORDERS, Noise, NoiseModel, estimate_noise, noise_step, thin, thinning
@@ -165,16 +165,9 @@ class Fit(Optimum, Saveable):
         `std` is NaN and `note` is "at its bound" where a value is at its bound; `note` is "not identified" where a
         parameter is not identifiable.
         """
-        info = self.model.parameter_info()
-        return {
-            "parameter": list(self.free),
-            "value": [self.values[n] for n in self.free],
-            "std": [self.std(n) for n in self.free],
-            "low": [self.interval(n)[0] for n in self.free],
-            "high": [self.interval(n)[1] for n in self.free],
-            "unit": [info[n].unit for n in self.free],
-            "note": [self._note(n) for n in self.free],
-        }
+        head, info = ("parameter", "value", "std", "low", "high", "unit", "note"), self.model.parameter_info()
+        rows = [(n, self.values[n], self.std(n), *self.interval(n), info[n].unit, self._note(n)) for n in self.free]
+        return by_columns(head, rows)
 
     def record(self) -> dict[str, Any]:
         """Return the fit as JSON holds it: see `fes_pin.data.results`."""

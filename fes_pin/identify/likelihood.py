@@ -229,8 +229,9 @@ class LikelihoodProblem(Problem, NoisyProblem):
         at, squares = [self.free.index(n) for n in self._scales], sum(float(p.residual @ p.residual) for p in parts)
         if not (np.isfinite(squares) and squares > 0.0):
             return parts
-        missed = self._missed_slopes(parts, at, values, unknowns)
-        return [_added(p, at, missed / squares) for p in parts]
+        along = np.zeros(len(self.free))
+        along[at] = self._missed_slopes(parts, at, values, unknowns) / squares
+        return [replace(p, jacobian=p.jacobian + np.outer(p.residual, along)) for p in parts]
 
     def _missed_slopes(
         self, parts: Sequence[Linearized], at: Sequence[int], values: Mapping[str, float], unknowns: Unknowns
@@ -258,13 +259,6 @@ class LikelihoodProblem(Problem, NoisyProblem):
 def is_simulated(noise: StateSpaceNoise, trials: Sequence[Trial]) -> bool:
     """Return whether there is no process noise: one-step predictions are then a free simulation."""
     return not noise.processes and all(t.kind != IMPOSED for t in trials)
-
-
-def _added(part: Linearized, at: Sequence[int], factors: np.ndarray) -> Linearized:
-    """Return sensitivities with multiples of the residual added to some columns."""
-    jacobian = part.jacobian.copy()
-    jacobian[:, at] += np.outer(part.residual, factors)
-    return replace(part, jacobian=jacobian)
 
 
 def _evaluation(one: PredictedTrial) -> Evaluation:
