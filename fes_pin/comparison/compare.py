@@ -84,9 +84,8 @@ def compare(
     if len(fitted) + len(held) < 2:
         raise InputError("expected at least two trials: whole trials are left out", file=study.folder)
     every = [*fitted, *held]
-    horizon = _horizon(study, every, horizon_s)
-    if given_s is not None:
-        _check_time(given_s, every, "given_s")
+    _check_times(every, horizon_s=horizon_s, given_s=given_s)
+    horizon = horizon_s or study.horizon_s or default_horizon(every)
     chosen = _chosen(models, extended, nominal, every, library)
     noted = [*measured.warnings, *check_study(joined, nominal)]
     parts = partings(fitted, held)
@@ -128,7 +127,8 @@ def _chosen(
     names = possible(trials) if models is None else instance(models, Iterable, "models")
     for name in dict.fromkeys(str(name) for name in ([names] if isinstance(names, str) else names)):
         one = published_model(name)
-        out.append(_Chosen(name, one.model(nominal, trials), one.words, one.source, one.unfelt(nominal, trials)))
+        model = one.model(nominal, trials)
+        out.append(_Chosen(name, model, one.words, one.source, one.unfelt(model, trials)))
     for name, given in instance({} if extended is None else extended, Mapping, "extended").items():
         own = given if isinstance(given, Model) else load_model(given, library=library)
         if own.rig.name != nominal.rig.name:
@@ -189,19 +189,12 @@ def _with_apart(ranked: Sequence[Compared], folds: int) -> list[Compared]:
     return [replace(m, apart={kind: apart(m, kind) for kind in best}) for m in ranked]
 
 
-def _horizon(study: Study, trials: Sequence[Trial], asked: float | None) -> float:
-    if asked is None:
-        return study.horizon_s or default_horizon(trials)
-    _check_time(asked, trials, "horizon_s")
-    return asked
-
-
-def _check_time(value: float, trials: Sequence[Trial], name: str) -> None:
+def _check_times(trials: Sequence[Trial], **asked: float | None) -> None:
     shortest = min(t.duration for t in trials)
-    if not 0.0 < number(value, name) < shortest:
-        raise InputError(
-            f"expected seconds between 0 and {shortest:.4g}, the shortest trial; found {value:g}", column=name
-        )
+    for name, value in asked.items():
+        if value is not None and not 0.0 < number(value, name) < shortest:
+            message = f"expected seconds between 0 and {shortest:.4g}, the shortest trial; found {value:g}"
+            raise InputError(message, column=name)
 
 
 __all__ = ["compare"]

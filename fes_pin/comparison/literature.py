@@ -83,18 +83,14 @@ class Published:
         if self.fixed:
             held = dict(self.fixed)
             left = tuple(n for n in rig.fitted_parameters() if n not in held)
-            rig = dataclasses.replace(rig, fitted=left, **held)  # type: ignore[arg-type]
-        return Model(rig, tuple(e for e in self.effects(trials) if is_felt(nominal, e, trials)))
+            rig = dataclasses.replace(nominal.with_parameters(held).rig, fitted=left)
+        signals = {name for t in trials for name in rig.changeable(t.kind, rig.input_columns(t))}
+        return Model(rig, tuple(e for e in self.effects(trials) if rig.takes(e) and e.signal in signals))
 
-    def unfelt(self, nominal: Model, trials: Sequence[Trial]) -> tuple[str, ...]:
-        """Names of its effects that act in none of these trials."""
-        return tuple(e.name for e in self.effects(trials) if not is_felt(nominal, e, trials))
-
-
-def is_felt(model: Model, effect: Effect, trials: Sequence[Trial]) -> bool:
-    """Return whether an effect belongs to the rig and acts in some of the trials."""
-    rig = model.rig
-    return rig.takes(effect) and any(effect.signal in rig.changeable(t.kind, rig.input_columns(t)) for t in trials)
+    def unfelt(self, model: Model, trials: Sequence[Trial]) -> tuple[str, ...]:
+        """Names of its effects that are not in its model, as they act in none of these trials."""
+        felt = [e.name for e in model.effects]
+        return tuple(e.name for e in self.effects(trials) if e.name not in felt)
 
 
 def _contractile(trials: Sequence[Trial]) -> tuple[Effect, ...]:
