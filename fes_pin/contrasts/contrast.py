@@ -172,7 +172,9 @@ class _Work:
         changes = [change_of(models, found, i, self.catalogue, evidence.get(str(i))) for i in best.changes]
         changes += [misread_change(models, made.misread)] if made is not None else []
         unchanged, excluded, untestable = not_changed(models, best)
-        said += [*state.weighed.said, *_smoothed(best), *(UNCONFIRMED.format(n) for n in state.rejected)]
+        smoothed = max(best.weights.noise.values(), key=lambda n: n.correlation_s)
+        said += [*state.weighed.said, *words_of_reading(smoothed, best.model.rig, best.fit.trials)]
+        said += [UNCONFIRMED.format(n) for n in state.rejected]
         if left.unexplained:  # excluded sizes hold for a right model only
             unchanged, excluded = {}, {}
             said.append("with a lack of fit in one group no change can be excluded")
@@ -201,12 +203,6 @@ def _provenance(study: Study, after: Study | None, seed: int) -> Provenance:
         return made
     both = zip(labels_of(study, after), (study, after), strict=True)
     return replace(made, inputs={f"{label}/{path}": sha for label, one in both for path, sha in one.inputs().items()})
-
-
-def _smoothed(best: Grouped) -> tuple[str, ...]:
-    """Return warnings about smoothed readings of a driven rig."""
-    noise = max(best.weights.noise.values(), key=lambda n: n.correlation_s)
-    return words_of_reading(noise, best.model.rig, best.fit.trials)
 
 
 __all__ = ["contrast"]

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from hashlib import sha256
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import instance
@@ -72,25 +73,23 @@ def _labelled(study: Study, by: str) -> Study:
 
 def _joined(before: Study, after: Study) -> Study:
     """Return two studies of one rig as one, each a group by its name."""
-    if before.rig != after.rig:
-        raise InputError(f"expected a study of the rig {before.rig}, found {after.rig}", file=after.folder)
-    for name in sorted(set(before.constants) | set(after.constants)):
-        one, two = before.constants.get(name), after.constants.get(name)
-        if one != two:
-            message = f"expected the rig of {before.name} with {name} = {one}, found {two}"
-            raise InputError(message, file=after.document, column=f"rig.{name}")
-    if (before.urdf is None) != (after.urdf is None):
-        raise InputError(f"expected the rig of {before.name}: one has a URDF, the other none", file=after.folder)
-    if before.urdf is not None and after.urdf is not None and before.urdf.read_bytes() != after.urdf.read_bytes():
-        raise InputError(f"expected the URDF of {before.name}, found another", file=after.urdf)
-    if set(before.start) != set(after.start):
-        odd = sorted(set(before.start) ^ set(after.start))[0]
-        raise InputError(f"expected start.{odd} in both studies, or in none", file=after.document)
+    one, two = _rig_of(before), _rig_of(after)
+    for name in dict.fromkeys([*one, *two]):
+        if one.get(name) != two.get(name):
+            message = f"expected the rig of {before.name}: {one.get(name, 'none')}, found {two.get(name, 'none')}"
+            raise InputError(message, file=after.document or after.folder, column=name)
     names = labels_of(before, after)
     trials: list[Trial] = []
     for label, study in zip(names, (before, after), strict=True):
         trials += [derived_trial(t, name=f"{label}/{t.name}", group=label) for t in study.trials]
     return replace(before, name=f"{names[0]} and {names[1]}", trials=tuple(trials))
+
+
+def _rig_of(study: Study) -> dict[str, object]:
+    """Return what studies of one rig have alike, by its key in the study format."""
+    start = dict.fromkeys((f"start.{n}" for n in study.start), "a value")
+    urdf = {} if study.urdf is None else {"rig.urdf": f"SHA-256 {sha256(study.urdf.read_bytes()).hexdigest()}"}
+    return {"study.rig": study.rig, **{f"rig.{n}": v for n, v in study.constants.items()}, **urdf, **start}
 
 
 def labels_of(before: Study, after: Study) -> tuple[str, str]:
