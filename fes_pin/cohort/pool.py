@@ -22,7 +22,7 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.stats import binomtest, chi2, false_discovery_control, t
 
-from fes_pin.infer.result import LEAST_P
+from fes_pin.infer.family import SMALLEST_P
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ def pooled(values: Sequence[float], stds: Sequence[float]) -> PooledEffect | Non
         next_low=(mu - reach) * size,
         next_high=(mu + reach) * size,
         heterogeneity=100.0 * max(0.0, (q - (k - 1)) / q) if q > 0.0 else 0.0,
-        p_alike=max(float(chi2.sf(q, k - 1)), LEAST_P),
+        p_alike=max(float(chi2.sf(q, k - 1)), SMALLEST_P),
     )
 
 

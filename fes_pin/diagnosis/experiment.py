@@ -123,13 +123,12 @@ def next_experiment(
     study
         The rig, and the conditions that it was run under.
     """
+    pair = name, next(iter(rivals))
     if falls(best.model, best.trials):
-        pair = (name, next(iter(rivals)))
         why = f"{' and '.join(pair)}: the rig falls unless its controller holds it, and no effort is proposed"
         return NextExperiment(f"{why}; move it further, or another way, and diagnose again", pair)
     found = _best(best, rivals, list(candidates(study)), study)
     if found is None:
-        pair = (name, next(iter(rivals)))
         why = f"no trial was found for {' and '.join(pair)} that stays near what has been measured"
         return NextExperiment(why, pair)
     expected, trial = _refined(best, rivals, found, study)

@@ -27,16 +27,22 @@ def folds_of(trials: Sequence[Trial], groups: Sequence[str] | None = None, count
 
 @dataclass(frozen=True)
 class Fold:
-    """Trials that are held out together, and the fits without them."""
+    """Trials that are held out together, and the fits without them.
+
+    Attributes
+    ----------
+    within
+        False if the study itself holds the trials out, so that they are in no fit.
+    chosen
+        The set that is chosen again without the trials, fitted to the others; None where no choice is made again.
+    """
 
     nominal: LikelihoodFit
     best: LikelihoodFit
     without: dict[str, LikelihoodFit]
     test: tuple[Trial, ...]
     within: bool = True
-    """False if the study itself holds the trials out, so that they are in no fit."""
     chosen: LikelihoodFit | None = None
-    """The set that is chosen again without the trials, fitted to the others; None where no choice is made again."""
 
 
 class Again:

@@ -146,12 +146,9 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
         """
         best, train = state.found.best, self.models.trials
         folds = self.folds(state)
-        if folds and folds[0].within:
-            pairs = [(f.chosen or f.best, f.best, f.test) for f in folds]
-        else:
-            held = folds_of(train) if len(train) > 1 else []
-            others = self.refitted([(best, [t for i, t in enumerate(best.trials) if i not in out]) for out in held])
-            pairs = [(f, f, tuple(train[i] for i in out)) for f, out in zip(others, held, strict=True)]
+        if not (folds and folds[0].within):
+            folds = make_folds(replace(state.found, nominal=best, without={}), train, (), self.refitted)
+        pairs = [(f.chosen or f.best, f.best, f.test) for f in folds]
         error = errors_ahead(pairs or [(best, best, train)], self.models.horizon_s, self._falls(state))
         return error.horizon if error.free is None or self.models.judged_s is not None else error.free
 

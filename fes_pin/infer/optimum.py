@@ -88,10 +88,20 @@ class Optimum:
         return math.nan if name in self.at_bound else float(np.sqrt(variance))
 
     def reach(self, name: str) -> float:
-        """Return half of a parameter's 95 % interval by the quadratic approximation; the whole interval at a bound."""
+        """Return half of a parameter's 95 % interval by the quadratic approximation; the whole interval at a bound.
+
+        It is infinite where the parameter is not identified. At a bound, with g and h the slope and curvature of half
+        the sum of squares, all other parameters refitted, it is the s with 2 |g| s + h s^2 = 2.71.
+        """
         if name not in self.at_bound:
             return CONFIDENCE_95 * self.std(name)
-        return reach_at_bound(self.parts, self.place(name), [n in self.at_bound for n in self.free])
+        k, system = self.place(name), normal_equations(self.parts)
+        covariance = covariance_of(system.hessian, np.array([n == name or n not in self.at_bound for n in self.free]))
+        if not np.isfinite(covariance[k, k]):
+            return math.inf
+        known = np.isfinite(np.diag(covariance))
+        slope = abs(float(covariance[k, known] @ system.gradient[known])) / covariance[k, k]
+        return float(SEPARABLE / (slope + math.sqrt(slope**2 + SEPARABLE / covariance[k, k])))
 
     def interval(self, name: str) -> tuple[float, float]:
         """Return the 95 % interval of a fitted parameter by the quadratic approximation."""
@@ -140,30 +150,3 @@ def minimise(
         unknowns=search.unknowns,
         parts=tuple(search.parts),
     )
-
-
-def reach_at_bound(parts: Sequence[Linearized], k: int, held: Sequence[bool]) -> float:
-    """Return the end of a one-sided interval by the quadratic approximation, as a distance from the bound.
-
-    It is infinite where the parameter is not identified.
-
-    With g and h the slope and curvature of half the sum of squares, all other parameters refitted, it is the s with
-    2 |g| s + h s^2 = 2.71.
-
-    Parameters
-    ----------
-    parts
-        Trials of the fit, linearized at its optimum.
-    k
-        Place of the parameter.
-    held
-        Which parameters are at a bound.
-    """
-    system = normal_equations(parts)
-    free = np.array([not at or j == k for j, at in enumerate(held)])
-    covariance = covariance_of(system.hessian, free)
-    if not np.isfinite(covariance[k, k]):
-        return math.inf
-    known = np.isfinite(np.diag(covariance))
-    slope = abs(float(covariance[k, known] @ system.gradient[known])) / covariance[k, k]
-    return float(SEPARABLE / (slope + math.sqrt(slope**2 + SEPARABLE / covariance[k, k])))

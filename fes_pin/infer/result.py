@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, TypeVar
 
+from fes_pin.infer.family import SMALLEST_P
 from fes_pin.infer.levels import CONFIDENCE_95, NOTHING_PERCENT
 from fes_pin.infer.optimum import Optimum
 from fes_pin.infer.text import percent, probability, quantity
@@ -15,8 +16,6 @@ CELLS = ("value", "std", "unit", "low", "high", "at_bound")
 """Columns of tables of estimates; `low` and `high` are the ends of the 95 % interval."""
 DIGITS = 6
 """Significant digits printed: the last that does not depend on how sums are ordered."""
-LEAST_P = 1e-300
-"""Replaces a p-value that underflows: it is at most this."""
 
 
 def shown(value: float | None, digits: int = DIGITS) -> float | None:
@@ -26,7 +25,7 @@ def shown(value: float | None, digits: int = DIGITS) -> float | None:
 
 def p_shown(value: float) -> float | None:
     """Return a p-value rounded for print; none is zero."""
-    return shown(max(value, LEAST_P)) if math.isfinite(value) else None
+    return shown(max(value, SMALLEST_P)) if math.isfinite(value) else None
 
 
 @dataclass(frozen=True)
@@ -114,6 +113,8 @@ class Gain:
         Horizon of the predictions, s, where that is longer than the usual one.
     on
         Data on which it is found: a key of `ON`.
+    measure
+        What it is counted in.
     """
 
     percent: float
@@ -121,17 +122,13 @@ class Gain:
     high: float
     ahead_s: float | None = None
     on: str = CROSS_VALIDATED
+    measure: ClassVar[str] = ERROR
 
     def __str__(self) -> str:
         if self.is_none:
             return "none computed"
         further = "" if self.ahead_s is None else f", {self.ahead_s:.2g} s ahead"
         return f"{self.percent:.0f} % [{self.low:.0f}, {self.high:.0f}]{further}"
-
-    @property
-    def measure(self) -> str:
-        """What it is counted in."""
-        return ERROR
 
     @property
     def is_none(self) -> bool:
@@ -171,13 +168,14 @@ class Evidence:
         The increase of twice the log-likelihood.
     squares
         |Delta|^2.
-    on
-        Data on which it is found, as in `Gain`.
+    on, measure
+        As of `Gain`.
     """
 
     added: float
     squares: float
     on: str = CROSS_VALIDATED
+    measure: ClassVar[str] = LIKELIHOOD
 
     @property
     def low(self) -> float:
@@ -191,11 +189,6 @@ class Evidence:
 
     def __add__(self, other: Evidence) -> Evidence:
         return Evidence(self.added + other.added, self.squares + other.squares, self.on)
-
-    @property
-    def measure(self) -> str:
-        """What it is counted in."""
-        return LIKELIHOOD
 
     @property
     def high(self) -> float:

@@ -16,7 +16,7 @@ from fes_pin.infer.held_out import is_supported
 from fes_pin.infer.result import Evidence, Gain, Remainder
 from fes_pin.infer.search import M, Search, SearchResult
 
-CAUSES_FOUND, UNEXPLAINED, ADEQUATE, STOPPED = "causes_found", "unexplained", "adequate", "stopped"
+CAUSES_FOUND, UNEXPLAINED, ADEQUATE = "causes_found", "unexplained", "adequate"
 
 
 @dataclass(frozen=True)
@@ -221,8 +221,6 @@ def share_in(found: SearchResult[F], name: str) -> float:
     return (found.without[name].sse - found.best.sse) / max(whole, 1e-9)
 
 
-def word_of(has_candidates: bool, lack_of_fit: Remainder, stopped: bool = False) -> str:
+def word_of(has_candidates: bool, lack_of_fit: Remainder) -> str:
     """Return the verdict in a word."""
-    if stopped:
-        return STOPPED
     return CAUSES_FOUND if has_candidates else UNEXPLAINED if lack_of_fit.unexplained else ADEQUATE

@@ -46,16 +46,15 @@ def test_of_several_units_a_candidate_together_with_others_needs_their_likelihoo
 
 
 @pytest.mark.parametrize(
-    ("has_candidates", "left", "stopped", "word"),
+    ("has_candidates", "left", "word"),
     [
-        (True, SOMETHING, False, "causes_found"),
-        (False, SOMETHING, False, "unexplained"),
-        (False, NOISE, False, "adequate"),
-        (True, NOISE, True, "stopped"),
+        (True, SOMETHING, "causes_found"),
+        (False, SOMETHING, "unexplained"),
+        (False, NOISE, "adequate"),
     ],
 )
-def test_the_word_says_what_is_claimed_first(has_candidates, left, stopped, word):
-    assert word_of(has_candidates, left, stopped) == word
+def test_the_word_says_what_is_claimed_first(has_candidates, left, word):
+    assert word_of(has_candidates, left) == word
 
 
 def test_folds_keep_every_group():
