@@ -83,18 +83,6 @@ def make_folds(found: Found, train: Sequence[Trial], test: Sequence[Trial], refi
     ]
 
 
-def with_choices(folds: Sequence[Fold], chosen: Sequence[LikelihoodFit], refitted: Again) -> list[Fold]:
-    """Return the folds with the set that each chooses again.
-
-    Parameters
-    ----------
-    chosen
-        For each fold, the fit to all trials of the set that is chosen without its own trials.
-    """
-    again = refitted([(one, fold.best.trials) for one, fold in zip(chosen, folds, strict=True)])
-    return [replace(fold, chosen=one) for fold, one in zip(folds, again, strict=True)]
-
-
 def refit(fitted: LikelihoodFit, trials: Sequence[Trial]) -> LikelihoodFit:
     """Return the fit of the same model to other trials, with the noise of these."""
     problem, unknowns = _problem(fitted, trials)

@@ -59,12 +59,9 @@ class LogFaults:
         """Return the same under a diagnosis; 0 where the efforts as recorded are likelier than the corrected ones."""
         fitted, known = diagnosis.extended, diagnosis.log.effort_noise
         if known:
-            return known * self._in_time(lambda: float(fitted.sse < self._as_recorded(fitted).sse), 1.0)
+            as_recorded = self.prepared(self.trials)
+            return known * self._in_time(lambda: float(fitted.sse < maximum_from(fitted, as_recorded).sse), 1.0)
         return self._in_time(lambda: self._noise(fitted), 0.0) if diagnosis.verdict != "adequate" else 0.0
-
-    def _as_recorded(self, fitted: LikelihoodFit) -> LikelihoodFit:
-        """Return the fit of the same model to trials with their efforts as recorded."""
-        return maximum_from(fitted, self.prepared(self.trials))
 
     def _noise(self, fitted: LikelihoodFit) -> float:
         return effort_noise_of(fitted, self.trials, self.answers, self.prepared)
@@ -121,8 +118,15 @@ def with_timing_of(log: Log, timed: Log) -> Log:
 
 
 def likelier(other: Diagnosis, one: Diagnosis) -> Diagnosis:
-    """Return the likelier of two diagnoses of the same readings with different efforts."""
-    return other if _is_likelier(other.extended, one.extended) else one
+    """Return the likelier of two diagnoses of the same readings with different efforts.
+
+    It has the lower criterion, both at the longer correlation time of measurement noise. If the process noise of one is
+    white, both are fitted with white process noise.
+    """
+    fits = [d.extended for d in (other, one)]
+    correlation_s, timed = max(f.noise.correlation_s for f in fits), any(f.noise.timed for f in fits)
+    first, second = (_as_random(f, correlation_s, timed) for f in fits)
+    return other if first.criterion < second.criterion else one
 
 
 def with_words(diagnosis: Diagnosis) -> Diagnosis:
@@ -133,17 +137,6 @@ def with_words(diagnosis: Diagnosis) -> Diagnosis:
     if log.effort_noise:
         said.append(words_of_noise(log.effort_noise, diagnosis.model.rig.units()["effort"]))
     return replace(diagnosis, warnings=(*said, *diagnosis.warnings))
-
-
-def _is_likelier(one: LikelihoodFit, other: LikelihoodFit) -> bool:
-    """Return whether the first fit has the lower criterion, both at the longer correlation time of measurement noise.
-
-    If the process noise of one is white, both are fitted with white process noise.
-    """
-    both = one.noise, other.noise
-    correlation_s, timed = max(n.correlation_s for n in both), any(n.timed for n in both)
-    first, second = (_as_random(f, correlation_s, timed) for f in (one, other))
-    return first.criterion < second.criterion
 
 
 def _as_random(fitted: LikelihoodFit, correlation_s: float, timed: bool) -> LikelihoodFit:

@@ -47,7 +47,8 @@ def diagnosis_of(
     best, other = as_wide_as_trials_differ(with_honest_intervals(found.best), again), verdict.by_the_other(state)
     if other is not None:
         best = as_wide_as_estimates_differ(best, other)
-    fitted, held = verdict.errors(state), verdict.held_out_errors(state)
+    fitted, *others = verdict.errors(state)
+    held = others[0] if others else None
     on = HELD_OUT if trials[1] else CROSS_VALIDATED if held else FITTED
     causes = [_cause(verdict, state, one, best, on) for one in best.model.effects]
     causes.sort(key=lambda c: -c.gain_held_out.percent)

@@ -9,7 +9,7 @@ from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.conditions import Conditions, Restated
 from fes_pin.diagnosis.errors_ahead import errors_ahead, free_errors
-from fes_pin.diagnosis.held_out import folds_of, refit
+from fes_pin.diagnosis.held_out import Again, make_folds, refit
 from fes_pin.diagnosis.long_records import in_parts
 from fes_pin.diagnosis.misread import NAME, Misread, find_misread, restated_trials
 from fes_pin.diagnosis.remainder.lack_of_fit import lack_of_fit
@@ -72,19 +72,12 @@ def with_misread(
         return restated
     parts = in_parts(before.model.rig, trials)
     nominal = maximum_from(made.searched.nominal, parts)
-    held = [(nominal, best, test)] if test else [_without(nominal, best, out) for out in folds_of(parts)]
+    alone = replace(made.searched, nominal=nominal, best=nominal, without={})
+    held = [(f.best, best, f.test) for f in make_folds(alone, parts, test, Again(refit))]
     horizon, falling = diagnosis.ahead.horizon_s, diagnosis.ahead.nominal.free is None
     inside, outside = (errors_ahead(some, horizon, falling) for some in ([(nominal, best, parts)], held))
     ahead = replace(diagnosis.ahead, nominal=inside, nominal_held_out=outside)
     return replace(restated, nominal_error=(inside.free, outside.free), ahead=ahead)
-
-
-def _without(
-    fitted: LikelihoodFit, floor: LikelihoodFit, out: Sequence[int]
-) -> tuple[LikelihoodFit, LikelihoodFit, list[Trial]]:
-    """Return a fit without some of its trials, the fit whose noise is the unit of its errors, and those trials."""
-    others = [t for i, t in enumerate(fitted.trials) if i not in out]
-    return refit(fitted, others), floor, [fitted.trials[i] for i in out]
 
 
 def _cause(made: Made, gain_fit: float, trials: Sequence[Trial], seed: int) -> Cause:

@@ -29,7 +29,6 @@ from fes_pin.diagnosis.held_out import (
     gains_of,
     make_folds,
     refit,
-    with_choices,
 )
 from fes_pin.diagnosis.rejected import UNMOVED, is_moved_by_what_is_recorded, no_noise, with_rejected_causes
 from fes_pin.diagnosis.remainder.lack_of_fit import lack_of_fit
@@ -38,6 +37,7 @@ from fes_pin.identify.ahead import falls
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.levels import FORM_SHARE
 from fes_pin.infer.result import Remainder
+from fes_pin.infer.text import WHOLE
 from fes_pin.infer.verdict import State, Verdict, Weighed
 
 
@@ -112,7 +112,7 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
         Where process noise is large, a cause that explains no more than an error of form is not supported either.
         """
         gains = state.weighed.gains
-        if are_large(state.weighed.random) and (form := [n for n in gains if gains[n].low < 100.0 * FORM_SHARE]):
+        if are_large(state.weighed.random) and (form := [n for n in gains if gains[n].low < WHOLE * FORM_SHARE]):
             return form
         return super().unsupported(state)
 
@@ -166,22 +166,20 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
     def folds(self, state: RigState) -> Sequence[Fold]:
         """Return the held-out trials, with fits without them, and the set that each fold chooses again."""
         chosen, folds = self.chosen(state), state.weighed.folds
-        return with_choices(folds, chosen, self.refitted) if chosen and state.names else folds
+        if not chosen or not state.names:
+            return folds
+        again = self.refitted([(one, fold.best.trials) for one, fold in zip(chosen, folds, strict=True)])
+        return [replace(fold, chosen=one) for fold, one in zip(folds, again, strict=True)]
 
-    def errors(self, state: RigState) -> tuple[Ahead, Ahead]:
-        """Return errors of the nominal and of the extended model on the fitted trials."""
-        found = state.found
-        return self._errors_on(state, [Fold(found.nominal, found.best, found.without, self.models.trials)])
-
-    def held_out_errors(self, state: RigState) -> tuple[Ahead, Ahead] | None:
-        """Return the same on held-out trials; None where there are none."""
-        folds = self.folds(state)
-        return self._errors_on(state, folds) if folds else None
-
-    def _errors_on(self, state: RigState, folds: Sequence[Fold]) -> tuple[Ahead, Ahead]:
-        fits = [(f.nominal, f.best, f.test) for f in folds], [(f.chosen or f.best, f.best, f.test) for f in folds]
-        nominal, best = (errors_ahead(one, self.models.horizon_s, self._falls(state)) for one in fits)
-        return nominal, best
+    def errors(self, state: RigState) -> list[tuple[Ahead, Ahead]]:
+        """Return errors of the nominal and of the extended model: on the fitted trials, and on held-out ones if any."""
+        found, out = state.found, []
+        whole = [Fold(found.nominal, found.best, found.without, self.models.trials)]
+        for folds in filter(None, (whole, self.folds(state))):
+            fits = [(f.nominal, f.best, f.test) for f in folds], [(f.chosen or f.best, f.best, f.test) for f in folds]
+            nominal, best = (errors_ahead(one, self.models.horizon_s, self._falls(state)) for one in fits)
+            out.append((nominal, best))
+        return out
 
     def remainder(self, state: RigState) -> tuple[Remainder, str | None]:
         """Return the lack of fit of a set, and its reason where no test finds it.

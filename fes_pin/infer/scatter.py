@@ -139,15 +139,11 @@ def scores_of(parts: Sequence[Linearized]) -> np.ndarray:
         piece
         for part, count in zip(parts, shares, strict=True)
         for piece in np.add.reduceat(
-            without_locals(part, part.jacobian) * part.residual[:, None], _beginnings(part, count)
+            without_locals(part, part.jacobian) * part.residual[:, None],
+            np.linspace(0, len(part.residual), count, endpoint=False, dtype=int),
         )
     ]
     return np.array(pieces)
-
-
-def _beginnings(part: Linearized, count: int) -> np.ndarray:
-    """Return the first samples of the pieces of a trial, shape (count,)."""
-    return np.linspace(0, len(part.residual), count, endpoint=False, dtype=int)
 
 
 def in_pieces(values: np.ndarray, trials: int) -> np.ndarray:

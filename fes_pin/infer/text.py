@@ -4,6 +4,8 @@ import math
 
 LEAST_P, LEAST_PERCENT = 1e-12, 1e-3
 """Least p-value and percentage that are printed; smaller ones are printed as below these."""
+WHOLE = 100.0
+"""A whole in percent: from it on no decimals are printed."""
 LARGE, DIGITS = 1e5, 6
 """Larger values, and values with more decimals, are printed with a power of ten."""
 
@@ -22,7 +24,7 @@ def percent(value: float | None) -> str:
     if 0.0 <= value < LEAST_PERCENT:
         return f"below {LEAST_PERCENT:g} %"
     digits = 2 if value < 1.0 else 3
-    return f"{value:.0f} %" if value >= 100.0 else f"{value:.{digits}g} %"
+    return f"{value:.0f} %" if value >= WHOLE else f"{value:.{digits}g} %"
 
 
 def rounded(value: float, std: float) -> str:

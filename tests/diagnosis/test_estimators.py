@@ -24,7 +24,7 @@ def test_trials_that_the_study_holds_out_do_not_choose_between_estimators():
     columns = {n: -v if n == "position" else v for n, v in held.columns.items()}
     verdicts = [RigVerdict(search, test) for test in ([held], [derived_trial(held, columns=columns)], [])]
     states = [v.of(found) for v in verdicts]
-    one, other, none = (v.held_out_errors(s)[1].free for v, s in zip(verdicts, states, strict=True))
+    one, other, none = (v.errors(s)[1][1].free for v, s in zip(verdicts, states, strict=True))
     assert one < 1.0 < 100.0 < other
     errors = [v.prediction_error(s) for v, s in zip(verdicts, states, strict=True)]
     assert errors[0] == errors[1] == pytest.approx(none, rel=1e-9)

@@ -12,7 +12,7 @@ from fes_pin.diagnosis.search.library import Library
 from fes_pin.diagnosis.search.likelihood_maxima import less, likeliest, look, maximum_from_afar, process_noises
 from fes_pin.diagnosis.search.possible import is_possible
 from fes_pin.diagnosis.search.score import Scored, best_by_effect
-from fes_pin.diagnosis.search.starts import STARTS, from_afar, refinements, started
+from fes_pin.diagnosis.search.starts import STARTED, STARTS, from_afar, refinements, started
 from fes_pin.identify.ahead import default_horizon
 from fes_pin.identify.correlation_time import with_new_noise
 from fes_pin.identify.likelihood import LikelihoodProblem
@@ -264,4 +264,4 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
 
 def _of_much(shapes: Sequence[Scored]) -> list[Scored]:
     """Return the shapes of a cause of largest score."""
-    return [s for s in shapes[:STARTS] if s.gain >= 0.5 * shapes[0].gain]
+    return [s for s in shapes[:STARTS] if s.gain >= STARTED * shapes[0].gain]

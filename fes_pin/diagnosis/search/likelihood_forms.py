@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from fes_pin.diagnosis.search.likelihood_maxima import better, less, look
-from fes_pin.diagnosis.search.starts import STARTS, number_of_forms, refinements
+from fes_pin.diagnosis.search.starts import STARTED, STARTS, number_of_forms, refinements
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood_fit import LikelihoodFit, maximum_from
 from fes_pin.infer.distributions import chi2_quantile, chi2_tail
@@ -59,7 +59,7 @@ def demanded_form(
     """
     looks = sorted(looks, key=lambda f: f.criterion)
     demanded = chi2_quantile(1.0 - level, 1)
-    worth = [f for f in looks[:STARTS] if base.sse - f.sse > 0.5 * max(demanded, base.sse - looks[0].sse)]
+    worth = [f for f in looks[:STARTS] if base.sse - f.sse > STARTED * max(demanded, base.sse - looks[0].sse)]
     best = min(finished(worth), key=lambda f: f.criterion, default=None)
     if best is None or not chi2_tail(max(base.sse - best.sse, 0.0), more_degrees(best, base)) < level:
         return None
