@@ -10,7 +10,6 @@ from scipy import special
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.results import Recorded, Saveable
-from fes_pin.data.show import by_columns
 from fes_pin.data.study import Study
 from fes_pin.identify.fit import Fit
 from fes_pin.infer.levels import UNUSUAL_LEVEL
@@ -159,17 +158,13 @@ class Comparison(Saveable):
     def columns(self) -> dict[str, list[Any]]:
         """The table of `to_frame`, by columns: a row a model, its errors E in percent."""
         kinds = dict.fromkeys(k for m in self.models for k in m.percent)
-        apart = [(kind, n) for kind in ("free", "horizon") for n in ("more", "low", "high")]
-        head = ("model", "parameters", *(f"{k}_percent" for k in kinds), *(f"{k}_{n}" for k, n in apart), "converged")
-        best = Apart(0.0, 0.0, 0.0)
-        rows = [
-            (
-                *(m.name, m.parameters, *(m.percent.get(k, math.nan) for k in kinds)),
-                *(*(getattr(m.apart[k] or best, n) for k, n in apart), m.converged),
-            )
-            for m in self.models
-        ]
-        return by_columns(head, rows)
+        out: dict[str, list[Any]] = {"model": [m.name for m in self.models]}
+        out["parameters"] = [m.parameters for m in self.models]
+        out |= {f"{kind}_percent": [m.percent.get(kind, math.nan) for m in self.models] for kind in kinds}
+        for kind in ("free", "horizon"):
+            apart = [m.apart[kind] or Apart(0.0, 0.0, 0.0) for m in self.models]
+            out |= {f"{kind}_{n}": [getattr(one, n) for one in apart] for n in ("more", "low", "high")}
+        return {**out, "converged": [m.converged for m in self.models]}
 
     def as_table(self) -> tuple[str, Sequence[str], Sequence[Sequence[str]], Sequence[str]]:
         """Title, head, rows and notes of the table that is printed."""

@@ -20,11 +20,9 @@ def change_of(
     assert item.group is not None
     wider = math.sqrt(max(1.0, models.spread(best, *models.under_noise_of(best, [found.without[str(item)]])).phi))
     nominal = item.name in found.nominal.model.free
-    parameters = _by_group(best, item, groups, nominal, wider)
+    parameters = _by_group(best, item, wider)
     first = next(iter(parameters.values()))
-    reference = next(g for g in groups if g != item.group)
-    forward = groups.index(reference) < groups.index(item.group)
-    one, two = (reference, item.group) if forward else (item.group, reference)
+    one, two = sorted((item.group, next(g for g in groups if g != item.group)), key=groups.index)
     if nominal:
         words = of_nominal(model.rig, item.name, first[one].value, first[two].value, first[one].unit)
     else:
@@ -42,20 +40,18 @@ def change_of(
     )
 
 
-def _by_group(
-    best: Grouped, item: Item, groups: tuple[str, ...], nominal: bool, wider: float
-) -> dict[str, dict[str, ParameterEstimate]]:
+def _by_group(best: Grouped, item: Item, wider: float) -> dict[str, dict[str, ParameterEstimate]]:
     """Return each parameter of a change in each group, with widened deviations; its null where a group has none."""
     model = best.model
     assert item.group is not None
     own = model.models[item.group]
     parameters: dict[str, dict[str, ParameterEstimate]] = {}
-    for path in [item.name] if nominal else [n for n in own.parameters() if n.split(".", maxsplit=1)[0] == item.name]:
+    for path in [n for n in own.parameters() if n.partition(".")[0] == item.name]:
         here = own.parameter_info()[path]
         if here.optional:
             continue
         parameters[path.removeprefix(f"{item.name}.")] = values = {}
-        for group in groups:
+        for group in model.models:
             if path in model.models[group].parameters():
                 values[group] = ParameterEstimate.of(best.fit, model.path(path, group), here.unit, wider)
             elif here.null is not None:

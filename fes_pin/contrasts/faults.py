@@ -17,7 +17,7 @@ from fes_pin.diagnosis.misread import Misread, find_misread
 from fes_pin.identify.effort_timing import lateness_of
 from fes_pin.identify.likelihood_fit import maximum_from
 from fes_pin.infer.levels import CLAIM_LEVEL
-from fes_pin.workers import in_parallel
+from fes_pin.workers import attempted, in_parallel
 
 
 class GroupConditions(Conditions[Grouped, ContrastModels]):
@@ -64,10 +64,7 @@ def _late_in(models: ContrastModels, one: Grouped) -> float | None:
         late = lateness_of(maximum_from(part, part.trials), min(t.dt for t in part.trials))
         return math.nan if late is None else late.log.effort_late_s
 
-    try:
-        mean = float(np.mean(in_parallel(late_in, models.trials)))
-    except (ArithmeticError, np.linalg.LinAlgError):
-        return None
+    mean = attempted(lambda: float(np.mean(in_parallel(late_in, models.trials))), math.nan)
     return mean if math.isfinite(mean) else None
 
 
