@@ -18,8 +18,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import fes_pin as fp
+from fes_pin.comparison.held_out import own_part, pairs_of
 from fes_pin.comparison.literature import published_model
-from fes_pin.comparison.own_part import own_part, pairs_of
 from fes_pin.data.datasets import fetch
 from fes_pin.data.errors import InputError
 from fes_pin.identify.fit import fit_problem

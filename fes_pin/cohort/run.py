@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fes_pin.cohort.cluster import on_cluster
 from fes_pin.cohort.found import find_studies
 from fes_pin.cohort.keep import STATE, Store
-from fes_pin.cohort.local import Task, in_processes
 from fes_pin.cohort.one import Answer, Work, diagnose_one
 from fes_pin.cohort.page import cohort_html
+from fes_pin.cohort.processes import Task, in_processes, on_cluster
 from fes_pin.cohort.tables import (
     ERRORS,
     Row,

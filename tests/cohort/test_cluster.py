@@ -7,7 +7,7 @@ from collections import Counter
 import pytest
 from cohort.fakes import calls, quick, studies
 
-from fes_pin.cohort.cluster import on_cluster
+from fes_pin.cohort.processes import on_cluster
 from fes_pin.cohort.run import run_cohort
 from fes_pin.data.errors import InputError
 
@@ -45,6 +45,6 @@ def test_a_worker_that_is_killed_costs_no_study(tmp_path, cluster):
 
 
 def test_a_scheduler_that_is_not_there_is_one_line(monkeypatch):
-    monkeypatch.setattr("fes_pin.cohort.cluster.PATIENCE_S", "1s")
+    monkeypatch.setattr("fes_pin.cohort.processes.PATIENCE_S", "1s")
     with pytest.raises(InputError, match="no Dask scheduler answers"):
         next(on_cluster([(None, "")], "tcp://127.0.0.1:9", quick))

@@ -12,8 +12,8 @@ from data import studies
 
 import fes_pin as fp
 from fes_pin.cli import main
+from fes_pin.comparison.held_out import own_part
 from fes_pin.comparison.literature import LITERATURE, published_model
-from fes_pin.comparison.own_part import own_part
 from fes_pin.comparison.result import apart_from
 from fes_pin.data.errors import InputError
 from fes_pin.diagnosis.errors_ahead import free_errors

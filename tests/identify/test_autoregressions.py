@@ -10,8 +10,7 @@ from scipy.signal import lfilter
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.log import Log
-from fes_pin.identify.autoregressions import autoregressions
-from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.identify.likelihood import LikelihoodProblem, autoregressions
 from fes_pin.identify.problem import Problem
 from fes_pin.identify.process_noise import first_guess, stilled
 from fes_pin.identify.stored import load_random, stored_tables

@@ -1,7 +1,13 @@
-"""Studies in processes of this machine. A process that dies takes no other study with it."""
+"""Studies in processes of this machine, or on a Dask cluster that is there already.
+
+A process that dies takes no other study with it. The workers of a cluster must see the studies under the same paths; a
+worker that is lost has its studies diagnosed elsewhere by the scheduler. Answers are written here alone.
+"""
 
 import multiprocessing
 import os
+import re
+import socket
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
@@ -12,12 +18,17 @@ from itertools import islice
 from queue import SimpleQueue
 
 from fes_pin.cohort.one import Answer, Work
+from fes_pin.data.errors import InputError
+from fes_pin.data.libraries import optional_library
 
 STUDIES_EACH = 25
 """Studies that a process diagnoses before a new one takes its place: a bound on what it may have gathered."""
 DIED = "the process that diagnosed it died: out of memory, or killed"
 DEATHS = ("BrokenProcessPool", "KilledWorker", "NoneType")
 """Errors of a study whose process died, or whose workers died more often than a scheduler allows."""
+AHEAD = 2
+"""Studies that wait at each worker: what bounds the answers that are held."""
+PATIENCE_S = "20s"
 
 Task = tuple[Work, str]
 
@@ -86,3 +97,28 @@ def _end_with(parent: int) -> None:
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()
+
+
+def on_cluster(tasks: Iterable[Task], address: str, run: Callable[[Work, str], Answer]) -> Iterator[Answer]:
+    """Answers as they come.
+
+    Raises
+    ------
+    InputError
+        What is given is no address, dask.distributed is not installed, or no scheduler answers at the address.
+    """
+    host = re.fullmatch(r"(?:(?:tcp|tls)://)?\[?([^\s/]+?)\]?:\d{1,5}|(?!tcp:|tls:)\w+://\S+", address)
+    if host is None:
+        raise InputError(
+            f"expected the address of a Dask scheduler, as tcp://host:8786, found {address!r}", column="scheduler"
+        )
+    distributed = optional_library("distributed", "cohort", "a cluster needs dask.distributed")
+    try:
+        if host[1]:
+            socket.getaddrinfo(host[1], None)  # a name that is none is said at once
+        client = distributed.Client(address, timeout=PATIENCE_S, set_as_default=False)
+    except (OSError, ValueError, TimeoutError) as problem:
+        raise InputError(f"no Dask scheduler answers at {address}: {type(problem).__name__}") from None
+    with client:
+        workers, at_once = client.get_executor(pure=False), max(1, sum(client.nthreads().values())) + AHEAD
+        yield from as_they_come(tasks, lambda task: workers.submit(run, *task), at_once)
