@@ -16,10 +16,10 @@ def change_of(
     models: ContrastModels, found: Found, item: Item, catalogue: Catalogue, evidence: Evidence | None
 ) -> Change:
     """Return one change of the result: its size in each group, in words, and its equivalents."""
-    best, model, groups = found.best, found.best.model, tuple(found.best.model.models)
+    best, model, groups = found.best, found.best.grouped, tuple(found.best.grouped.models)
     assert item.group is not None
     wider = math.sqrt(max(1.0, models.spread(best, *models.under_noise_of(best, [found.without[str(item)]])).phi))
-    nominal = item.name in found.nominal.model.free
+    nominal = item.name in found.nominal.grouped.free
     parameters = _by_group(best, item, wider)
     first = next(iter(parameters.values()))
     one, two = sorted((item.group, next(g for g in groups if g != item.group)), key=groups.index)
@@ -42,7 +42,7 @@ def change_of(
 
 def _by_group(best: Grouped, item: Item, wider: float) -> dict[str, dict[str, ParameterEstimate]]:
     """Return each parameter of a change in each group, with widened deviations; its null where a group has none."""
-    model = best.model
+    model = best.grouped
     assert item.group is not None
     own = model.models[item.group]
     parameters: dict[str, dict[str, ParameterEstimate]] = {}
@@ -53,7 +53,7 @@ def _by_group(best: Grouped, item: Item, wider: float) -> dict[str, dict[str, Pa
         parameters[path.removeprefix(f"{item.name}.")] = values = {}
         for group in model.models:
             if path in model.models[group].parameters():
-                values[group] = ParameterEstimate.of(best.fit, model.path(path, group), here.unit, wider)
+                values[group] = ParameterEstimate.of(best, model.path(path, group), here.unit, wider)
             elif here.null is not None:
                 values[group] = ParameterEstimate(here.null, 0.0, here.unit)
     return parameters
@@ -85,7 +85,7 @@ def not_changed(
     """
     single = 1.0 - (1.0 - CLAIM_LEVEL) ** (1.0 / models.family.tests)
     reach, named = normal_quantile(1.0 - 0.5 * single) + normal_quantile(SEEN_POWER), {i.name for i in best.items}
-    values, units, largest, seen = best.model.parameters(), best.model.rig.units(), dict[str, float](), dict[str, str]()
+    values, units, largest, seen = best.values, best.grouped.rig.units(), dict[str, float](), dict[str, str]()
     for one in models.screen.scores(best).scored:
         name, size = one.item.name, reach * one.deviation * math.sqrt(max(one.spread.phi, 1.0))
         if one.item.group is None or name in named or not values.get(name, 1.0):

@@ -173,7 +173,7 @@ class _Work:
         changes += [misread_change(models, made.misread)] if made is not None else []
         unchanged, excluded, untestable = not_changed(models, best)
         smoothed = max(best.weights.noise.values(), key=lambda n: n.correlation_s)
-        said += [*state.weighed.said, *words_of_reading(smoothed, best.model.rig, best.fit.trials)]
+        said += [*state.weighed.said, *words_of_reading(smoothed, best.grouped.rig, best.trials)]
         said += [UNCONFIRMED.format(n) for n in state.rejected]
         if left.unexplained:  # excluded sizes hold for a right model only
             unchanged, excluded = {}, {}
@@ -188,7 +188,7 @@ class _Work:
             excluded=excluded,
             untestable=untestable,
             remainder=left,
-            fit=best.fit,
+            fit=best,
             driven=best.is_driven,
             repeats=best.repeats,
             warnings=tuple(said),

@@ -26,7 +26,7 @@ class GroupConditions(Conditions[Grouped, ContrastModels]):
     def misread(self, trials: Sequence[Trial], searched: Found | None) -> Misread | None:
         """Return the trial that is an outlier in its group, of all groups."""
         groups = in_groups(trials)
-        models = dict.fromkeys(groups, self.nominal) if searched is None else searched.best.model.models
+        models = dict.fromkeys(groups, self.nominal) if searched is None else searched.best.grouped.models
         found = [one for g, many in groups.items() if (one := find_misread(models[g], many)) is not None]
         first = min(found, key=lambda m: m.p_value, default=None)
         if first is None or not len(groups) * first.p_value < CLAIM_LEVEL:

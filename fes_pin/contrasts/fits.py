@@ -81,7 +81,7 @@ class GroupedFits:
 
     def again(self, one: Grouped, weights: Weights | None = None, rounds: int = ROUNDS) -> Grouped:
         """Fit a set from its own values; without rounds, with given weights, so that residuals have their unit."""
-        return self.fitted(one.model, weights or one.weights, one.fit.unknowns, rounds)
+        return self.fitted(one.grouped, weights or one.weights, one.unknowns, rounds)
 
     def go_on(self, one: Grouped) -> Grouped:
         """Fit a set until it converges, also from little process noise and from that of each group alone.
@@ -92,18 +92,18 @@ class GroupedFits:
 
     def refitted(self, one: Grouped, held: Collection[int]) -> Grouped:
         """Return the set fitted without some trials, by their numbers, with its own weights."""
-        kept = by_group(((k, t) for k, t in enumerate(one.fit.trials)), self.trials)
+        kept = by_group(((k, t) for k, t in enumerate(one.trials)), self.trials)
         trials = {g: [t for k, t in many if k not in held] for g, many in kept.items()}
-        problem = GroupedProblem(one.model, trials, one.weights)
-        unknowns = [u for k, u in enumerate(one.fit.unknowns) if k not in held]
-        return Grouped.of(problem, minimise(problem, one.fit.values, unknowns))
+        problem = GroupedProblem(one.grouped, trials, one.weights)
+        unknowns = [u for k, u in enumerate(one.unknowns) if k not in held]
+        return Grouped.of(problem, minimise(problem, one.values, unknowns))
 
     def part(self, one: Grouped, group: str, alone: int | None = None) -> LikelihoodFit:
         """Return a group's part of a fit as a fit of that group, to its own trials or to one of them `alone`."""
         rows = slice(None) if alone is None else slice(alone, alone + 1)
-        trials, unknowns = self.trials[group][rows], by_group(one.fit.unknowns, self.trials)[group][rows]
-        problem = LikelihoodProblem(one.model.models[group], trials, one.weights.noise[group])
-        return fit_of(problem, minimise(problem, one.model.models[group].parameters(), unknowns, SCREEN_ITERATIONS))
+        trials, unknowns = self.trials[group][rows], by_group(one.unknowns, self.trials)[group][rows]
+        problem = LikelihoodProblem(one.grouped.models[group], trials, one.weights.noise[group])
+        return fit_of(problem, minimise(problem, one.grouped.models[group].parameters(), unknowns, SCREEN_ITERATIONS))
 
     def with_process_noise(self, one: Grouped) -> Grouped | None:
         """Return a set fitted with process noise; None where that does not lower the criterion."""

@@ -312,24 +312,21 @@ def _of_group(parameters: Mapping[str, float], group: str) -> dict[str, float]:
     return {name: v for (name, _, g), v in split if g == group}
 
 
-@dataclass(frozen=True, eq=False)
-class Grouped:
-    """A fitted grouped model.
+@dataclass(frozen=True, kw_only=True, repr=False, eq=False)
+class Grouped(Fit):
+    """A fitted grouped model; its `sse` is twice the negative log-likelihood up to a constant.
 
     Attributes
     ----------
-    model
+    grouped
         The fitted model.
-    fit
-        The optimum; its `sse` is twice the negative log-likelihood up to a constant.
     weights
         Noise of each group, and scatter of repeats.
     shrinks
         Whitening of each trial by the scatter of repeats, all groups end to end; empty where nothing scatters.
     """
 
-    model: GroupedModel
-    fit: Fit
+    grouped: GroupedModel
     weights: Weights
     shrinks: Sequence[Shrink]
 
@@ -337,24 +334,13 @@ class Grouped:
     def of(cls, problem: GroupedProblem, found: Optimum) -> Grouped:
         """Return the fit of a grouped problem at its optimum."""
         model, shrinks = problem.model.with_parameters(found.values), problem.shrinks(found.values, found.unknowns)
-        ended = {**vars(found), "model": model, "parameters": model.parameters()}
-        fit = Fit(**ended, trials=problem.trials, noise=problem.noise)
-        return cls(model, fit, problem.weights, shrinks)
+        ended = {**vars(found), "model": model, "parameters": model.parameters(), "grouped": model}
+        return cls(**ended, trials=problem.trials, noise=problem.noise, weights=problem.weights, shrinks=shrinks)
 
     @property
     def items(self) -> frozenset[Item]:
         """Its causes and changes in addition to the nominal model."""
-        return self.model.items
-
-    @property
-    def sse(self) -> float:
-        """Twice the negative log-likelihood, up to a constant."""
-        return self.fit.sse
-
-    @property
-    def degrees(self) -> int:
-        """Number of free parameters."""
-        return len(self.fit.free)
+        return self.grouped.items
 
     @property
     def criterion(self) -> float:
@@ -379,12 +365,12 @@ class Grouped:
     @property
     def is_driven(self) -> bool:
         """Whether predictions are one step ahead: there is process noise, or a motion is imposed."""
-        return not all(is_simulated(n, self.fit.trials) for n in self.weights.noise.values())
+        return not all(is_simulated(n, self.trials) for n in self.weights.noise.values())
 
     @property
     def repeats(self) -> dict[str, float]:
         """Deviation of each nominal parameter between trials, as a share of the first group's value."""
-        values = next(iter(self.model.models.values())).parameters()
+        values = next(iter(self.grouped.models.values())).parameters()
         return {n: s / abs(values[n]) for n, s in self.weights.deviations.items() if values[n]}
 
     def leaning(self, moved: np.ndarray) -> float:
@@ -395,6 +381,6 @@ class Grouped:
         moved
             Change of the residuals, shape (m,), all trials end to end.
         """
-        ends = np.cumsum([len(p.residual) for p in self.fit.parts])[:-1]
+        ends = np.cumsum([len(p.residual) for p in self.parts])[:-1]
         pieces = np.split(moved, ends) if self.shrinks else []
         return sum(s.leaning(one) for s, one in zip(self.shrinks, pieces, strict=True))

@@ -93,10 +93,10 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
 
     def _look(self, base: Grouped, scores: Sequence[ItemScore]) -> Grouped:
         """Return a first fit of a set, with a round of its own noise where that of the smaller set explains changes."""
-        new = [base.model.having(base.items | {s.item}, () if s.effect is None else (s.effect,)) for s in scores]
+        new = [base.grouped.having(base.items | {s.item}, () if s.effect is None else (s.effect,)) for s in scores]
         begun = [model.with_parameters(s.start) for model, s in zip(new, scores, strict=True)]
         rounds = 0 if self.leaves_noise(base) else 1
-        looks = (self.maxima.fitted(model, base.weights, base.fit.unknowns, rounds) for model in begun)
+        looks = (self.maxima.fitted(model, base.weights, base.unknowns, rounds) for model in begun)
         return min(looks, key=lambda f: f.criterion)
 
     def near(self, size: int, without: Sequence[Names] = ()) -> list[Names]:
@@ -125,15 +125,15 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
 
     def form_of(self, fitted: Grouped) -> frozenset[tuple[str, str, tuple[str, ...]]]:
         """Return for each cause of each group its name and its refinements."""
-        models = fitted.model.models.items()
+        models = fitted.grouped.models.items()
         return frozenset((g, e.name, e.refined()) for g, m in models for e in m.effects)
 
     def without(self, names: Names, name: str) -> Grouped:
         """Return the fit of a set without one item, from the values of the set where that is better."""
         rest, whole = tuple(n for n in names if n != name), self.fits[names]
         if self._compared.get((names, name)) is not whole:
-            model = whole.model.having(whole.items - {Item.of(name)})
-            own = self.maxima.fitted(model, whole.weights, whole.fit.unknowns)
+            model = whole.grouped.having(whole.items - {Item.of(name)})
+            own = self.maxima.fitted(model, whole.weights, whole.unknowns)
             if rest not in self.fits or own.criterion < self.fits[rest].criterion:
                 self.fits[rest] = own
             self._converged.add(rest)
@@ -142,7 +142,7 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
 
     def excess_scatter(self, larger: Grouped, smaller: Grouped) -> float:
         """See `identify.scatter.excess_scatter`."""
-        return excess_scatter(larger.fit, smaller.fit)
+        return excess_scatter(larger, smaller)
 
     def p_value(self, larger: Grouped, smaller: Grouped, gain: float | None = None) -> float:
         """Return the family-wise p-value of the gain of a larger set.
@@ -165,9 +165,9 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
         freedom are reduced to 1 / (1 / f + q^2 / f0), with f0 those of the trials. Source: Satterthwaite, Biometrics
         Bulletin 2 (1946).
         """
-        left = np.concatenate([p.residual for p in larger.fit.parts])
-        moved = np.concatenate([p.residual for p in smaller.fit.parts]) - left
-        units = ByUnit.of(moved, left, larger.fit.parts)
+        left = np.concatenate([p.residual for p in larger.parts])
+        moved = np.concatenate([p.residual for p in smaller.parts]) - left
+        units = ByUnit.of(moved, left, larger.parts)
         free = len(units.sizes) - 1 - max(1, len(larger.changes))
         if free < 1:
             return Spread(1.0, free)
@@ -190,10 +190,10 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
             return None
         starts, tried = [], 0
         for group, effect in _causes(fitted):
-            own = fitted.model.models[group]
+            own = fitted.grouped.models[group]
             tried += number_of_forms(own, [effect])
-            starts += [_moved(fitted.model, group, m) for m in refinements(own, effect, self._library.measured)]
-        looks = in_parallel(lambda start: self.maxima.fitted(start, fitted.weights, fitted.fit.unknowns, 0), starts)
+            starts += [_moved(fitted.grouped, group, m) for m in refinements(own, effect, self._library.measured)]
+        looks = in_parallel(lambda start: self.maxima.fitted(start, fitted.weights, fitted.unknowns, 0), starts)
         return demanded_form(fitted, looks, DRIVEN_LEVEL / max(tried, 1), self.converged)
 
     def begin_again(self, names: Names) -> bool:
@@ -212,7 +212,7 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
 
 def _causes(fitted: Grouped) -> list[tuple[str, Effect]]:
     """Return the causes of a set, each once for all groups that share it, with the first group that has it."""
-    each = [(g, e) for g, m in fitted.model.models.items() for e in m.effects]
+    each = [(g, e) for g, m in fitted.grouped.models.items() for e in m.effects]
     shared = {i.name for i in fitted.items if i.group is None}
     return list({(e.name, "" if e.name in shared else g): (g, e) for g, e in reversed(each)}.values())
 

@@ -131,23 +131,23 @@ class Screen:
 
     def _scores(self, base: Grouped) -> ItemScores:
         """Return the scores of every item that a set does not have."""
-        projection, made = Projection(base.fit.parts), list(self._columns(base))
+        projection, made = Projection(base.parts), list(self._columns(base))
         left = np.concatenate([projection(np.nan_to_num(c.columns)) for c in made], axis=1)
         gram, along = left.T @ left, left.T @ projection.residual
         blocks = slices(c.columns.shape[1] for c in made)
         scored = []
         for c, b in zip(made, blocks, strict=True):
-            spread = ByUnit.of(left[:, b.start], projection.residual, base.fit.parts).spread(FITTED)
+            spread = ByUnit.of(left[:, b.start], projection.residual, base.parts).spread(FITTED)
             scored.append(_score(c, gram[b, b], along[b], spread))
         return ItemScores(scored, gram, [b for c, b in zip(made, blocks, strict=True) if c.item.group is not None])
 
     def _columns(self, base: Grouped) -> Iterator[_Column]:
         """Yield every item that a set does not have."""
-        ends = slices(sum(len(p.residual) for p in own) for own in by_group(base.fit.parts, self._trials).values())
+        ends = slices(sum(len(p.residual) for p in own) for own in by_group(base.parts, self._trials).values())
         rows = dict(zip(self._trials, ends, strict=True))
         for item in self._differing(base):
             yield _own(base, item, rows[str(item.group)])
-        unknowns = by_group(base.fit.unknowns, self._trials)
+        unknowns = by_group(base.unknowns, self._trials)
         wanted = [e for e in self._effects if Item(e.name) not in base.items]
         for many in in_parallel(lambda e: list(self._of_cause(e, base, unknowns, rows)), wanted):
             yield from many
@@ -175,7 +175,7 @@ class Screen:
         lacks = [g for g in rows if g not in has]
         wanted: list[tuple[Item, list[str]]] = [(Item(kind.name), lacks)]
         wanted += [(Item(kind.name, g), [g]) for g in lacks if len(lacks) > 1]
-        for one in [_at_null(base.model.models[has[0]], kind)] if has else self._library.grid(kind):
+        for one in [_at_null(base.grouped.models[has[0]], kind)] if has else self._library.grid(kind):
             pieces = {g: self._sensitivities(one, base, g, unknowns[g]) for g in lacks}
             info = one.parameters()
             amplitudes = {n: (float(info[n].null or 0.0), info[n].lower, info[n].upper) for n in one.amplitudes()}
@@ -187,7 +187,7 @@ class Screen:
 
     def _sensitivities(self, one: Effect, base: Grouped, group: str, unknowns: Unknowns) -> np.ndarray:
         """Return sensitivities of the trials of a group to the amplitudes of a cause, whitened as in a fit."""
-        at = (base.model.models[group], base.weights.noise[group], unknowns)
+        at = (base.grouped.models[group], base.weights.noise[group], unknowns)
         parts = self._by_group[group].sensitivities(one, *at)
         shrinks = by_group(base.shrinks, self._trials)[group]
         return np.concatenate([s.shrunk(p) for s, p in zip(shrinks, parts, strict=True)] if shrinks else parts)
@@ -202,11 +202,11 @@ def _at_null(model: Model, kind: type[Effect]) -> Effect:
 
 def _own(base: Grouped, item: Item, rows: slice) -> _Column:
     """Return a parameter, or a cause's amplitudes, in one group alone."""
-    model, group = base.model, str(item.group)
+    model, group = base.grouped, str(item.group)
     effects = (e for e in model.models[group].effects if e.name == item.name)
     names = [f"{e.name}.{n}" for e in effects for n in e.amplitudes()] or [item.name]
     paths = [model.path(n, group) for n in names]
-    every = np.concatenate([p.jacobian for p in base.fit.parts])[:, [model.free.index(p) for p in paths]]
+    every = np.concatenate([p.jacobian for p in base.parts])[:, [model.free.index(p) for p in paths]]
     columns = np.zeros_like(every)
     columns[rows] = every[rows]
     values, info = model.parameters(), model.parameter_info()

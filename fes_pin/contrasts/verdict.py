@@ -87,7 +87,7 @@ def folds_of_groups(trials: Mapping[str, Sequence[Trial]]) -> list[list[int]]:
 
 
 def _cost(one: Grouped) -> float:
-    return marginal_cost(one.fit, {n: info.scale for n, info in one.model.parameter_info().items()})
+    return marginal_cost(one, {n: info.scale for n, info in one.grouped.parameter_info().items()})
 
 
 def left_in_groups(models: ContrastModels, best: Grouped) -> tuple[Remainder, list[str]]:
