@@ -16,7 +16,6 @@ Benjamini and Hochberg, Controlling the false discovery rate, J. R. Stat. Soc. B
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import brentq
@@ -25,44 +24,22 @@ from scipy.stats import binomtest, chi2, false_discovery_control, t
 from fes_pin.infer.family import SMALLEST_P
 
 
-@dataclass(frozen=True)
-class PooledEffect:
-    """A value in the population that the studies are of.
-
-    Attributes
-    ----------
-    studies
-        Number of studies.
-    mean, low, high
-        Of the population's mean, with its 95 % interval.
-    between
-        tau: how much the true value differs from study to study.
-    next_low, next_high
-        Where the true value of one more study would lie in 95 of 100; infinite for fewer than 3 studies.
-    heterogeneity
-        I^2: share of the scatter that is not the studies' own uncertainty, percent.
-    p_alike
-        p-value that all studies have one value (Cochran's Q).
-    """
-
-    studies: int
-    mean: float
-    low: float
-    high: float
-    between: float
-    next_low: float
-    next_high: float
-    heterogeneity: float
-    p_alike: float
-
-
-def pooled(values: Sequence[float], stds: Sequence[float]) -> PooledEffect | None:
-    """Random-effects mean of at least two studies; None for fewer that have a finite value and deviation.
+def pooled(values: Sequence[float], stds: Sequence[float]) -> dict[str, float] | None:
+    """Return the value in the population that at least two studies are of, by a random-effects model.
 
     Parameters
     ----------
     values, stds
         Of each study, in one unit.
+
+    Returns
+    -------
+    dict or None
+        None for fewer than two studies that have a finite value and deviation. By name: the number of `studies`; the
+        `mean` of the population with its 95 % interval from `low` to `high`; `between`, which is tau; `next_low` and
+        `next_high`, where the true value of one more study would lie in 95 of 100, infinite for fewer than 3 studies;
+        `heterogeneity`, I^2, the share of the scatter that is not the studies' own uncertainty, percent; `p_alike`, the
+        p-value that all studies have one value (Cochran's Q).
     """
     y, s = np.asarray(values, dtype=float), np.asarray(stds, dtype=float)
     good = np.isfinite(y) & np.isfinite(s) & (s > 0.0)
@@ -80,17 +57,17 @@ def pooled(values: Sequence[float], stds: Sequence[float]) -> PooledEffect | Non
     half = float(t.ppf(0.975, k - 1)) * error
     reach = float(t.ppf(0.975, k - 2)) * math.hypot(math.sqrt(square), error) if k > 2 else math.inf
     q = _cochran(y, s, 0.0)
-    return PooledEffect(
-        studies=k,
-        mean=mu * size,
-        low=(mu - half) * size,
-        high=(mu + half) * size,
-        between=math.sqrt(square) * size,
-        next_low=(mu - reach) * size,
-        next_high=(mu + reach) * size,
-        heterogeneity=100.0 * max(0.0, (q - (k - 1)) / q) if q > 0.0 else 0.0,
-        p_alike=max(float(chi2.sf(q, k - 1)), SMALLEST_P),
-    )
+    return {
+        "studies": k,
+        "mean": mu * size,
+        "low": (mu - half) * size,
+        "high": (mu + half) * size,
+        "between": math.sqrt(square) * size,
+        "next_low": (mu - reach) * size,
+        "next_high": (mu + reach) * size,
+        "heterogeneity": 100.0 * max(0.0, (q - (k - 1)) / q) if q > 0.0 else 0.0,
+        "p_alike": max(float(chi2.sf(q, k - 1)), SMALLEST_P),
+    }
 
 
 def _cochran(y: np.ndarray, s: np.ndarray, square: float) -> float:

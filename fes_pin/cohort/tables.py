@@ -93,7 +93,7 @@ def pooled_rows(rows: Iterable[Row], studies: int) -> list[Row]:
     for (cause, parameter), many in by_parameter(rows).items():
         found = pooled([r["value"] for r in many], [r["std"] for r in many])
         if found is not None:
-            out.append({"cause": cause, "parameter": parameter, "of": studies, **vars(found)})
+            out.append({"cause": cause, "parameter": parameter, "of": studies, **found})
     return sorted(out, key=lambda r: (r["cause"] == "", r["cause"]))
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fes_pin.comparison.held_out import Parting, fits_of, left_out_errors, partings, spread_noise
+from fes_pin.comparison.held_out import Parting, left_out_errors, partings, spread_noise
 from fes_pin.comparison.literature import RIGS, possible, published_model
 from fes_pin.comparison.result import Apart, Compared, Comparison, apart_from
 from fes_pin.data.asked import asked
@@ -27,7 +27,7 @@ from fes_pin.models.catalogue import Source
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.store import load_model
-from fes_pin.workers import Progress, one_thread_each
+from fes_pin.workers import Progress, in_parallel, one_thread_each
 
 FEW = "too few trials to estimate how trials differ: the first seconds of a trial do not predict its others"
 
@@ -152,7 +152,7 @@ def _compared(
     given_s: float | None,
 ) -> Compared:
     """A model with its errors; `white` weighs the columns in its fits, `floor` in E."""
-    fits = fits_of(one.model, parts, white)
+    fits = in_parallel(lambda p: fit_multistart(Problem(one.model, p.fitted, white)), parts)
     kinds = left_out_errors(fits, parts, horizon_s, given_s)
     whole = fits[0] if len(parts) == 1 else fit_multistart(Problem(one.model, fitted, white))
     trials = [t for p in parts for t in p.held]

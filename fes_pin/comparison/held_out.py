@@ -11,7 +11,7 @@ estimated from its first samples alone. Laird and Ware, Biometrics 38 (1982).
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,7 +19,7 @@ import numpy as np
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.held_out import folds_of
 from fes_pin.identify.ahead import forecast, free_residuals
-from fes_pin.identify.fit import Fit, fit_multistart, noise_of
+from fes_pin.identify.fit import Fit, noise_of
 from fes_pin.identify.problem import Problem
 from fes_pin.infer.held_out import within
 from fes_pin.infer.levels import RUNAWAY
@@ -63,11 +63,6 @@ def spread_noise(model: Model, trials: Sequence[Trial]) -> dict[str, Noise]:
         columns.setdefault(model.rig.output(trial.kind), []).append(trial[model.rig.output(trial.kind)])
     stds = {n: max(float(np.nanstd(np.concatenate(v))), 1e-12) for n, v in columns.items()}
     return {n: Noise(std, (), std) for n, std in stds.items()}
-
-
-def fits_of(model: Model, parts: Sequence[Parting], white: Mapping[str, Noise]) -> list[Fit]:
-    """Fits for least free error, one for each parting."""
-    return in_parallel(lambda p: fit_multistart(Problem(model, p.fitted, white)), parts)
 
 
 def left_out_errors(

@@ -11,6 +11,7 @@ from scipy import special
 from fes_pin.data.errors import InputError
 from fes_pin.data.results import Recorded, Saveable
 from fes_pin.data.study import Study
+from fes_pin.data.units import own_unit
 from fes_pin.identify.fit import Fit
 from fes_pin.infer.levels import UNUSUAL_LEVEL
 from fes_pin.infer.result import shown
@@ -224,12 +225,8 @@ def _row(found: Comparison, one: Compared) -> tuple[str, ...]:
 
 
 def _cell(one: Compared, kinds: Sequence[str]) -> str:
-    columns = [f"{' / '.join(f'{errors[k]:.4g}' for k in kinds)} {_unit(name)}" for name, errors in one.rmse.items()]
+    columns = [f"{' / '.join(f'{errors[k]:.4g}' for k in kinds)} {own_unit(name)}" for name, errors in one.rmse.items()]
     return ", ".join(columns) + f" ({' / '.join(f'{one.percent[k]:.3g}' for k in kinds)} %)"
-
-
-def _unit(column: str) -> str:
-    return {"force_n": "N", "angle_rad": "rad", "torque_nm": "N m"}.get(column, "")
 
 
 def notes(found: Comparison) -> list[str]:

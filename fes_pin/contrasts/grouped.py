@@ -48,12 +48,6 @@ class Item:
     def __str__(self) -> str:
         return self.name if self.group is None else f"{self.name}@{self.group}"
 
-    @classmethod
-    def of(cls, text: str) -> Item:
-        """Return the item of a name, or of a name, "@" and a group."""
-        name, _, group = text.partition("@")
-        return cls(name, group or None)
-
 
 @dataclass(frozen=True)
 class GroupedModel:

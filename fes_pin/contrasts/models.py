@@ -132,7 +132,7 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
         """Return the fit of a set without one item, from the values of the set where that is better."""
         rest, whole = tuple(n for n in names if n != name), self.fits[names]
         if self._compared.get((names, name)) is not whole:
-            model = whole.grouped.having(whole.items - {Item.of(name)})
+            model = whole.grouped.having({i for i in whole.items if str(i) != name})
             own = self.maxima.fitted(model, whole.weights, whole.unknowns)
             if rest not in self.fits or own.criterion < self.fits[rest].criterion:
                 self.fits[rest] = own

@@ -113,7 +113,7 @@ class Fit(Optimum, Saveable):
         return self.within(name, *self.bounds.get(name, (info.lower, info.upper)))
 
     def _has_profile(self) -> bool:
-        return isinstance(self.model, Model)
+        return type(self) is Fit
 
     @cached_property
     def _one_sided(self) -> dict[str, tuple[float, float]]:

@@ -44,9 +44,6 @@ class LikelihoodFit(Fit):
         """
         return DRIVEN_LEVEL if self.noise.acting else CLAIM_LEVEL
 
-    def _has_profile(self) -> bool:
-        return False
-
 
 def fit_of(problem: LikelihoodProblem, found: Optimum) -> LikelihoodFit:
     """Return the fit of a problem at its optimum, with the noise of the problem."""

@@ -25,29 +25,31 @@ def vaccine():
 
 def test_published_trials_are_pooled_as_statsmodels_does():
     found = pooled(*vaccine())
-    assert found.between**2 == pytest.approx(0.3180684522, rel=1e-6)
-    assert found.mean == pytest.approx(-0.714968, abs=1e-6)
-    assert (found.low, found.high) == pytest.approx((-1.109098, -0.320838), abs=2e-6)
-    assert found.heterogeneity == pytest.approx(92.11734685, rel=1e-8)
-    assert found.p_alike < 1e-20 and found.next_low < found.low
+    assert found["between"] ** 2 == pytest.approx(0.3180684522, rel=1e-6)
+    assert found["mean"] == pytest.approx(-0.714968, abs=1e-6)
+    assert (found["low"], found["high"]) == pytest.approx((-1.109098, -0.320838), abs=2e-6)
+    assert found["heterogeneity"] == pytest.approx(92.11734685, rel=1e-8)
+    assert found["p_alike"] < 1e-20 and found["next_low"] < found["low"]
 
 
 def test_the_answer_is_free_of_units():
     y, s = vaccine()
     small, usual = pooled([1e-9 * v for v in y], 1e-9 * s), pooled(y, s)
-    assert small.mean == pytest.approx(1e-9 * usual.mean) and small.between == pytest.approx(1e-9 * usual.between)
+    assert small["mean"] == pytest.approx(1e-9 * usual["mean"]) and small["between"] == pytest.approx(
+        1e-9 * usual["between"]
+    )
 
 
 def test_studies_that_agree_differ_by_nothing():
     found = pooled([1.0, 1.01, 0.99], [0.1, 0.1, 0.1])
-    assert found.between == 0.0 and found.heterogeneity == 0.0 and found.low < 1.0 < found.high
-    assert found.high - found.low > 2 * 1.96 * 0.1 / math.sqrt(3)
+    assert found["between"] == 0.0 and found["heterogeneity"] == 0.0 and found["low"] < 1.0 < found["high"]
+    assert found["high"] - found["low"] > 2 * 1.96 * 0.1 / math.sqrt(3)
 
 
 def test_one_study_is_no_population():
     assert pooled([1.0], [0.1]) is None
     assert pooled([1.0, 2.0], [0.1, math.inf]) is None
-    assert math.isinf(pooled([1.0, 2.0], [0.1, 0.1]).next_low)
+    assert math.isinf(pooled([1.0, 2.0], [0.1, 0.1])["next_low"])
 
 
 def test_intervals_cover_the_mean_of_a_population():
@@ -55,7 +57,7 @@ def test_intervals_cover_the_mean_of_a_population():
     for _ in range(300):
         s = rng.uniform(0.1, 0.5, 8)
         found = pooled(rng.normal(2.0, 0.4, 8) + s * rng.standard_normal(8), s)
-        hits += found.low < 2.0 < found.high
+        hits += found["low"] < 2.0 < found["high"]
     assert 0.92 * 300 < hits < 0.985 * 300
 
 

@@ -18,11 +18,6 @@ def shared(tmp_path):
 FRICTION = CoulombFriction(torque_nm=0.05)
 
 
-def test_an_item_is_its_name():
-    for item in (Item("gain"), Item("gain", "b"), Item("gain", "day@2")):
-        assert Item.of(str(item)) == item
-
-
 def test_a_parameter_differs_in_one_group(shared):
     model = shared.having({Item("gain", "b")})
     assert set(model.free) == {*shared.free, "gain@b"}
