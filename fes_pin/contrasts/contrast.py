@@ -20,11 +20,10 @@ from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.conditions import Restated
 from fes_pin.diagnosis.diagnosis import measured_study, split
-from fes_pin.diagnosis.logged import LogFaults
+from fes_pin.diagnosis.logged import LogFaults, words_of_noise
 from fes_pin.diagnosis.long_records import searched_part
 from fes_pin.diagnosis.plausibility import check_study
 from fes_pin.identify.correlation_time import words_of_reading
-from fes_pin.identify.effort_noise import words_of_noise
 from fes_pin.identify.effort_timing import words_of_lateness
 from fes_pin.identify.feedback import is_fed_back
 from fes_pin.models.catalogue import Catalogue, Source, catalogue_of

@@ -139,8 +139,8 @@ def test_a_hidden_cause_is_named_and_predicted(tmp_path, cause):
 def test_nothing_hidden_is_adequate(tmp_path, monkeypatch):
     """And the effort, which is what is read here, is never moved."""
     made = joint.study((), 0.0, np.random.default_rng(11), tmp_path)
-    for asked in ("lateness_of", "effort_noise_of"):
-        monkeypatch.setattr(logged, asked, lambda *_: pytest.fail("the effort of an imposed motion was doubted"))
+    for owner, asked in ((logged, "lateness_of"), (logged.LogFaults, "_noise")):
+        monkeypatch.setattr(owner, asked, lambda *_: pytest.fail("the effort of an imposed motion was doubted"))
     assert diagnose_joint(made).verdict == "adequate"
 
 
