@@ -41,19 +41,15 @@ Pair = tuple[np.ndarray, np.ndarray]
 class Parting:
     """Trials that are fitted, and others that this fit predicts."""
 
-    fitted: tuple[Trial, ...]
-    held: tuple[Trial, ...]
+    fitted: Sequence[Trial]
+    held: Sequence[Trial]
 
 
-def partings(fitted: Sequence[Trial], held: Sequence[Trial]) -> tuple[Parting, ...]:
+def partings(fitted: Sequence[Trial], held: Sequence[Trial]) -> list[Parting]:
     """Partings that predict each trial once: trials that the study holds out, or else each by a fit without it."""
-    if held:
-        return (Parting(tuple(fitted), tuple(held)),)
-    folds = folds_of(fitted)
-    return tuple(
-        Parting(tuple(t for i, t in enumerate(fitted) if i not in fold), tuple(fitted[i] for i in fold))
-        for fold in folds
-    )
+    every = [*fitted, *held]
+    folds = [list(range(len(fitted), len(every)))] if held else folds_of(fitted)
+    return [Parting([t for i, t in enumerate(every) if i not in out], [every[i] for i in out]) for out in folds]
 
 
 def spread_noise(model: Model, trials: Sequence[Trial]) -> dict[str, Noise]:

@@ -90,8 +90,6 @@ def contrast(
         found = _Work(measured.study, catalogue, seed, tell, end, stops).contrast()
     tell(1.0, "done")
     found = replace(found, warnings=(*warnings, *found.warnings))
-    if stops:
-        found = replace(found, unchanged={}, excluded={})
     return found.ended(began, made, limit if stops else None)
 
 
@@ -174,9 +172,10 @@ class _Work:
         smoothed = max(best.weights.noise.values(), key=lambda n: n.correlation_s)
         said += [*state.weighed.said, *words_of_reading(smoothed, best.grouped.rig, best.trials)]
         said += [UNCONFIRMED.format(n) for n in state.rejected]
-        if left.unexplained:  # excluded sizes hold for a right model only
-            unchanged, excluded = {}, {}
+        if left.unexplained:
             said.append("with a lack of fit in one group no change can be excluded")
+        if left.unexplained or self.stops:  # excluded sizes hold for a right model and a whole search only
+            unchanged, excluded = {}, {}
         return Contrast(
             study=self.study,
             groups=tuple(models.trials),

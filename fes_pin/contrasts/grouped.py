@@ -229,12 +229,8 @@ class GroupedProblem(NoisyProblem):
         """
         own = by_group(unknowns, self._by_group)
         gained = float(sum(p.noise_step(self.model.of(g, values), own[g]) for g, p in self.parts.items()))
-        return gained + self._scatter_step(values, unknowns) if self.is_simulated else gained
-
-    @property
-    def is_simulated(self) -> bool:
-        """Whether no group has process noise."""
-        return all(p.is_simulated for p in self.parts.values())
+        calm = all(p.is_simulated for p in self.parts.values())
+        return gained + self._scatter_step(values, unknowns) if calm else gained
 
     def _scatter_step(self, values: Mapping[str, float], unknowns: Unknowns) -> float:
         """Estimate the scatter of repeats again, in place; return by how much the cost falls."""
