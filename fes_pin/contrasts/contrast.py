@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from fes_pin.contrasts.changes import change_of, misread_change, not_changed
 from fes_pin.contrasts.faults import GroupConditions, is_likelier, late_in_groups
+from fes_pin.contrasts.fits import GroupedFits
 from fes_pin.contrasts.grouped import Grouped
 from fes_pin.contrasts.groups import BY_GROUP, grouped_study, in_groups, labels_of
 from fes_pin.contrasts.models import POLICY, ContrastModels, ContrastSearch, Found
@@ -157,7 +158,7 @@ class _Work:
 
     def _run(self, trials: Sequence[Trial]) -> tuple[ContrastSearch, Found]:
         effects = self.catalogue.effects_for(self.nominal.rig)
-        models = ContrastModels(self.nominal, in_groups(trials), effects, self.driven, self.seed)
+        models = ContrastModels(GroupedFits(self.nominal, in_groups(trials), self.driven), effects, self.seed)
         search = ContrastSearch(models, self.tell, POLICY)
         return search, search.run()
 

@@ -7,7 +7,6 @@ import numpy as np
 from fes_pin.contrasts.fits import GroupedFits
 from fes_pin.contrasts.grouped import Grouped, GroupedModel, Item
 from fes_pin.contrasts.screen import ItemScore, Screen
-from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.search.library import Library
 from fes_pin.diagnosis.search.likelihood_forms import demanded_form
 from fes_pin.diagnosis.search.starts import STARTS, number_of_forms, refinements
@@ -36,14 +35,10 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
 
     Parameters
     ----------
-    nominal
-        The nominal model of all groups.
-    trials
-        Trials by group.
+    maxima
+        Fits of grouped models to the trials of all groups.
     effects
         The causes that are searched.
-    driven
-        Whether fits have process noise.
     seed
         Of critical values.
     """
@@ -51,20 +46,12 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
     most_candidates: int | None = MOST_ITEMS
     converged_sets = 3
 
-    def __init__(
-        self,
-        nominal: Model,
-        trials: Mapping[str, Sequence[Trial]],
-        effects: Sequence[type[Effect]],
-        driven: bool,
-        seed: int = 0,
-    ) -> None:
+    def __init__(self, maxima: GroupedFits, effects: Sequence[type[Effect]], seed: int = 0) -> None:
         super().__init__()
-        self.nominal_model, self.trials, self.driven, self.seed = Model(nominal.rig), dict(trials), driven, seed
-        every = [t for many in trials.values() for t in many]
-        self._library = Library(self.nominal_model, every, effects)
+        self.maxima, self.seed = maxima, seed
+        self.nominal_model, self.trials, self.driven = maxima.nominal, maxima.trials, maxima.driven
+        self._library = Library(self.nominal_model, [t for many in self.trials.values() for t in many], effects)
         self.screen = Screen(self.nominal_model, self.trials, self._library)
-        self.maxima = GroupedFits(nominal, trials, driven)
         self._compared: dict[tuple[Names, str], Grouped] = {}
 
     def nominal(self) -> Grouped:
