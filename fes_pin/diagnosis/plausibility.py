@@ -62,9 +62,8 @@ def _steps(study: Study | ToPredict, model: Model) -> Iterable[str]:
         raise InputError(f"{message}: is time_s in ms?", file=study.folder, column="time_s")
     for name, constant in model.rig.time_constants({t.kind for t in study.trials}).items():
         said = f"the time step of trial {slowest.name} is {slowest.dt:.4g} s, and {name} {constant:.4g} s"
-        is_fitted = isinstance(
-            study, ToPredict
-        )  # a constant that a fit found may be short, and that is no slip of units
+        # a constant that a fit found may be short, and that is no slip of units
+        is_fitted = isinstance(study, ToPredict)
         if slowest.dt > COARSE * constant and not (is_fitted and slowest.dt < SLOW_S):
             raise InputError(
                 f"{said}: is time_s in ms, or the value in [start] wrong?", file=study.folder, column="time_s"

@@ -9,12 +9,12 @@ import numpy as np
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.decide.chosen_again import share_of
-from fes_pin.diagnosis.decide.rivals import estimates, experiment, not_identifiable, ranking
+from fes_pin.diagnosis.decide.rivals import alike_in, estimates, experiment, not_identifiable, ranking
 from fes_pin.diagnosis.errors_ahead import AheadErrors, free_errors, noise_that_is_small
 from fes_pin.diagnosis.estimators import WHITE_PROCESS_NOISE
 from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodSearch
-from fes_pin.diagnosis.verdict import RigState, RigVerdict, alike_in
+from fes_pin.diagnosis.verdict import RigState, RigVerdict
 from fes_pin.identify.correlation_time import words_of_reading
 from fes_pin.identify.fit import rough_noise
 from fes_pin.identify.likelihood import is_simulated
@@ -52,6 +52,7 @@ def diagnosis_of(
     on = HELD_OUT if trials[1] else CROSS_VALIDATED if held else FITTED
     causes = [_cause(verdict, state, one, best, on) for one in best.model.effects]
     causes.sort(key=lambda c: -c.gain_held_out.percent)
+    said = words_of_reading(best.noise, best.model.rig, trials[0])
     return Diagnosis(
         study=study,
         verdict=word_of(bool(causes), left),
@@ -66,7 +67,7 @@ def diagnosis_of(
         next_experiment=experiment(best, found.rivals, causes, study),
         ranking=ranking(best, found.rivals),
         held_out_by=on,
-        warnings=_words(best, trials[0]),
+        warnings=(*said, WHITE_PROCESS_NOISE) if best.noise.timed else said,
         random=state.weighed.random,
         is_driven=search.models.judged_s is not None,
         reason=reason,
@@ -93,12 +94,6 @@ def unfitted(study: Study, nominal: LikelihoodFit, reason: str, test: Sequence[T
         held_out_by=HELD_OUT if test else FITTED,
         reason=reason,
     )
-
-
-def _words(fitted: LikelihoodFit, trials: Sequence[Trial]) -> tuple[str, ...]:
-    """Return warnings about the noise of a fit."""
-    said = words_of_reading(fitted.noise, fitted.model.rig, trials)
-    return (*said, WHITE_PROCESS_NOISE) if fitted.noise.timed else said
 
 
 def _cause(verdict: RigVerdict, state: RigState, one: Effect, best: LikelihoodFit, on: str) -> Cause:

@@ -16,7 +16,7 @@ from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.long_records import searched_part
 from fes_pin.diagnosis.search.library import Library
-from fes_pin.diagnosis.search.score import Scores
+from fes_pin.diagnosis.search.score import Scores, best_by_effect
 from fes_pin.identify.feedback import is_fed_back
 from fes_pin.identify.fit import Fit, noise_of, rough_fit
 from fes_pin.identify.likelihood_fit import at_noise
@@ -86,9 +86,7 @@ def testable_causes(study: Study, catalogue: Catalogue | None = None) -> Testabl
             warnings = _given_away(nominal, trials, fitted)
         except (ArithmeticError, np.linalg.LinAlgError) as problem:
             return f"the nominal model cannot be fitted ({problem})"
-    kept: dict[str, float] = {}
-    for one in scores.scored:
-        kept[one.effect.name] = max(kept.get(one.effect.name, 0.0), one.kept)
+    kept = {n: max(one.kept for one in many) for n, many in best_by_effect(scores.scored).items()}
     return Testable(
         shown={n: k for n, k in sorted(kept.items()) if k >= IDENTIFIABLE_SHARE},
         absorbed=tuple(sorted(n for n, k in kept.items() if k < IDENTIFIABLE_SHARE)),
@@ -132,7 +130,7 @@ def _unexplained(fitted: Fit) -> float:
 
 
 def _alike(scores: Scores, kept: Mapping[str, float]) -> tuple[tuple[str, ...], ...]:
-    """Return groups of causes of one amplitude that have, for some of their shapes, nearly parallel sensitivities."""
+    """Return pairs of causes of one amplitude that have, for some of their shapes, nearly parallel sensitivities."""
     single = [
         (one.effect.name, block.start)
         for one, block in zip(scores.scored, scores.blocks, strict=False)
@@ -140,14 +138,12 @@ def _alike(scores: Scores, kept: Mapping[str, float]) -> tuple[tuple[str, ...], 
         and kept[one.effect.name] >= IDENTIFIABLE_SHARE
         and one.kept >= IDENTIFIABLE_SHARE
     ]
-    groups: list[set[str]] = []
+    pairs = set[tuple[str, ...]]()
     for (name, i), (other, j) in itertools.combinations(single, 2):
         size = math.sqrt(scores.gram[i, i] * scores.gram[j, j])
-        if name == other or not size > 0.0 or abs(scores.gram[i, j]) < ALIKE_COSINE * size:
-            continue
-        if not any({name, other} <= group for group in groups):
-            groups.append({name, other})
-    return tuple(sorted(tuple(sorted(group)) for group in groups))
+        if name != other and size > 0.0 and abs(scores.gram[i, j]) >= ALIKE_COSINE * size:
+            pairs.add(tuple(sorted((name, other))))
+    return tuple(sorted(pairs))
 
 
 def _reversed(model: Model, trials: Sequence[Trial], fitted: Fit) -> list[str]:
@@ -195,9 +191,8 @@ def _shift(model: Model, trial: Trial) -> tuple[float, float]:
     lags = np.arange(-most, most + 1, max(1, most // 200))
     inside = simulated[most : len(trial) - most]
     errors = np.array([np.mean((measured[most + k : len(trial) - most + k] - inside) ** 2) for k in lags])
-    if not np.isfinite(errors).all():
-        return 0.0, 1.0
     best, none = int(np.argmin(errors)), int(np.argmin(np.abs(lags)))
-    if errors[best] > SMALL_SHARE * np.var(measured):  # no shift predicts a rig that falls over
+    # no shift predicts a rig that falls over
+    if not np.isfinite(errors).all() or errors[best] > SMALL_SHARE * np.var(measured):
         return 0.0, 1.0
     return float(lags[best] * trial.dt), float(errors[best] / max(errors[none], 1e-300))

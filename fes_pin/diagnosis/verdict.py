@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.decide.chosen_again import ChosenAgain, is_chosen, share_of
-from fes_pin.diagnosis.decide.rivals import alternatives
+from fes_pin.diagnosis.decide.rivals import alike_in
 from fes_pin.diagnosis.errors_ahead import (
     Ahead,
     RandomPart,
@@ -202,8 +202,3 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
 
     def _falls(self, state: RigState) -> bool:
         return self.models.answered and falls(state.found.best.model, self.models.trials)
-
-
-def alike_in(found: Found, name: str) -> tuple[str, ...]:
-    """Return a cause and its equivalents."""
-    return (name, *alternatives(found.best, found.rivals[name], name))

@@ -213,6 +213,7 @@ class FittedSets(Sets[F], Generic[F, S]):
     def extend(self, base: Names, most: int | None = None) -> None:
         """Fit a set with each further candidate, or with the `most` of largest score.
 
+        Of several fits of a set the one of lowest criterion is kept.
         A fitted set is started again where candidates of the base have another form than in that set.
         """
         fitted = self.fits[base]
@@ -221,19 +222,15 @@ class FittedSets(Sets[F], Generic[F, S]):
         starts = {tuple(sorted((*base, n))): known[n].start for n in chosen}
         missing = {k: s for k, s in starts.items() if (k, forms) not in self._begun and not self._has(k, forms)}
         self._begun.update((k, forms) for k in missing)
-        self._add(fitted, missing)
+        for names, first in self.begin(fitted, missing).items():
+            if names not in self.fits or first.criterion < self.fits[names].criterion:
+                self.fits[names] = first
+                self._converged.discard(names)
+        if missing:
+            self.converge(len(base) + 1)
 
     def _has(self, names: Names, forms: frozenset[Hashable]) -> bool:
         return names in self.fits and forms <= self.form_of(self.fits[names])
-
-    def _add(self, base: F, starts: Mapping[Names, S]) -> None:
-        """Start fits of sets in parallel; of several fits of a set the one of lowest criterion is kept."""
-        for names, best in self.begin(base, starts).items():
-            if names not in self.fits or best.criterion < self.fits[names].criterion:
-                self.fits[names] = best
-                self._converged.discard(names)
-        for size in sorted({len(n) for n in starts}):
-            self.converge(size)
 
 
 def more_degrees(larger: Fitted, smaller: Fitted) -> int:

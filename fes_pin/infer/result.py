@@ -187,9 +187,6 @@ class Evidence:
         """Return the evidence of a likelihood ratio: that of a true cause scatters by twice the root of its mean."""
         return cls(added, max(added, 0.0)) if math.isfinite(added) else cls(0.0, 0.0)
 
-    def __add__(self, other: Evidence) -> Evidence:
-        return Evidence(self.added + other.added, self.squares + other.squares, self.on)
-
     @property
     def high(self) -> float:
         """Upper end of the 95 % interval."""

@@ -97,7 +97,8 @@ class Search(Generic[F, M]):
             self._sets.nominal()
         self._kept: Names = ()
         try:
-            return self._search()
+            given = self.policy.given
+            return self.settle(self._backward(self._found_forward() if given is None else given))
         except OutOfTime:
             self.was_stopped = True
             with time_limit(math.inf):
@@ -111,10 +112,6 @@ class Search(Generic[F, M]):
     def nominal(self) -> F:
         """Return the fit of the nominal model."""
         return self._sets.fits[()]
-
-    def _search(self) -> SearchResult[F]:
-        given = self.policy.given
-        return self.settle(self._backward(self._found_forward() if given is None else given))
 
     def _found_forward(self) -> Names:
         """Return the best set of a forward search, repeated with another kind of noise where that is likelier."""
@@ -132,7 +129,8 @@ class Search(Generic[F, M]):
             self.progress(min(0.1 + 0.2 * size, 0.7), f"sets of {size}")
             if best and not self._worth_extending(best):
                 break
-            self._extend(size)
+            for names in self._sets.near(size - 1)[: self.policy.beam]:
+                self._sets.extend(names, None if size == 1 else self.policy.fitted)
             larger = self._first_accepted(size, best)
             if larger is None:
                 break
@@ -172,11 +170,6 @@ class Search(Generic[F, M]):
         fitted = self._sets.fits[names]
         return self._sets.extension_p_value(fitted) < UNUSUAL_LEVEL or not self._sets.leaves_noise(fitted)
 
-    def _extend(self, size: int) -> None:
-        """Fit sets of a size: the best smaller ones with further candidates."""
-        for names in self._sets.near(size - 1)[: self.policy.beam]:
-            self._sets.extend(names, None if size == 1 else self.policy.fitted)
-
     def _first_accepted(self, size: int, best: Names) -> Names | None:
         """Return the accepted set of a size of lowest criterion; sets that are not accepted are left out in turn."""
         tried: list[Names] = []
@@ -203,20 +196,17 @@ class Search(Generic[F, M]):
         return self._sets.noise_p_value(doubled, more_degrees(larger, smaller)) < self._sets.level(larger)
 
     def _is_accepted(self, names: Names, best: Names) -> bool:
-        """Return whether a set is physically possible and improves on the best smaller one."""
+        """Return whether a set is physically possible and improves on the best smaller one.
+
+        A further candidate must also lower the errors of prediction, if the smaller set has no lack of fit. Where it
+        has one, yet another candidate may be needed to lower the errors.
+        """
         models = self._sets
         larger, smaller = models.fits[names], models.fits[best]
-        accepted = self.is_accepted(larger, smaller) and self._predicts_better(larger, smaller, bool(best))
+        accepted = self.is_accepted(larger, smaller)
+        if accepted and best and models.leaves_noise(smaller):
+            accepted = models.predicts_better(larger, smaller)
         return self._kept_in_mind(names, accepted) and models.is_possible(larger)
-
-    def _predicts_better(self, larger: F, smaller: F, has_candidates: bool) -> bool:
-        """Return whether a further candidate lowers the errors of prediction, if the smaller set has no lack of fit.
-
-        Where the smaller set has one, yet another candidate may be needed to lower the errors.
-        """
-        if not has_candidates or not self._sets.leaves_noise(smaller):
-            return True
-        return self._sets.predicts_better(larger, smaller)
 
     def _kept_in_mind(self, names: Names, accepted: bool) -> bool:
         """Record whether a set is accepted, and return that."""

@@ -95,11 +95,6 @@ class State(Generic[F, M, W]):
         """The candidates of the set."""
         return frozenset(self.found.without)
 
-    @property
-    def weak(self) -> list[str]:
-        """The candidates of the set, smallest gain first."""
-        return sorted(sorted(self.names), key=lambda n: self.weighed.gains[n].low)
-
 
 Claim = Callable[[State[F, M, W]], State[F, M, W] | None]
 
@@ -202,17 +197,13 @@ class Verdict(ABC, Generic[F, M, W]):
 
     def _without_weakest(self, state: State[F, M, W], some: Sequence[str]) -> State[F, M, W] | None:
         """Return the state without the weakest of some candidates; None if there are none."""
-        weakest = next((n for n in state.weak if n in some), None)
+        gains = state.weighed.gains
+        weakest = min(some, key=lambda n: (gains[n].low, n), default=None)
         if weakest is None:
             return None
-        rejected = {**state.rejected, weakest: rejection_from(state.found, weakest, state.weighed.gains[weakest])}
+        rejected = Rejected(state.found.p_values[weakest], share_in(state.found, weakest), gains[weakest])
         found = state.search.result(tuple(sorted(state.names - {weakest})))
-        return replace(state, found=found, weighed=self.weigh(found), rejected=rejected)
-
-
-def rejection_from(found: SearchResult[F], name: str, gain: Gain) -> Rejected:
-    """Return the record of a candidate that is rejected from a set."""
-    return Rejected(found.p_values[name], share_in(found, name), gain)
+        return replace(state, found=found, weighed=self.weigh(found), rejected={**state.rejected, weakest: rejected})
 
 
 def share_in(found: SearchResult[F], name: str) -> float:

@@ -136,7 +136,9 @@ class RegressionVerdict(Verdict[Optimum, Regression, Weighed]):
             left = {n: models.left(f.free, held) for n, f in sets.items()}
             for n, rows in left.items():
                 squares[n] += np.sum(rows**2, axis=1).tolist()
-            evidence = {n: e + added_likelihood(left[n].ravel(), left["+"].ravel()) for n, e in evidence.items()}
+            for n, e in evidence.items():
+                more = added_likelihood(left[n].ravel(), left["+"].ravel())
+                evidence[n] = Evidence(e.added + more.added, e.squares + more.squares)
         spread, noise = np.full(len(squares[""]), COUNT), np.full(len(squares[""]), float(COUNT))
         errors = {n: Errors(np.array(v), spread, noise) for n, v in squares.items()}
         gains = {n: held_out_gain(errors[""], errors[n], errors["+"], seed=0) for n in found.without}

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from fes_pin.data.study import Study
 from fes_pin.diagnosis.experiment import NextExperiment, next_experiment
+from fes_pin.diagnosis.held_out import Found
 from fes_pin.diagnosis.search.score import Scored, best_by_effect
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.per_trial import amplitude
@@ -28,13 +29,13 @@ def estimates(fitted: LikelihoodFit, name: str) -> dict[str, ParameterEstimate]:
     return out
 
 
-def alternatives(best: LikelihoodFit, rivals: Sequence[LikelihoodFit], name: str) -> tuple[str, ...]:
-    """Return the equivalents of a cause: the criterion chooses which is named, the likelihood which are equivalent.
+def alike_in(found: Found, name: str) -> tuple[str, ...]:
+    """Return a cause and its equivalents: the criterion chooses which is named, the likelihood which are equivalent.
 
     A rival that fits as well with more parameters, as a spring in the place of a constant torque, is not excluded.
     """
-    others = {e.name for e in best.model.effects} - {name}
-    return tuple(sorted({e.name for f in not_excluded(best, rivals) for e in f.model.effects} - others - {name}))
+    near = {n for f in not_excluded(found.best, found.rivals[name]) for n in f.names}
+    return name, *sorted(near - set(found.best.names))
 
 
 def not_excluded(best: LikelihoodFit, rivals: Sequence[LikelihoodFit]) -> list[LikelihoodFit]:

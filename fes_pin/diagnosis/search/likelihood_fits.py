@@ -176,10 +176,9 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         """Return the best first fit of each set: at the noise of the base, with little process noise, and from afar."""
         begun = {k: [base.model + started(s.effect, s.amplitudes) for s in many] for k, many in starts.items()}
         looks = in_parallel(lambda k: self._first_fits(base, starts[k], begun[k]), list(starts))
-        restarted = {k: [f] for k, f in self.calm.items()}
-        restarted = restarted or self._restarted({names: models[0] for names, models in begun.items()}, base)
+        restarted = self.calm or self._restarted({names: models[0] for names, models in begun.items()}, base)
         each = zip(begun, looks, strict=True)
-        return {names: min((*fits, *restarted.get(names, ())), key=lambda f: f.criterion) for names, fits in each}
+        return {n: min((*fits, restarted.get(n, fits[0])), key=lambda f: f.criterion) for n, fits in each}
 
     def _first_fits(self, base: LikelihoodFit, starts: Starts, models: Sequence[Model]) -> list[LikelihoodFit]:
         others = [] if base.model.effects else self._elsewhere(starts[0].effect)
@@ -196,7 +195,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         begun += refinements(self.model + effect, effect, measured) if self.noise == WHITE else []
         return in_parallel(lambda one: self._maximum(one, guess, rounds=RESTART_ROUNDS), begun)
 
-    def _restarted(self, starts: Mapping[Names, Model], base: LikelihoodFit) -> dict[Names, list[LikelihoodFit]]:
+    def _restarted(self, starts: Mapping[Names, Model], base: LikelihoodFit) -> dict[Names, LikelihoodFit]:
         """Return fits that start with little process noise, where that of the base takes what a cause should explain.
 
         All sets are fitted for one alternation; those of lowest criterion are fitted further.
@@ -207,7 +206,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         first = in_parallel(lambda start: self._maximum(start, guess, rounds=1), list(starts.values()))
         lowest = sorted(zip(starts, first, strict=True), key=lambda one: one[1].criterion)[:RESTART_SETS]
         gone_on = in_parallel(lambda one: maximum_from(one[1], self.trials, rounds=RESTART_ROUNDS - 1), lowest)
-        return {names: [fitted] for (names, _), fitted in zip(lowest, gone_on, strict=True)}
+        return {names: fitted for (names, _), fitted in zip(lowest, gone_on, strict=True)}
 
     def converged(self, fits: Sequence[LikelihoodFit]) -> list[LikelihoodFit]:
         """Return the converged fits."""
