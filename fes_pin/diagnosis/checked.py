@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from fes_pin.data.asked import asked
 from fes_pin.data.read_only import ReadOnly
-from fes_pin.data.show import frame, table_html
+from fes_pin.data.show import by_columns, frame, table_html
 from fes_pin.data.study import Study
 from fes_pin.diagnosis.diagnosis import few_trials, measured_study, split
 from fes_pin.diagnosis.plausibility import check_study
@@ -66,10 +66,8 @@ class Checked(ReadOnly):
         found, rows = self.testable, list[tuple[str, str, float]]()
         if isinstance(found, Testable):
             rows += [(name, "shown", share) for name, share in found.shown.items()]
-            for word, names in (("absorbed", found.absorbed), ("silent", found.silent)):
-                rows += [(name, word, math.nan) for name in names]
-        names = ("cause", "testable", "share")
-        return frame({name: [row[k] for row in rows] for k, name in enumerate(names)}, index="cause")
+            rows += [(name, word, math.nan) for word in ("absorbed", "silent") for name in getattr(found, word)]
+        return frame(by_columns(("cause", "testable", "share"), rows), index="cause")
 
     def _repr_html_(self) -> str:
         first, *notes = str(self).splitlines()

@@ -21,9 +21,10 @@ from fes_pin.diagnosis.estimators import searched
 from fes_pin.diagnosis.logged import LogFaults, likelier, with_timing_of, with_words
 from fes_pin.diagnosis.long_records import in_parts, searched_part, thinned
 from fes_pin.diagnosis.misread import NAME as MISREAD
+from fes_pin.diagnosis.misread import restated_trials
 from fes_pin.diagnosis.plausibility import check_study
 from fes_pin.diagnosis.reported import diagnosis_of, unfitted
-from fes_pin.diagnosis.restate import Run, StudyConditions, restated_study, with_misread
+from fes_pin.diagnosis.restate import Run, StudyConditions, with_misread
 from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.diagnosis.search.likelihood_fits import MEASUREMENT, PROCESS
 from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodModels, LikelihoodSearch, NominalFitError
@@ -154,10 +155,9 @@ class _Work:
 
         try:
             found = self._judged(study, nominal, run, train, test)
-        except NominalFitError as problem:
-            found = unfitted(study, problem.nominal, str(problem), test)
         except (ArithmeticError, np.linalg.LinAlgError) as problem:
-            reason = f"the search met numbers that are not finite ({problem})"
+            own = isinstance(problem, NominalFitError)
+            reason = str(problem) if own else f"the search met numbers that are not finite ({problem})"
             found = unfitted(study, ran[-1].nominal(), reason, test)
         return replace(found, warnings=(*said, *found.warnings))
 
@@ -167,7 +167,8 @@ class _Work:
         self.tell(0.88, "held-out gain")
         whole, stated = study, train
         if again is not None:
-            train, whole = again.trials, restated_study(study, nominal, again.misread)
+            restated = restated_trials(nominal, study.trials, again.misread)
+            train, whole = again.trials, replace(study, trials=tuple(restated))
         diagnosis = diagnosis_of(whole, search, found, (train, test))
         return diagnosis if again is None else with_misread(diagnosis, again, stated, test, self.seed)
 

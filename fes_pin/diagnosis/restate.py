@@ -5,13 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.conditions import Conditions, Restated
 from fes_pin.diagnosis.errors_ahead import errors_ahead, free_errors
 from fes_pin.diagnosis.held_out import Again, make_folds, refit
 from fes_pin.diagnosis.long_records import in_parts
-from fes_pin.diagnosis.misread import NAME, Misread, find_misread, restated_trials
+from fes_pin.diagnosis.misread import NAME, Misread, find_misread
 from fes_pin.diagnosis.remainder.lack_of_fit import lack_of_fit
 from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodModels, LikelihoodSearch
@@ -46,11 +45,6 @@ class StudyConditions(Conditions[LikelihoodFit, LikelihoodModels]):
     def saved(self, searched: Found, trials: Sequence[Trial], made: Made) -> float:
         """Return by how much the criterion falls."""
         return searched.best.criterion - made.searched.best.criterion
-
-
-def restated_study(study: Study, nominal: Model, misread: Misread) -> Study:
-    """Return the study with the estimated value in the place of the stated one."""
-    return replace(study, trials=tuple(restated_trials(nominal, study.trials, misread)))
 
 
 def with_misread(

@@ -21,8 +21,6 @@ from fes_pin.infer.levels import CONFIDENCE_95, SEPARABLE
 from fes_pin.infer.optimize import Descent
 from fes_pin.infer.problem import Problem, Unknowns
 
-RISE = CONFIDENCE_95**2
-"""95 % quantile of a chi-square with one degree of freedom."""
 STEPS = 20
 """Most steps of the other parameters for each value of the one; they start near their optimum."""
 DOUBLINGS = 30
@@ -45,7 +43,7 @@ def profile_interval(
     step
         Approximate distance of an end; only computing time depends on it.
     """
-    rise = SEPARABLE if at_bound else RISE
+    rise = SEPARABLE if at_bound else CONFIDENCE_95**2
     here, limits = values[name], problem.limits
     least = Descent(problem, values, unknowns).sse
 

@@ -45,10 +45,8 @@ def not_excluded(best: LikelihoodFit, rivals: Sequence[LikelihoodFit]) -> list[L
 
 def not_identifiable(best: LikelihoodFit, scored: Sequence[Scored], not_excited: Sequence[str]) -> tuple[str, ...]:
     """Return the causes that are not identifiable: nominal parameters take their place, or they act in no trial."""
-    found = {e.name for e in best.model.effects}
-    by_effect = best_by_effect(scored)
-    taken = {n for n, many in by_effect.items() if n not in found and max(s.kept for s in many) < IDENTIFIABLE_SHARE}
-    return tuple(sorted(taken | set(not_excited)))
+    kept = {n: max(s.kept for s in many) for n, many in best_by_effect(scored).items() if n not in best.names}
+    return tuple(sorted({n for n, share in kept.items() if share < IDENTIFIABLE_SHARE} | set(not_excited)))
 
 
 def ranking(best: LikelihoodFit, rivals: Mapping[str, Sequence[LikelihoodFit]]) -> dict[str, tuple[Ranked, ...]]:
@@ -64,10 +62,10 @@ def experiment(
 ) -> NextExperiment | None:
     """Return the experiment that distinguishes the first confounded cause from its equivalents."""
     for cause in causes:
-        others = {e.name for e in best.model.effects} - {cause.name}
+        others = set(best.names) - {cause.name}
         confounded: dict[str, LikelihoodFit] = {}
         for rival in sorted(rivals[cause.name], key=lambda f: f.criterion):
-            (instead,) = {e.name for e in rival.model.effects} - others
+            (instead,) = set(rival.names) - others
             if instead in cause.equivalents:
                 confounded.setdefault(instead, rival)
         if confounded:

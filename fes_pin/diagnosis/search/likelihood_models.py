@@ -1,7 +1,5 @@
 """Sets of causes of one study for the search of `infer`: fits by the likelihood, and the rules that judge them."""
 
-from __future__ import annotations
-
 import math
 
 from fes_pin.data.schema import IMPOSED
@@ -20,19 +18,7 @@ from fes_pin.infer.search import Search
 
 
 class NominalFitError(ArithmeticError):
-    """Error for a study to which not even the nominal model can be fitted.
-
-    Parameters
-    ----------
-    why
-        The reason, in one line.
-    nominal
-        The nominal fit where it ended.
-    """
-
-    def __init__(self, why: str, nominal: LikelihoodFit) -> None:
-        super().__init__(why)
-        self.nominal = nominal
+    """Error for a study to which not even the nominal model can be fitted, with the reason in one line."""
 
 
 class LikelihoodModels(LikelihoodFits):
@@ -58,7 +44,7 @@ class LikelihoodModels(LikelihoodFits):
         if not math.isfinite(fitted.sse):
             free = "the simulation of the nominal model is not finite at its start values"
             filtered = "the one-step predictions of the nominal model are not finite at its start values"
-            raise NominalFitError(free if is_simulated(fitted.noise, fitted.trials) else filtered, fitted)
+            raise NominalFitError(free if is_simulated(fitted.noise, fitted.trials) else filtered)
         self.family = self.library.scores(fitted).family(self.seed)
         return fitted
 
