@@ -99,7 +99,6 @@ def _errors_of_halves(made: Made, trial: Trial) -> tuple[Errors, Errors]:
         free_errors(others.model, [others.model.rig.restated(trial, misread.condition, v)], others.noise)
         for v in misread.halves
     ]
-    pieces = len(plain.squares)
-    odd = halves(pieces)[0]
+    odd, _ = halves(len(plain.squares))
     squares = np.where(odd, by_half[1].squares, by_half[0].squares)  # each piece by the value of the other half
     return plain, Errors(squares, plain.spread, plain.noise)

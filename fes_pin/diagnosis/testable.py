@@ -152,9 +152,8 @@ def _reversed(model: Model, trials: Sequence[Trial], fitted: Fit) -> list[str]:
         return []
     turned = [t.with_columns(effort=-t["effort"]) if "effort" in t else t for t in trials]
     other = rough_fit(model, turned)
-    if not (
-        math.isfinite(other.sse) and other.sse < REVERSED_LEAVES * fitted.sse and _unexplained(other) < REVERSED_LEAVES
-    ):
+    better = math.isfinite(other.sse) and other.sse < REVERSED_LEAVES * fitted.sse
+    if not (better and _unexplained(other) < REVERSED_LEAVES):
         return []  # a rig whose effort answers its reading is explained by neither
     share = 100.0 * other.sse / fitted.sse
     return [
@@ -174,10 +173,8 @@ def _shifted(model: Model, trials: Sequence[Trial], fitted: Fit) -> list[str]:
     out = []
     for trial, (shift, share) in zip(worst, shifts, strict=True):
         if share < SMALL_SHARE and abs(shift - usual) > LEAST_SHIFT_S:
-            way = "later" if shift > usual else "earlier"
-            out.append(
-                f"trial {trial.name} answers {abs(shift - usual):.2g} s {way} than the others: is it shifted in time?"
-            )
+            late = f"{abs(shift - usual):.2g} s {'later' if shift > usual else 'earlier'}"
+            out.append(f"trial {trial.name} answers {late} than the others: is it shifted in time?")
     return out
 
 

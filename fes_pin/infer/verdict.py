@@ -16,8 +16,6 @@ from fes_pin.infer.held_out import is_supported
 from fes_pin.infer.result import Evidence, Gain, Remainder
 from fes_pin.infer.search import M, Search, SearchResult
 
-CAUSES_FOUND, UNEXPLAINED, ADEQUATE = "causes_found", "unexplained", "adequate"
-
 
 @dataclass(frozen=True)
 class Rejected:
@@ -214,4 +212,4 @@ def share_in(found: SearchResult[F], name: str) -> float:
 
 def word_of(has_candidates: bool, lack_of_fit: Remainder) -> str:
     """Return the verdict in a word."""
-    return CAUSES_FOUND if has_candidates else UNEXPLAINED if lack_of_fit.unexplained else ADEQUATE
+    return "causes_found" if has_candidates else "unexplained" if lack_of_fit.unexplained else "adequate"

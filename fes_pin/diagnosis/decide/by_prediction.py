@@ -49,9 +49,8 @@ def best_predicting(search: LikelihoodSearch, names: Names) -> Names:
     ranked = [n for k in sorted({len(n) for n in models.fits}) for n in models.ranked(k)[:POOL]]
     pool = [n for n in dict.fromkeys([names, *ranked]) if models.is_possible(models.fits[n])]
     noise = models.fits[()].noise
-    inside = dict(
-        zip(pool, in_parallel(lambda n: _error(models.fits[n].model, models.trials, noise), pool), strict=True)
-    )
+    own = in_parallel(lambda n: _error(models.fits[n].model, models.trials, noise), pool)
+    inside = dict(zip(pool, own, strict=True))
     errors: dict[Names, float] = {}
     for one in sorted(pool, key=lambda n: (inside[n], n)):
         if errors and inside[one] > min(errors.values()) + FORM_SHARE:
