@@ -239,8 +239,8 @@ def candidates(study: Study) -> Iterator[Trial]:
     """Yield trials that the rig can run as it is: a dozen stimuli under each of its conditions."""
     rig, time = rig_of(study), np.arange(0.0, SECONDS, study.trials[0].dt)
     column = rig.steered(study)
-    shaped = ({column: rig.driven(study, shape)} for shape in _shapes(time)) if column else None
-    inputs = list(shaped or rig.other_stimuli(study, time))
+    shaped = [{column: rig.driven(study, shape)} for shape in _shapes(time)] if column else None
+    inputs = shaped or list(rig.other_stimuli(study, time))
     for kind, conditions in sorted(rig.conditions_to_try(study)):
         for columns in inputs:
             yield Trial("next", kind, columns, time, dict(conditions))

@@ -293,6 +293,11 @@ class Held(Mapping[str, V_co]):
         return repr(self._values)
 
 
+def _held(value: object) -> object:
+    """Return mappings, and mappings in these, as such that cannot be changed; other values as they are."""
+    return Held({n: _held(v) for n, v in value.items()}) if isinstance(value, Mapping) else value
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Named:
     """A named cause or change. Two are equal if their records are.
@@ -331,8 +336,7 @@ class Named:
     """Columns of its gain."""
 
     def __post_init__(self) -> None:
-        own = {n: Held(v) if isinstance(v, Mapping) else v for n, v in self.parameters.items()}
-        object.__setattr__(self, "parameters", Held(own))
+        vars(self).update({n: _held(value) for n, value in vars(self).items()})
 
     @property
     def judged(self) -> Gain | Evidence | None:
@@ -410,10 +414,6 @@ class Cause(Named):
     elsewhere: tuple[str, ...] = ()
     further: Mapping[str, float | None] = field(default_factory=dict)
     GAIN: ClassVar[tuple[str, ...]] = ("gain_percent", "gain_low", "gain_high")
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        object.__setattr__(self, "further", Held(self.further))
 
     @property
     def judged(self) -> Gain | Evidence:

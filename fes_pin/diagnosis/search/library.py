@@ -67,10 +67,9 @@ class Library:
 
     def scores(self, base: LikelihoodFit) -> Scores:
         """Return score tests of every effect that a fit does not have, at its noise; none in a fit that diverges."""
-        if not math.isfinite(base.sse):
-            return Scores([], np.zeros((0, 0)), [])
         if base not in self._scores:
-            wanted = [e for e in self.effects if e.name not in base.names and self.felt(e)]
+            finite = math.isfinite(base.sse)
+            wanted = [e for e in self.effects if finite and e.name not in base.names and self.felt(e)]
             groups = in_parallel(lambda e: self._probes(e, base), wanted)
             self._scores[base] = score_test(base.parts, [p for g in groups for p in g])
         return self._scores[base]
