@@ -97,6 +97,14 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         self._calm: StateSpaceNoise | None = None
         self._compared: dict[tuple[Names, str], LikelihoodFit] = {}
 
+    @property
+    def judged_s(self) -> float | None:
+        """Horizon by which causes are judged, s: in closed loop or of imposed motion; None for free simulation.
+
+        In closed loop errors come back as an input, and a free simulation of even the best model diverges.
+        """
+        return self.horizon_s if self.answered or any(t.kind == IMPOSED for t in self.trials) else None
+
     def begun_with(self, fits: Sequence[LikelihoodFit]) -> Self:
         """Return the same trials and causes with some fits to start from; the process noise is timed as in these."""
         other = copy.copy(self)
@@ -116,7 +124,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         if () in self.fits:
             return self.fits[()]
         from_rest = all(t.kind != IMPOSED and not self.model.rig.unknowns(t.kind) for t in self.trials)
-        if from_rest or not (self.answered or any(t.kind == IMPOSED for t in self.trials)):
+        if from_rest or self.judged_s is None:
             self.fits[()] = self._without_process_noise_first()
         else:
             self.fits[()] = with_new_noise(self.trials, self._nominal)

@@ -2,7 +2,6 @@
 
 import math
 
-from fes_pin.data.schema import IMPOSED
 from fes_pin.diagnosis.errors_ahead import are_large, random_parts
 from fes_pin.diagnosis.held_out import Fold, Found, gains_of
 from fes_pin.diagnosis.remainder.lack_of_fit import lack_of_fit
@@ -23,14 +22,6 @@ class NominalFitError(ArithmeticError):
 
 class LikelihoodModels(LikelihoodFits):
     """Fits of sets of causes to one set of trials, and the rules by which a search judges them."""
-
-    @property
-    def judged_s(self) -> float | None:
-        """Horizon by which causes are judged, s: in closed loop or of imposed motion; None for free simulation.
-
-        In closed loop errors come back as an input, and a free simulation of even the best model diverges.
-        """
-        return self.horizon_s if self.answered or any(t.kind == IMPOSED for t in self.trials) else None
 
     def nominal(self) -> LikelihoodFit:
         """Fit the nominal model, and simulate the family of score tests of all causes in it.
