@@ -20,7 +20,7 @@ LONGEST_S = 4.0
 
 def playback_html(diagnosis: WalkDiagnosis) -> str:
     """The first trial of a diagnosis of walking as a page that plays it."""
-    first = diagnosis.models.designs.recordings[0]
+    first = diagnosis.models.designs.as_read.trials[0]
     return show_reactions(first.motion, first.plates, f"{diagnosis.study.name}, {first.name}").html()
 
 

@@ -14,7 +14,6 @@ from fes_pin.infer.fits import Names
 from fes_pin.walk.disturb import disturbed, misplaced, tissue, white
 from fes_pin.walk.effects import walk_library
 from fes_pin.walk.likelihood import MEAN_ARM_M, MEAN_FORCE, MEAN_TWIST_NM, WalkNoise, fit_many, rotation
-from fes_pin.walk.recording import WalkRecording
 from fes_pin.walk.strides import Strides, strides_of
 from fes_pin.walk.walk_trial import WalkTrial
 
@@ -36,7 +35,7 @@ class Design:
     The plates are read `later_s` later than their clock says.
     """
 
-    trials: list[WalkTrial] = field(repr=False)
+    trials: Sequence[WalkTrial] = field(repr=False)
     y: np.ndarray = field(repr=False)
     x: dict[str, np.ndarray] = field(repr=False)
     later_s: float = 0.0
@@ -47,7 +46,7 @@ class Designs:
 
     Attributes
     ----------
-    recordings, seed
+    seed
         As given.
     forms
         The library, by names.
@@ -63,18 +62,17 @@ class Designs:
         (1, 6, k, m) rotated: residuals by ordinary errors of landmarks and plates.
     """
 
-    def __init__(self, recordings: Sequence[WalkRecording], seed: int = 0) -> None:
-        self.recordings, self.seed = list(recordings), seed
+    def __init__(self, trials: Sequence[WalkTrial], seed: int = 0) -> None:
+        self.seed = seed
         self.forms = {form.label: form for form in walk_library()}
         self.shift = next(n for n, f in self.forms.items() if f.shifts)
-        trials = [r.trial() for r in self.recordings]
-        self.strides: Strides = strides_of(trials, self.recordings[0].session.cutoff_hz)
-        self._first = self.recordings[self.strides.windows[0][0]]
+        self.strides = strides_of(trials, trials[0].session.cutoff_hz)
+        self._first = trials[self.strides.windows[0][0]]
         self.as_read = self._design(trials, 0.0)
         self._turn(self.as_read.y)
         self.shifted = self._shifted()
 
-    def _design(self, trials: list[WalkTrial], later_s: float) -> Design:
+    def _design(self, trials: Sequence[WalkTrial], later_s: float) -> Design:
         x = {n: self.strides.mean([form.columns(s) for s in trials]) for n, form in self.forms.items()}
         return Design(trials, self.strides.mean([s.residual for s in trials]), x, later_s)
 
@@ -127,7 +125,7 @@ class Designs:
             (found,) = fit_many(aim, columns, self.plausible((self.shift,))[None], self.noise)
             step = float(np.clip(found.values[0], -0.05, 0.05))
             later = float(np.clip(later + step, -0.2, 0.2))
-            trials = [r.trial(later) for r in self.recordings]
+            trials = [one.read_later(later) for one in self.as_read.trials]
             y = self.strides.mean([s.residual for s in trials])
             rate = self.strides.mean([form.columns(s) for s in trials])
             if abs(step) < SHIFT_ENDS_S:
@@ -168,7 +166,7 @@ class Designs:
         return np.zeros((*self.as_read.y.shape, 0))
 
 
-def _taken(trials: list[WalkTrial], strides: Strides) -> np.ndarray:
+def _taken(trials: Sequence[WalkTrial], strides: Strides) -> np.ndarray:
     """Return nuisance columns for errors in the motion, in units of `TAKEN`: (n, 6, k, 7).
 
     They are a share of each wave of the required reaction by channel, and one of all channels that grows with the

@@ -6,8 +6,8 @@ import numpy as np
 
 from fes_pin.data.motion import TRANSLATIONS
 from fes_pin.walk.dynamics import about
-from fes_pin.walk.recording import WalkRecording
 from fes_pin.walk.strides import Strides
+from fes_pin.walk.walk_trial import WalkTrial
 
 TISSUE_DRAWS, WHITE_DRAWS = 40, 64
 """Numbers of simulated errors."""
@@ -50,20 +50,20 @@ def misplaced(phase: np.ndarray, angle: np.ndarray, random: np.random.Generator)
     return np.diag(np.where(angle, LANDMARK_RAD, LANDMARK_M))[:, :, None] * np.ones_like(phase)
 
 
-def disturbed(recording: WalkRecording, strides: Strides, kind: Disturbance, seed: int) -> np.ndarray:
+def disturbed(trial: WalkTrial, strides: Strides, kind: Disturbance, seed: int) -> np.ndarray:
     """Return changes of the residual's waves in the first stride by errors of the coordinates: (draws, 6, k)."""
     _, rows, phase = strides.windows[0]
-    time = recording.motion.time[rows]
-    near = (recording.time >= time[0] - PAD_S) & (recording.time <= time[-1] + PAD_S)
-    clock = recording.time[near]
-    columns = {n: c[near] for n, c in recording.coordinates.items() if n.startswith("q_")}
+    time = trial.motion.time[rows]
+    near = (trial.time >= time[0] - PAD_S) & (trial.time <= time[-1] + PAD_S)
+    clock = trial.time[near]
+    columns = {n: c[near] for n, c in trial.coordinates.items() if n.startswith("q_")}
     turn = (clock - time[0]) / ((time[-1] - time[0]) * len(time) / (len(time) - 1)) + phase[0]
     inside = (clock >= time[0] - 1e-9) & (clock <= time[-1] + 1e-9)
-    total = recording.plates.total[rows]
+    total = trial.plates.total[rows]
 
     def residual(errors: np.ndarray | float) -> np.ndarray:
         moved = dict(zip(columns, np.stack(list(columns.values())) + errors, strict=True))
-        motion = recording.moved(clock, moved).part(inside)
+        motion = trial.moved(clock, moved).part(inside)
         return about(total - motion.required, motion.centre)
 
     angle = np.array([n.removeprefix("q_") not in TRANSLATIONS for n in columns])

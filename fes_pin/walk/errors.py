@@ -26,7 +26,7 @@ class StrideErrors:
     def __init__(self, models: WalkModels) -> None:
         self.models = models
         designs = models.designs
-        height = designs.recordings[0].motion.body.height_m or 1.8
+        height = designs.as_read.trials[0].motion.body.height_m or 1.8
         self._scale = np.r_[np.ones(3), np.full(3, 1.0 / (ARM * height))][:, None]
         self._residual = cache(partial(_residual_by_stride, designs))
         measured = designs.strides.coefficients([s.measured for s in designs.as_read.trials])

@@ -11,7 +11,6 @@ from fes_pin.infer.search import SearchResult
 from fes_pin.walk.designs import Designs
 from fes_pin.walk.dynamics import about
 from fes_pin.walk.models import WalkFit, WalkModels
-from fes_pin.walk.recording import WalkRecording
 from fes_pin.walk.walk_trial import WalkTrial
 
 CARRIED_KG = 10.0
@@ -53,10 +52,10 @@ def next_walk(models: WalkModels, found: SearchResult[WalkFit], cause: str) -> P
         )
         return Plan(why, pair)
     why = f"{words} (it separates {pair[0]} from {pair[1]} by {np.sqrt(scores[words]):.1f} standard deviations)"
-    return Plan(why, pair, _to_make(designs.recordings[0], PLANS[words][0]))
+    return Plan(why, pair, _to_make(designs.as_read.trials[0], PLANS[words][0]))
 
 
-def _to_make(usual: WalkRecording, speed: float) -> Trial:
+def _to_make(usual: WalkTrial, speed: float) -> Trial:
     """Return the motion to make at a share of the usual speed."""
     columns = {n: c for n, c in usual.coordinates.items() if n.startswith("q_")}
     if not speed:
@@ -77,7 +76,7 @@ def _planned(usual: WalkTrial, speed: float, carried_kg: float) -> WalkTrial:
     feet = {side: share[:, None] * needed for side, share in shares.items()}
     loaded = {side: share > 0.0 for side, share in shares.items()}
     plates = replace(usual.plates, feet=feet, loaded=loaded, way=0.0 * usual.plates.way)
-    return WalkTrial(usual.name, slow, plates)
+    return replace(usual, motion=slow, plates=plates)
 
 
 def _separation(designs: Designs, signal: np.ndarray, rival: np.ndarray, prior: np.ndarray, best: WalkFit) -> float:

@@ -26,7 +26,7 @@ def extended_body(models: WalkModels, best: WalkFit) -> Body:
         If the parameters are impossible, as a mass that is not positive.
     """
     designs = models.designs
-    body = designs.recordings[0].motion.body
+    body = designs.as_read.trials[0].motion.body
     believed = designs.as_read.trials[0].motion.parameters
     found = {s: p.copy() for s, p in believed.items()}
     for name, sizes in models.sizes(best).items():

@@ -1,8 +1,7 @@
 """A study of walking made ready: the body that is believed, its motion, and the plates on the motion's clock."""
 
 import json
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -13,9 +12,8 @@ from fes_pin.data.errors import InputError, errors_of
 from fes_pin.data.smooth import CUTOFF_HZ
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
-from fes_pin.walk.dynamics import Motion
 from fes_pin.walk.motion import Session, has_rates, motion_of, pelvis_to_hip
-from fes_pin.walk.plates import Plates, plates_of
+from fes_pin.walk.plates import plates_of
 from fes_pin.walk.plausible import carried_along, check_together
 from fes_pin.walk.walk_trial import WalkTrial
 
@@ -23,41 +21,6 @@ MASS_SHARE = 0.01
 """Share by which the mass that a study states may differ from that of its segments."""
 FEWEST = 10
 """Samples of motion and reaction together, at least."""
-
-
-@dataclass(frozen=True)
-class WalkRecording:
-    """One walking trial.
-
-    Attributes
-    ----------
-    name
-        Of the trial.
-    motion, plates
-        On one clock; where coordinates are filtered, the filter's ends are cut off.
-    time, coordinates
-        The coordinates and their clock, as read.
-    moved
-        Function of times and coordinates of the same session: their motion.
-    read
-        Function of times, and of how much later than their clock says the plates are read: the plates.
-    session
-        Low pass and treadmill.
-    """
-
-    name: str
-    motion: Motion
-    plates: Plates
-    time: np.ndarray = field(repr=False)
-    coordinates: Mapping[str, np.ndarray] = field(repr=False)
-    moved: Callable[[np.ndarray, Mapping[str, np.ndarray]], Motion] = field(repr=False)
-    read: Callable[..., Plates] = field(repr=False)
-    session: Session
-
-    def trial(self, later_s: float = 0.0) -> WalkTrial:
-        """Return the trial, with the plates read that much later than their clock says."""
-        plates = self.read(self.motion.time, later_s=later_s) if later_s else self.plates
-        return WalkTrial(self.name, self.motion, plates)
 
 
 def body_of(study: Study) -> tuple[Body, np.ndarray]:
@@ -89,7 +52,7 @@ def body_of(study: Study) -> tuple[Body, np.ndarray]:
     return body, pelvis_to_hip(body)
 
 
-def recordings_of(study: Study, *, cutoff_hz: float = CUTOFF_HZ, body: Body | None = None) -> list[WalkRecording]:
+def recordings_of(study: Study, *, cutoff_hz: float = CUTOFF_HZ, body: Body | None = None) -> list[WalkTrial]:
     """Every trial of a walking study, each file at its own sample rate; by the body that is given, else the study's.
 
     Raises
@@ -101,7 +64,7 @@ def recordings_of(study: Study, *, cutoff_hz: float = CUTOFF_HZ, body: Body | No
     return [_recording(trial, body or believed, hip, cutoff_hz) for trial in study.trials]
 
 
-def _recording(trial: Trial, body: Body, hip: np.ndarray, cutoff_hz: float) -> WalkRecording:
+def _recording(trial: Trial, body: Body, hip: np.ndarray, cutoff_hz: float) -> WalkTrial:
     paths = list(map(Path, trial.as_read.sha256)) if trial.as_read is not None else []
     source, reaction = paths[0] if paths else None, paths[-1] if paths else None
     if trial.as_read is not None and trial.as_read.recordings and not trial.is_edited:
@@ -124,4 +87,4 @@ def _recording(trial: Trial, body: Body, hip: np.ndarray, cutoff_hz: float) -> W
         check_together(motion, plates)
         rows = carried_along(motion, plates)
     used = motion.part(rows), plates.part(rows)
-    return WalkRecording(trial.name, *used, time, dict(columns), moved, read, session)
+    return WalkTrial(trial.name, *used, time, dict(columns), moved, read, session)

@@ -52,7 +52,7 @@ class WalkDiagnosis(Result):
     @property
     def cutoff_hz(self) -> float:
         """Cut-off of the low pass, Hz."""
-        return self.models.designs.recordings[0].session.cutoff_hz
+        return self.models.designs.as_read.trials[0].session.cutoff_hz
 
     @property
     def judged_on(self) -> str:

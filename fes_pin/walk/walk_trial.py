@@ -1,11 +1,15 @@
 """A trial of walking: the residual of the ground reaction, and the regressors of its possible causes."""
 
-from dataclasses import dataclass, field
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
 from fes_pin.walk.dynamics import Motion, about
+from fes_pin.walk.motion import Session
 from fes_pin.walk.plates import Plates
 
 
@@ -18,12 +22,29 @@ class WalkTrial:
     name
         Of the trial.
     motion, plates
-        On one clock.
+        On one clock; where coordinates are filtered, the filter's ends are cut off.
+    time, coordinates
+        The coordinates and their clock, as read.
+    moved
+        Function of times and coordinates of the same session: their motion.
+    read
+        Function of times, and of how much later than their clock says the plates are read: the plates.
+    session
+        Low pass and treadmill.
     """
 
     name: str
-    motion: Motion = field(repr=False)
-    plates: Plates = field(repr=False)
+    motion: Motion
+    plates: Plates
+    time: np.ndarray = field(repr=False)
+    coordinates: Mapping[str, np.ndarray] = field(repr=False)
+    moved: Callable[[np.ndarray, Mapping[str, np.ndarray]], Motion] = field(repr=False)
+    read: Callable[..., Plates] = field(repr=False)
+    session: Session
+
+    def read_later(self, later_s: float) -> WalkTrial:
+        """Return the trial with the plates read that much later than their clock says."""
+        return replace(self, plates=self.read(self.motion.time, later_s=later_s))
 
     @cached_property
     def needed(self) -> np.ndarray:

@@ -29,7 +29,7 @@ def trial(gait, folder, wrong, seed=3):
 
     make(gait, folder, wrong, seed)
     (recording,) = recordings_of(read_study(folder))
-    return recording.trial()
+    return recording
 
 
 def size(residual):

@@ -202,7 +202,7 @@ def test_the_extended_body_is_the_diagnosiss(heavy):
     name, site = heavy.causes[0].name, heavy.causes[0].site
     if name == "segment_mass" and site == "trunk":
         share = heavy.causes[0].parameters["share"].value
-        assert body.mass_kg > heavy.models.designs.recordings[0].motion.body.mass_kg * (1 + 0.3 * share)
+        assert body.mass_kg > heavy.models.designs.as_read.trials[0].motion.body.mass_kg * (1 + 0.3 * share)
     assert len(body.joint_names) == 19
 
 

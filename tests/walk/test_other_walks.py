@@ -135,8 +135,8 @@ def test_of_one_plate_the_stance_on_it_is_used_and_is_no_whole_stride(folder):
     longest = max((rows.stop - rows.start) * whole.motion.dt for rows in supports)
     length = one.motion.time[-1] - one.motion.time[0]
     assert 0.8 * longest < length < 1.25 * longest
-    assert strides_of([whole.trial()], 6.0).whole
-    assert not strides_of([one.trial()], 6.0).whole
+    assert strides_of([whole], 6.0).whole
+    assert not strides_of([one], 6.0).whole
 
 
 def test_over_ground_a_late_clock_does_not_move_with_the_body(folder):
@@ -153,7 +153,7 @@ def test_over_ground_a_late_clock_does_not_move_with_the_body(folder):
                         values[:, k] += 1.135
                 put(folder / file, names, values)
         recording = read(folder)
-        now, later = recording.trial(), recording.trial(0.004)
+        now, later = recording, recording.read_later(0.004)
         change = (later.measured - now.measured)[10:-10] / 0.004
         column = now.rate[10:-10]
         assert np.sqrt(np.mean((change - column) ** 2)) < 0.2 * np.sqrt(np.mean(column**2))
