@@ -137,12 +137,12 @@ class Designs:
         return self.shifted if self.shift in names else self.as_read
 
     def columns(self, names: Names) -> np.ndarray:
-        """Return rotated columns of a set in the mean stride, one form after the other: (n, 6, k, p)."""
-        return self.noise.rotated(self._columns(names))
+        """Return columns of a set in the mean stride, one form after the other: (1, 6, k, p)."""
+        return np.concatenate([self._none(), *(self.design(names).x[n] for n in names)], axis=3)
 
     def residual(self, names: Names, values: np.ndarray) -> np.ndarray:
         """Return the residual of a set in the mean stride, (1, 6, k)."""
-        return self.design(names).y - self._columns(names) @ values
+        return self.design(names).y - self.columns(names) @ values
 
     def by_stride(self, names: Names) -> tuple[np.ndarray, np.ndarray]:
         """Return residual (n, 6, k) and columns (n, 6, k, p) of a set, stride by stride."""
@@ -155,12 +155,21 @@ class Designs:
         empty = np.zeros((len(trial.needed), 6, 0))
         return np.concatenate([empty, *(self.forms[n].columns(trial) for n in names)], axis=2)
 
+    def whitened(self, values: np.ndarray, variance: np.ndarray) -> np.ndarray:
+        """Return waves (n, 6, k), whitened by a variance (1, 6, k) and by the nuisance parameters: (n, 6 k).
+
+        With F the nuisance's columns in units of the noise, u s v' its singular values: (1 + F F')^(-1/2) is
+        1 - u (1 - (1 + s^2)^(-1/2)) u'.
+        """
+        root = np.sqrt(variance)
+        nuisance = (self.noise.nuisance / root[..., None]).reshape(root.size, -1)
+        u, s, _ = np.linalg.svd(nuisance, full_matrices=False)
+        white = (self.noise.rotated(values) / root).reshape(len(values), -1)
+        return np.asarray(white - (white @ u) * (1.0 - 1.0 / np.sqrt(1.0 + s**2)) @ u.T)
+
     def plausible(self, names: Names) -> np.ndarray:
         """Return the plausible size of every parameter of a set, (p,)."""
         return np.array([form.plausible for form in (self.forms[n] for n in names) for _ in form.parameters])
-
-    def _columns(self, names: Names) -> np.ndarray:
-        return np.concatenate([self._none(), *(self.design(names).x[n] for n in names)], axis=3)
 
     def _none(self) -> np.ndarray:
         return np.zeros((*self.as_read.y.shape, 0))

@@ -59,7 +59,8 @@ class StrideErrors:
         Ordinary errors of landmarks and plates in a session are nuisance parameters. The evidence is the mean over
         strides: soft tissue moves alike in each, so that more strides are no more evidence.
         """
-        before, after = (_whitened(self._residual(one, True), self.models.designs, best) for one in (without, best))
+        whitened, variance = self.models.designs.whitened, best.fitted.variance
+        before, after = (whitened(self._residual(one, True), variance) for one in (without, best))
         every = [added_likelihood(*pair) for pair in zip(before, after, strict=True)]
         return Evidence(*np.mean([(e.added, e.squares) for e in every], axis=0).tolist())
 
@@ -72,15 +73,3 @@ def _residual_by_stride(designs: Designs, one: WalkFit, held_out: bool) -> np.nd
     rest_y, rest_x = (designs.noise.rotated((v.sum(axis=0) - v) / (len(v) - 1))[:, None] for v in (y, x))
     fits = fit_many(rest_y, rest_x, np.tile(designs.plausible(one.names), (len(y), 1)), designs.noise)
     return y - np.array([columns @ fitted.values for columns, fitted in zip(x, fits, strict=True)])
-
-
-def _whitened(residual: np.ndarray, designs: Designs, best: WalkFit) -> np.ndarray:
-    """Return residuals (n, 6, k), whitened by the noise of a set and by its nuisance parameters: (n, 6 k).
-
-    With F the nuisance's columns in units of the noise, u s v' its singular values: (1 + F F')^(-1/2) is
-    1 - u (1 - (1 + s^2)^(-1/2)) u'.
-    """
-    root = np.sqrt(best.fitted.variance[0])
-    u, s, _ = np.linalg.svd((designs.noise.nuisance[0] / root[..., None]).reshape(root.size, -1), full_matrices=False)
-    white = (designs.noise.rotated(residual) / root).reshape(len(residual), -1)
-    return np.asarray(white - (white @ u) * (1.0 - 1.0 / np.sqrt(1.0 + s**2)) @ u.T)

@@ -62,16 +62,16 @@ def lack_of_fit(designs: Designs, one: WalkFit) -> Remainder:
 
 def not_testable(designs: Designs, one: WalkFit) -> list[str]:
     """Return causes whose every form, at its plausible size, is significant by less than `SEEN_DEVIATIONS`."""
-    noise, variance = designs.noise, one.fitted.variance
-    root = 1.0 / np.sqrt(variance).ravel()
-    taken = np.concatenate([noise.nuisance, designs.columns(one.names)], axis=3).reshape(variance.size, -1)
-    taken = taken * root[:, None]
-    ridge = np.diag(np.r_[np.ones(noise.nuisance.shape[3]), np.zeros(one.degrees)]) + 1e-12 * np.eye(taken.shape[1])
+
+    def white(columns: np.ndarray) -> np.ndarray:
+        return designs.whitened(np.moveaxis(columns[0], 2, 0), one.fitted.variance)
+
+    basis, _ = np.linalg.qr(white(designs.columns(one.names)).T)
     best: dict[str, float] = {}
     for name, form in designs.forms.items():
-        x = noise.rotated(designs.as_read.x[name]).reshape(variance.size, -1) * root[:, None] * form.plausible
-        kept = x - taken @ np.linalg.solve(taken.T @ taken + ridge, taken.T @ x)
-        best[form.cause] = max(best.get(form.cause, 0.0), float(np.sqrt(max(np.sum(kept * x, axis=0).max(), 0.0))))
+        x = form.plausible * white(designs.as_read.x[name])
+        size = float(np.linalg.norm(x - (x @ basis) @ basis.T, axis=1).max())
+        best[form.cause] = max(best.get(form.cause, 0.0), size)
     found = {designs.forms[n].cause for n in one.names}
     if designs.strides.count > 1:  # differences between strides show noise
         found.add("marker_noise")

@@ -152,7 +152,7 @@ class WalkModels(FittedSets[WalkFit, None]):
         """Return fits of sets with the same number of parameters and the same clock."""
         noise, forms = self.designs.noise, self.designs.forms
         y = noise.rotated(self.designs.design(group[0]).y)
-        x = np.stack([self.designs.columns(names) for names in group])
+        x = np.stack([noise.rotated(self.designs.columns(names)) for names in group])
         prior = np.array([self.designs.plausible(names) for names in group]).reshape(len(group), -1)
         found = fit_many(np.broadcast_to(y, (len(group), *y.shape)), x, prior, noise)
         out = []
