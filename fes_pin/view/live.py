@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from threading import Thread
 
@@ -98,8 +98,6 @@ class _Server(ThreadingHTTPServer):
 def _server() -> _Server:
     """A server on the first free port of the loopback address."""
     for port in range(FIRST_PORT, FIRST_PORT + PORTS):
-        try:
+        with suppress(OSError):
             return _Server((LOOPBACK, port), _Answer)
-        except OSError:
-            continue
     raise InputError(f"no port is free between {FIRST_PORT} and {FIRST_PORT + PORTS - 1}")

@@ -21,7 +21,7 @@ import scipy.linalg
 from fes_pin.data.imposed import imposed_motion
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
-from fes_pin.infer.noise import first_order_low_pass, thin
+from fes_pin.infer.noise import thin
 from fes_pin.models.model import Model
 from fes_pin.models.rigs.base import Rig
 from fes_pin.models.stage import Signals
@@ -86,7 +86,8 @@ def missing_input(model: Model, measured: Trial, simulated: Trial | None = None)
     if measured.kind == IMPOSED:
         position, velocity, _ = (thin(v, count) for v in imposed_motion(measured, rig.schema.imposed).values)
         return Missing("effort", unit, residual, {"angle": position, "rate": velocity, "time_s": time})
-    driven = {**{n: thin(v, count) for n, v in activation(rig, measured).items()}, **inputs}
+    active = rig.activation(measured)
+    driven = {**({} if active is None else {"activation": thin(active, count)}), **inputs}
     shown = {n: v for n, v in driven.items() if n != "stim"}  # a pulse is an event, not a value to plot against
     if "v" not in rig.states(measured.kind):
         return Missing("force", "N", residual, {"time_s": time, **shown})
@@ -101,18 +102,6 @@ def missing_input(model: Model, measured: Trial, simulated: Trial | None = None)
 def _averaged(values: np.ndarray) -> int:
     """Return how many samples are averaged into one of at most `MAX_POINTS`."""
     return max(1, math.ceil(len(values) / MAX_POINTS))
-
-
-def activation(rig: Rig, trial: Trial) -> dict[str, np.ndarray]:
-    """Return the activation of the nominal muscle by name, shape (n,); nothing for a rig without one.
-
-    The first-order lag answers a recruitment that is held between samples exactly.
-    """
-    recruited = rig.recruited(trial)
-    if recruited is None:
-        return {}
-    pole = math.exp(-trial.dt / float(getattr(rig, "time_constant_s")))  # noqa: B009
-    return {"activation": first_order_low_pass(np.r_[0.0, recruited[:-1]], pole)}
 
 
 def nominal_torque(

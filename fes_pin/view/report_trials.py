@@ -3,11 +3,9 @@
 from collections.abc import Sequence
 
 from fes_pin.data.schema import IMPOSED
-from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.replay import Replay
 from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.infer.text import percent
-from fes_pin.models.model import Model
 from fes_pin.models.tracking import can_track
 from fes_pin.view.missing import Missing, missing_input
 from fes_pin.view.page import Markup, element, figure, folded, joined, key
@@ -27,8 +25,8 @@ def position_unit(diagnosis: Diagnosis) -> str:
 
 def missing_section(diagnosis: Diagnosis, replays: Sequence[Replay]) -> list[Markup]:
     """Missing torque and force against every variable."""
-    before = _missing(diagnosis, diagnosis.nominal.model, [r.nominal for r in replays], replays)
-    after = _missing(diagnosis, diagnosis.model, [r.extended for r in replays], replays) if diagnosis.causes else []
+    before = _missing(diagnosis, replays, "nominal")
+    after = _missing(diagnosis, replays, "extended") if diagnosis.causes else []
     unit = position_unit(diagnosis)
     how = (
         "the effort of a stiff servo that keeps the model on the measured motion. No free simulation takes part, for "
@@ -57,14 +55,10 @@ def missing_section(diagnosis: Diagnosis, replays: Sequence[Replay]) -> list[Mar
     return out
 
 
-def _missing(
-    diagnosis: Diagnosis, model: Model, simulated: Sequence[Trial], replays: Sequence[Replay]
-) -> list[Missing]:
-    tracked = _is_tracked(diagnosis)
-    return [
-        missing_input(model, r.measured, None if tracked and r.measured.kind != IMPOSED else one)
-        for r, one in zip(replays, simulated, strict=True)
-    ]
+def _missing(diagnosis: Diagnosis, replays: Sequence[Replay], which: str) -> list[Missing]:
+    model, tracked = getattr(diagnosis, which).model, _is_tracked(diagnosis)
+    free = [None if tracked and r.measured.kind != IMPOSED else getattr(r, which) for r in replays]
+    return [missing_input(model, r.measured, one) for r, one in zip(replays, free, strict=True)]
 
 
 def _is_tracked(diagnosis: Diagnosis) -> bool:

@@ -69,14 +69,12 @@ class Motion:
     def poses(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
         """Every segment's link frame: orientation (n, 3, 3) and origin (n, 3) m in the world."""
         model, data = self.model, self.model.createData()
-        frames = {s: model.getFrameId(s) for s in SEGMENT_NAMES}
-        turn = {s: np.empty((len(self.time), 3, 3)) for s in frames}
-        origin = {s: np.empty((len(self.time), 3)) for s in frames}
-        for k, q in enumerate(self.q):
+        placed = []
+        for q in self.q:
             pin.framesForwardKinematics(model, data, q)
-            for s, frame in frames.items():
-                turn[s][k], origin[s][k] = data.oMf[frame].rotation, data.oMf[frame].translation
-        return {s: (turn[s], origin[s]) for s in frames}
+            placed.append([data.oMf[model.getFrameId(s)].homogeneous for s in SEGMENT_NAMES])
+        each = np.array(placed).transpose(1, 0, 2, 3)
+        return {s: (one[:, :3, :3], one[:, :3, 3]) for s, one in zip(SEGMENT_NAMES, each, strict=True)}
 
     @cached_property
     def regressors(self) -> dict[str, np.ndarray]:
@@ -86,12 +84,11 @@ class Motion:
         They are the root's rows of Pinocchio's `computeJointTorqueRegressor`, carried to the world's origin.
         """
         model, data = self.model, self.model.createData()
-        rows = np.array(
-            [
-                _root_pose(q).toDualActionMatrix() @ pin.computeJointTorqueRegressor(model, data, q, v, a)[:6]
-                for q, v, a in zip(self.q, self.v, self.a, strict=True)
-            ]
-        )
+
+        def carried(q: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
+            return _root_pose(q).toDualActionMatrix() @ pin.computeJointTorqueRegressor(model, data, q, v, a)[:6]
+
+        rows = np.array(list(map(carried, self.q, self.v, self.a)))
         return {s: rows[:, :, 10 * (j - 1) : 10 * j] for s, j in self._carriers().items()}
 
     @cached_property

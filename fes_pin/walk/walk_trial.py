@@ -68,11 +68,6 @@ class WalkTrial:
         return about(np.gradient(read, self.motion.dt, axis=0), self.motion.centre - self.plates.way)
 
     @cached_property
-    def feet(self) -> dict[str, np.ndarray]:
-        """Measured reaction of each foot: (n, 6)."""
-        return {side: about(wrench, self.motion.centre) for side, wrench in self.plates.feet.items()}
-
-    @cached_property
     def load_shares(self) -> dict[str, np.ndarray]:
         """Share of each foot in the vertical load: (n,)."""
         up = {side: np.clip(wrench[:, 2], 0.0, None) for side, wrench in self.plates.feet.items()}
@@ -86,8 +81,8 @@ class WalkTrial:
         The residual is divided between the feet by their vertical load. A gain error is proportional to this reaction:
         in proportion to the reading, a gain that makes all readings small would make every residual small.
         """
-        shares = self.load_shares
-        return {side: wrench - shares[side][:, None] * self.residual for side, wrench in self.feet.items()}
+        feet, shares = self.plates.feet, self.load_shares
+        return {s: about(feet[s], self.motion.centre) - shares[s][:, None] * self.residual for s in feet}
 
     @cached_property
     def regressors(self) -> dict[str, np.ndarray]:

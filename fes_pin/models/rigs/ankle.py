@@ -144,13 +144,10 @@ class Ankle(Rig):
 
         The regression also contains acceleration, velocity and a parabola in the angle, close to any function of it.
         """
-        from scipy.signal import lfilter  # noqa: PLC0415 - half a second, for dynamometers alone
-
         c, rows, read = {n: float(self.constants[n]) for n in self.needed}, [], []
         for trial in trials:
             q, v, bend = imposed_motion(trial, self.schema.imposed).values
-            pole = math.exp(-trial.dt / self.time_constant_s)
-            act = lfilter([0.0, 1.0 - pole], [1.0, -pole], self.recruited(trial))
+            act = np.asarray(self.activation(trial))
             rows.append(np.stack([c["moment_arm_m"] * act * np.sin(q), bend, v, np.ones(len(q)), q, q * q], axis=1))
             read.append(trial["torque_nm"])
         return float(least_squares(np.concatenate(rows), np.concatenate(read))[0])

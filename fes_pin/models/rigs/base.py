@@ -228,6 +228,18 @@ class Rig(ReadOnly):
         """Recruitment of the nominal muscle by a trial's stimulus, shape (n,); None of a rig without one."""
         return None
 
+    def activation(self, trial: Trial) -> np.ndarray | None:
+        """Return the activation of the nominal muscle, shape (n,); None of a rig without one.
+
+        The first-order lag answers a recruitment that is held between samples exactly.
+        """
+        from fes_pin.infer.noise import first_order_low_pass  # noqa: PLC0415 - SciPy, for muscles alone
+
+        if (recruited := self.recruited(trial)) is None:
+            return None
+        pole = math.exp(-trial.dt / float(getattr(self, "time_constant_s")))  # noqa: B009
+        return first_order_low_pass(np.r_[0.0, recruited[:-1]], pole)
+
     def motion_names(self, kind: str) -> tuple[str, ...]:
         """Names of those constants."""
         return ("imposed_start",) if kind == IMPOSED else ()

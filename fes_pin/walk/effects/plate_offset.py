@@ -62,7 +62,7 @@ def _unloaded(trial: WalkTrial, sides: tuple[str, ...], axis: int) -> tuple[np.n
         free = ~near(trial.plates.loaded[side], int(np.ceil(SETTLED_S / trial.motion.dt)))
         if not free.any():
             return None
-        values.append(float(np.mean(trial.feet[side][free, axis])))
+        values.append(float(np.mean(trial.plates.feet[side][free, axis])))
     return np.array([min(values, key=abs)]), ORDINARY_N
 
 
@@ -72,5 +72,5 @@ def near(loaded: np.ndarray, reach: int) -> np.ndarray:
 
 
 def _displaced(trial: WalkTrial, sides: tuple[str, ...], axis: int) -> np.ndarray:
-    force = np.sum([trial.feet[side][:, :3] for side in sides], axis=0)
+    force = np.sum([trial.plates.feet[side][:, :3] for side in sides], axis=0)
     return np.hstack([0.0 * force, np.cross(np.eye(3)[axis], force)])[:, :, None]
