@@ -22,7 +22,7 @@ from fes_pin.view.page import (
     joined,
     section,
 )
-from fes_pin.view.sections import answers, provenance_parts, stage_mark
+from fes_pin.view.sections import header, provenance_parts, stage_mark
 
 FOREST = 40
 """Studies of one forest plot; of more only the pooled value is drawn."""
@@ -57,7 +57,7 @@ def _head(studies: Sequence[Row], good: Sequence[Row], prevalence: Sequence[Row]
         title = f"{name[0].upper()}{name[1:]} in {first['studies']} of {len(good)} studies"
     else:
         title = f"No cause is named in {len(good)} studies"
-    rows = [
+    rows: list[tuple[Content, Content]] = [
         ("A cause was named", f"in {counts['causes_found']} of {len(good)} studies"),
         ("The model is adequate", f"in {counts['adequate']}"),
         ("Something stays unexplained", f"in {sum(bool(r['unexplained']) for r in good)}"),
@@ -66,12 +66,7 @@ def _head(studies: Sequence[Row], good: Sequence[Row], prevalence: Sequence[Row]
         rows.append(("The search was stopped", f"in {counts['stopped']}: the causes are the best set so far"))
     if failed:
         rows.append(("Could not be diagnosed", f"{failed}: see the table of studies"))
-    return element(
-        "header",
-        element("p", f"cohort of {len(studies)} studies", class_="eyebrow"),
-        element("h1", title, class_="verdict causes_found"),
-        answers(rows),
-    )
+    return header(f"cohort of {len(studies)} studies", title, "causes_found", rows)
 
 
 def _prevalence(rows: Sequence[Row], studies: int) -> list[Markup]:

@@ -15,7 +15,7 @@ from fes_pin.models.describe import equation, remark, sentence
 from fes_pin.view.intervals import intervals_drawing, rivals_drawing
 from fes_pin.view.mathml import equations_mathml
 from fes_pin.view.page import Content, Markup, document, element, figure, html_table, section, unit_text
-from fes_pin.view.sections import UNIT_IN_NAME, Parts, answers, provenance_parts, stage_mark, value_and_interval
+from fes_pin.view.sections import UNIT_IN_NAME, Parts, header, provenance_parts, stage_mark, value_and_interval
 
 OWN = {"Diagnosis": "report_rig", "WalkDiagnosis": "report_walk", "Contrast": "report_groups"}
 """Modules that hold what each front end adds, as `PARTS`."""
@@ -65,16 +65,12 @@ def report_html(result: Result) -> str:
 def _header(result: Result, counts: str, elsewhere: tuple[str, ...]) -> Markup:
     """The verdict, and the questions that a reader has, each with its answer."""
     partly = " partly" if result.causes and result.remainder.unexplained else ""
-    style = f"verdict {STYLES.get(result.verdict, result.verdict)}{partly}"
-    rows = [(_heading(one), _answer(result, one)) for one in result.causes]
+    style = f"{STYLES.get(result.verdict, result.verdict)}{partly}"
+    rows: list[tuple[Content, Content]] = [(_heading(one), _answer(result, one)) for one in result.causes]
     further = [("explained", str(result.explained))] if result.explained and result.causes else []
     further += [note for note in result.notes() if not note[0].startswith(elsewhere)]
-    return element(
-        "header",
-        element("p", f"{result.study.name} · rig {result.study.rig} · {counts}", class_="eyebrow"),
-        element("h1", _upper(result.title()), class_=style),
-        answers([*rows, *((element("span", _upper(topic)), said) for topic, said in further)]),
-    )
+    rows += [(element("span", _upper(topic)), said) for topic, said in further]
+    return header(f"{result.study.name} · rig {result.study.rig} · {counts}", _upper(result.title()), style, rows)
 
 
 def _heading(one: Named) -> Markup:

@@ -42,10 +42,11 @@ class Parts:
     residual: str = "Residual = measured - simulated. "
 
 
-def answers(rows: Sequence[tuple[Content, Content]]) -> Markup:
-    """Questions, or topics, and what is said of them."""
-    made = [element("div", element("dt", question), element("dd", answer)) for question, answer in rows]
-    return element("dl", joined(made), class_="answers")
+def header(eyebrow: str, title: str, verdict: str, rows: Sequence[tuple[Content, Content]]) -> Markup:
+    """The head of a page: a title in the style of a verdict, and questions, or topics, with what is said of them."""
+    small, large = element("p", eyebrow, class_="eyebrow"), element("h1", title, class_=f"verdict {verdict}")
+    answers = [element("div", element("dt", question), element("dd", answer)) for question, answer in rows]
+    return element("header", small, large, element("dl", joined(answers), class_="answers"))
 
 
 def stage_mark(stage: str) -> Markup:

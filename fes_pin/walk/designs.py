@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -68,13 +68,13 @@ class Designs:
         self.shift = next(n for n, f in self.forms.items() if f.shifts)
         self.strides = strides_of(trials, trials[0].session.cutoff_hz)
         self._first = trials[self.strides.windows[0][0]]
-        self.as_read = self._design(trials, 0.0)
+        self.as_read = self._design(trials, self.forms)
         self._turn(self.as_read.y)
         self.shifted = self._shifted()
 
-    def _design(self, trials: Sequence[WalkTrial], later_s: float) -> Design:
-        x = {n: self.strides.mean([form.columns(s) for s in trials]) for n, form in self.forms.items()}
-        return Design(trials, self.strides.mean([s.residual for s in trials]), x, later_s)
+    def _design(self, trials: Sequence[WalkTrial], names: Iterable[str]) -> Design:
+        x = {n: self.strides.mean([self.forms[n].columns(s) for s in trials]) for n in names}
+        return Design(trials, self.strides.mean([s.residual for s in trials]), x)
 
     @cached_property
     def _in_every_session(self) -> np.ndarray:
@@ -118,19 +118,16 @@ class Designs:
 
     def _shifted(self) -> Design:
         """Return the design matrix at the delay of the plates that fits best, by repeated linearization."""
-        form, later = self.forms[self.shift], 0.0
-        trials, y, rate = self.as_read.trials, self.as_read.y, self.as_read.x[self.shift]
+        later, design, prior = 0.0, self.as_read, self.plausible((self.shift,))[None]
         for _ in range(SHIFT_ROUNDS):
-            aim, columns = self.noise.rotated(y)[None], self.noise.rotated(rate)[None]
-            (found,) = fit_many(aim, columns, self.plausible((self.shift,))[None], self.noise)
+            aim, columns = (self.noise.rotated(v)[None] for v in (design.y, design.x[self.shift]))
+            (found,) = fit_many(aim, columns, prior, self.noise)
             step = float(np.clip(found.values[0], -0.05, 0.05))
             later = float(np.clip(later + step, -0.2, 0.2))
-            trials = [one.read_later(later) for one in self.as_read.trials]
-            y = self.strides.mean([s.residual for s in trials])
-            rate = self.strides.mean([form.columns(s) for s in trials])
+            design = self._design([one.read_later(later) for one in design.trials], [self.shift])
             if abs(step) < SHIFT_ENDS_S:
                 break
-        return self._design(trials, later)
+        return replace(self._design(design.trials, self.forms), later_s=later)
 
     def design(self, names: Names) -> Design:
         """Return the design matrix in which a set is fitted: with the clock shifted if the set has a shift."""
@@ -164,7 +161,7 @@ class Designs:
         root = np.sqrt(variance)
         nuisance = (self.noise.nuisance / root[..., None]).reshape(root.size, -1)
         u, s, _ = np.linalg.svd(nuisance, full_matrices=False)
-        white = (self.noise.rotated(values) / root).reshape(len(values), -1)
+        white = (self.noise.rotated(values) / root).reshape(len(values), root.size)
         return np.asarray(white - (white @ u) * (1.0 - 1.0 / np.sqrt(1.0 + s**2)) @ u.T)
 
     def plausible(self, names: Names) -> np.ndarray:

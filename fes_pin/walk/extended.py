@@ -28,13 +28,12 @@ def extended_body(models: WalkModels, best: WalkFit) -> Body:
     designs = models.designs
     body = designs.as_read.trials[0].motion.body
     believed = designs.as_read.trials[0].motion.parameters
-    found = {s: p.copy() for s, p in believed.items()}
+    changed: dict[str, np.ndarray] = {}
     for name, sizes in models.sizes(best).items():
         change = designs.forms[name].segments
         if change is not None:
             for segment, columns in change(believed).items():
-                found[segment] += columns @ sizes
-    changed = {s: p for s, p in found.items() if not np.array_equal(p, believed[s])}
+                changed[segment] = changed.get(segment, believed[segment]) + columns @ sizes
     return with_segments(body, changed) if changed else body
 
 
