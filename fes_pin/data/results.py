@@ -290,6 +290,39 @@ class Result(Saveable):
         return f"{type(self).__name__} of {self.study.name}: {self.verdict}{names}"
 
 
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class ModelResult(Result):
+    """The result about one model: base of diagnoses of rigs and of walks.
+
+    Attributes
+    ----------
+    absorbed
+        Causes that are not testable with these data.
+    nominal_error, extended_error
+        E in percent: on the fitted data, and on held-out data; None where it is not computed.
+    ceiling_percent
+        E of noise alone.
+    """
+
+    absorbed: tuple[str, ...]
+    nominal_error: tuple[float | None, float | None]
+    extended_error: tuple[float | None, float | None]
+    ceiling_percent: float
+
+    def models_record(
+        self, nominal: dict[str, Any], extended: dict[str, Any], noise: dict[str, Any], files: Sequence[str] = ("file",)
+    ) -> dict[str, Any]:
+        """Return the part of the record about both models and the next experiment; `files` as in `Plan.record`."""
+        return {
+            "absorbed": list(self.absorbed),
+            "nominal": nominal,
+            "extended": extended,
+            "noise": noise,
+            "ceiling_percent": shown(self.ceiling_percent),
+            "next_experiment": self.next_experiment.record(files) if self.next_experiment else None,
+        }
+
+
 def _cell(value: Any) -> Any:
     return shown(value) if isinstance(value, float) else value
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from fes_pin.data.log import Log
-from fes_pin.data.results import Result
+from fes_pin.data.results import ModelResult
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.errors_ahead import AheadErrors, RandomPart
 from fes_pin.diagnosis.experiment import NextExperiment
@@ -28,17 +28,15 @@ EACH_TRIAL = (
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Diagnosis(Result):
+class Diagnosis(ModelResult):
     """Verdict of a study: "adequate", "causes_found", "unexplained" or "stopped", with the causes that are named.
 
     Attributes
     ----------
     model
         The extended model: it can be simulated, fitted and diagnosed again.
-    absorbed
-        Causes that are not identifiable from these data.
     nominal_error, extended_error
-        E of free simulations in percent: on the fitted trials, and on held-out trials.
+        E of free simulations.
     ranking
         For each cause, its rivals by shortfall in twice the log-likelihood.
     held_out_by
@@ -57,12 +55,8 @@ class Diagnosis(Result):
     """
 
     causes: tuple[Cause, ...]
-    absorbed: tuple[str, ...]
     nominal: LikelihoodFit
     extended: LikelihoodFit
-    nominal_error: tuple[float | None, float | None]
-    extended_error: tuple[float | None, float | None]
-    ceiling_percent: float
     next_experiment: NextExperiment | None = None
     ranking: Mapping[str, tuple[Ranked, ...]] = field(default_factory=dict)
     held_out_by: str
@@ -145,14 +139,10 @@ class Diagnosis(Result):
     def own_record(self) -> dict[str, Any]:
         """Return the part of `diagnosis.json` that only a rig has."""
         left_out = {t: {n: len(k) for n, k in columns.items()} for t, columns in self.left_out.items()}
+        noise = {n: {"std": shown(m.std), "ar": [shown(a) for a in m.ar]} for n, m in self.extended.noise.items()}
         library = {Path(where).name: names for where, names in self.catalogue.origins().items()}
         return {
-            "absorbed": list(self.absorbed),
-            "nominal": self._model("nominal"),
-            "extended": self._model("extended"),
-            "noise": {n: {"std": shown(m.std), "ar": [shown(a) for a in m.ar]} for n, m in self.extended.noise.items()},
-            "ceiling_percent": shown(self.ceiling_percent),
-            "next_experiment": self.next_experiment.record() if self.next_experiment else None,
+            **self.models_record(self._model("nominal"), self._model("extended"), noise),
             **({"left_out_samples": left_out} if left_out else {}),
             **({"reason": self.reason} if self.reason else {}),
             **({"log": log_table(self.log)} if self.log != Log() else {}),

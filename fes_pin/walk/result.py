@@ -7,7 +7,7 @@ import numpy as np
 import tomli_w
 
 from fes_pin.body.build import Body
-from fes_pin.data.results import Result
+from fes_pin.data.results import ModelResult
 from fes_pin.infer.result import CROSS_VALIDATED, FITTED, Cause, Explained, shown
 from fes_pin.infer.text import percent, probability
 from fes_pin.walk.effect import WalkEffect
@@ -20,26 +20,20 @@ BODY_FILE = "body.urdf"
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class WalkDiagnosis(Result):
+class WalkDiagnosis(ModelResult):
     """The result of a diagnosis of walking: "adequate", "causes_found", "unexplained" or "stopped".
 
     Attributes
     ----------
     remainder
         Lack of fit: whether the same residual repeats in every stride.
-    absorbed
-        Causes that are not testable with these data.
     nominal_error, extended_error
-        E in percent: on all strides, and on strides held out; None of a single stride.
+        E on all strides, and on strides held out; None of a single stride.
     models, best
         The fits behind it.
     """
 
     causes: tuple[Cause, ...]
-    absorbed: tuple[str, ...]
-    nominal_error: tuple[float, float | None]
-    extended_error: tuple[float, float | None]
-    ceiling_percent: float
     models: WalkModels
     best: WalkFit
     MODEL: ClassVar[str] = "the walking model"
@@ -80,19 +74,13 @@ class WalkDiagnosis(Result):
 
     def own_record(self) -> dict[str, Any]:
         """Return the part of `diagnosis.json` that only a walk has."""
-        parameters = {f"{c.name}.{n}": one.record() for c in self.causes for n, one in c.parameters.items()}
+        found = {f"{c.name}.{n}": one.record() for c in self.causes for n, one in c.parameters.items()}
+        pairs = zip(({}, found), (self.nominal_error, self.extended_error), strict=True)
         nominal, extended = (
-            {"fit": shown(f), "held_out": shown(h)} for f, h in (self.nominal_error, self.extended_error)
+            {"parameters": p, "error_percent": {"fit": shown(f), "held_out": shown(h)}} for p, (f, h) in pairs
         )
-        return {
-            "absorbed": list(self.absorbed),
-            "nominal": {"parameters": {}, "error_percent": nominal},
-            "extended": {"parameters": parameters, "error_percent": extended},
-            "noise": self._noise(),
-            "ceiling_percent": shown(self.ceiling_percent),
-            "next_experiment": plan.record(("coordinates", "file")) if (plan := self.next_experiment) else None,
-            "cutoff_hz": self.cutoff_hz,
-        }
+        record = self.models_record(nominal, extended, self._noise(), ("coordinates", "file"))
+        return {**record, "cutoff_hz": self.cutoff_hz}
 
     def _noise(self) -> dict[str, Any]:
         """Return the root mean square residual of the extended model in the mean stride, by channel: N and N m."""
