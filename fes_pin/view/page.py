@@ -67,13 +67,9 @@ def html_table(
     """
 
     def cells(tag: str, row: Sequence[Content]) -> Markup:
-        made = []
-        for k, content in enumerate(row):
-            known = {"class_": "number"} if k in numbers else {}
-            if tag == "td":
-                known["data-title"] = head[k]  # stands before it on a narrow screen
-            made.append(element(tag, content, **known))
-        return element("tr", joined(made, ""))
+        known = [{"class_": "number"} if k in numbers else {} for k in range(len(row))]
+        titled = zip(row, head, known, strict=True)  # titles stand before cells on a narrow screen
+        return element("tr", *(element(tag, cell, **own, **{"data-title": title}) for cell, title, own in titled))
 
     body = joined([cells("td", row) for row in rows])
     return element(

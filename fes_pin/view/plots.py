@@ -132,7 +132,7 @@ def missing_drawing(
         panel.plot(there, factor * stays, color=COLOURS["extended"], linewidth=2.8)
         rows += [("median_extended", a, b) for a, b in zip(there, stays, strict=True)]
         left = f"; of the extended model from {_short(stays.min())} to {_short(stays.max())} {before[0].unit}"
-    limit = factor * _limit(before)
+    limit = factor * max(1.15 * float(np.quantile(np.abs(value), 0.995)), 1e-12)  # all but the few largest values
     panel.set(ylim=(-limit, limit), xlabel=label(name, position_unit), ylabel=f"missing {before[0].kind} ({unit})")
     panel.set_title(f"{100 * share_of:.0f} % of its variance", loc="right", color=COLOURS["ink"], fontsize=10)
     words = (
@@ -151,12 +151,6 @@ def share(before: Sequence[Missing], name: str) -> float:
 
 def _joined(many: Sequence[Missing], name: str) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate([m.value for m in many]), np.concatenate([m.against[name] for m in many])
-
-
-def _limit(many: Sequence[Missing]) -> float:
-    """Half the height of a panel: all but the few largest values."""
-    values = np.abs(np.concatenate([m.value for m in many]))
-    return max(1.15 * float(np.quantile(values, 0.995)), 1e-12)
 
 
 def _spread(x: np.ndarray, value: np.ndarray) -> np.ndarray:

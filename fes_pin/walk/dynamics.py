@@ -56,8 +56,11 @@ class Motion:
         It is given by the first six rows of Pinocchio's `rnea`, the efforts of the free joint, at the world's origin.
         """
         model, data = self.model, self.model.createData()
-        root = (pin.rnea(model, data, q, v, a)[:6] for q, v, a in zip(self.q, self.v, self.a, strict=True))
-        return np.array([_root_pose(q).act(pin.Force(one)).vector for q, one in zip(self.q, root, strict=True)])
+
+        def carried(q: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
+            return pin.XYZQUATToSE3(q[:7]).act(pin.Force(pin.rnea(model, data, q, v, a)[:6])).vector
+
+        return np.array(list(map(carried, self.q, self.v, self.a)))
 
     @cached_property
     def centre(self) -> np.ndarray:
@@ -86,7 +89,9 @@ class Motion:
         model, data = self.model, self.model.createData()
 
         def carried(q: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
-            return _root_pose(q).toDualActionMatrix() @ pin.computeJointTorqueRegressor(model, data, q, v, a)[:6]
+            return (
+                pin.XYZQUATToSE3(q[:7]).toDualActionMatrix() @ pin.computeJointTorqueRegressor(model, data, q, v, a)[:6]
+            )
 
         rows = np.array(list(map(carried, self.q, self.v, self.a)))
         return {s: rows[:, :, 10 * (j - 1) : 10 * j] for s, j in self._carriers().items()}
@@ -99,10 +104,6 @@ class Motion:
     def _carriers(self) -> dict[str, int]:
         """Return the joint of each segment."""
         return {s: self.model.frames[self.model.getFrameId(s)].parentJoint for s in SEGMENT_NAMES}
-
-
-def _root_pose(q: np.ndarray) -> pin.SE3:
-    return pin.XYZQUATToSE3(q[:7])
 
 
 def about(wrench: np.ndarray, point: np.ndarray) -> np.ndarray:

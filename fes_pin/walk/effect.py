@@ -17,7 +17,6 @@ AXES = ("forward", "left", "up")
 UNITS = {"n": "N", "share": ""}
 """Units that the end of a parameter's name writes otherwise."""
 
-EffectColumns = Callable[[WalkTrial], np.ndarray]
 SegmentChange = Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]]
 """Function of the segments' ten mass parameters: their changes per unit of each parameter, (10, p) by segment."""
 
@@ -55,7 +54,7 @@ class Form:
     site: str
     parameters: tuple[str, ...]
     plausible: float
-    columns: EffectColumns = field(repr=False, compare=False)
+    columns: Callable[[WalkTrial], np.ndarray] = field(repr=False, compare=False)
     shifts: bool = False
     positive: bool = False
     ordinary: float = 0.0

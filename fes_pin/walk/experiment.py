@@ -13,14 +13,10 @@ from fes_pin.walk.dynamics import about
 from fes_pin.walk.models import WalkFit, WalkModels
 from fes_pin.walk.walk_trial import WalkTrial
 
-CARRIED_KG = 10.0
-"""Load that is carried in the trial that is proposed."""
-SLOWER = 0.6
-"""Share of the usual speed in the trial that is proposed."""
 PLANS = {
     "stand still on one plate": (0.0, 0.0),
-    f"walk at {100 * SLOWER:.0f} % of the speed": (SLOWER, 0.0),
-    f"carry a known weight of {CARRIED_KG:g} kg at the trunk": (1.0, CARRIED_KG),
+    "walk at 60 % of the speed": (0.6, 0.0),
+    "carry a known weight of 10 kg at the trunk": (1.0, 10.0),
 }
 """Trials that are compared: share of the usual speed, and load at the trunk, kg."""
 

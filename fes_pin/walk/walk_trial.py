@@ -62,12 +62,6 @@ class WalkTrial:
         return about(self.plates.total, self.motion.centre)
 
     @cached_property
-    def rate(self) -> np.ndarray:
-        """How fast the plates' reading changes, about the centre of mass where it is: (n, 6) per s."""
-        read = about(self.plates.total, self.plates.way)
-        return about(np.gradient(read, self.motion.dt, axis=0), self.motion.centre - self.plates.way)
-
-    @cached_property
     def load_shares(self) -> dict[str, np.ndarray]:
         """Share of each foot in the vertical load: (n,)."""
         up = {side: np.clip(wrench[:, 2], 0.0, None) for side, wrench in self.plates.feet.items()}

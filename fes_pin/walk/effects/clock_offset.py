@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from fes_pin.walk.dynamics import about
 from fes_pin.walk.effect import Form, WalkEffect
 from fes_pin.walk.walk_trial import WalkTrial
 
@@ -25,4 +26,7 @@ class ClockOffset(WalkEffect):
 
 
 def _rate(trial: WalkTrial) -> np.ndarray:
-    return -trial.rate[:, :, None]
+    """Return how fast the plates' reading changes, about the centre of mass where it is."""
+    way = trial.plates.way
+    rate = np.gradient(about(trial.plates.total, way), trial.motion.dt, axis=0)
+    return -about(rate, trial.motion.centre - way)[:, :, None]
