@@ -85,17 +85,11 @@ def _use(diagnosis: Diagnosis) -> list[Markup]:
     which = "extended" if diagnosis.causes else "fitted nominal"
     words = f"model.toml next to this page is the {which} model, whole. TRIAL.csv needs {columns}. {rig.begins}"
     library = f", library={libraries}".replace("'", '"') if libraries else ""
-    python = _in_python(library, logged=diagnosis.log != Log())
-    return [element("p", words), element("pre", "\n".join(lines)), element("pre", python)]
-
-
-def _in_python(library: str, *, logged: bool) -> str:
-    """Return the code that predicts a trial; with `logged` its log is corrected before."""
+    logged = diagnosis.log != Log()  # corrected before the trial is predicted
     given = 'load_log("model.toml").applied(trial)' if logged else "trial"
-    lines = ["import fes_pin as fp", *["from fes_pin.identify.stored import load_log"] * logged, ""]
-    return "\n".join(
-        [*lines, f'model = fp.load_model("model.toml"{library})', f"predicted = fp.predict(model, {given})"]
-    )
+    imports = ["import fes_pin as fp", *["from fes_pin.identify.stored import load_log"] * logged, ""]
+    python = [*imports, f'model = fp.load_model("model.toml"{library})', f"predicted = fp.predict(model, {given})"]
+    return [element("p", words), element("pre", "\n".join(lines)), element("pre", "\n".join(python))]
 
 
 PARTS = Parts(_counts, _sections, ("not testable",))

@@ -79,15 +79,11 @@ class WalkDiagnosis(ModelResult):
         nominal, extended = (
             {"parameters": p, "error_percent": {"fit": shown(f), "held_out": shown(h)}} for p, (f, h) in pairs
         )
-        record = self.models_record(nominal, extended, self._noise(), ("coordinates", "file"))
+        residual = self.models.designs.residual(self.best.names, self.best.fitted.values)[0]
+        sizes = zip(CHANNELS, np.sqrt(np.sum(residual**2, axis=1)), strict=True)  # in the mean stride
+        noise: dict[str, Any] = {name.replace(" ", "_"): {"std": shown(float(s)), "ar": []} for name, s in sizes}
+        record = self.models_record(nominal, extended, noise, ("coordinates", "file"))
         return {**record, "cutoff_hz": self.cutoff_hz}
-
-    def _noise(self) -> dict[str, Any]:
-        """Return the root mean square residual of the extended model in the mean stride, by channel: N and N m."""
-        residual = self.models.designs.residual(self.best.names, self.best.fitted.values)
-        size = np.sqrt(np.sum(residual[0] ** 2, axis=1))
-        names = (name.replace(" ", "_") for name in CHANNELS)
-        return {name: {"std": shown(float(s)), "ar": []} for name, s in zip(names, size, strict=True)}
 
     def effect(self, name: str) -> type[WalkEffect] | None:
         """Return the class of a cause."""

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
+from scipy.ndimage import binary_dilation
 
 from fes_pin.walk.effect import AXES, PLATES, Form, WalkEffect
 from fes_pin.walk.walk_trial import WalkTrial
@@ -59,16 +60,11 @@ def _unloaded(trial: WalkTrial, sides: tuple[str, ...], axis: int) -> tuple[np.n
     """What the plates read while nobody stands on them, which is what they always read: the least of both."""
     values = []
     for side in sides:
-        free = ~near(trial.plates.loaded[side], int(np.ceil(SETTLED_S / trial.motion.dt)))
+        free = ~binary_dilation(trial.plates.loaded[side], iterations=int(np.ceil(SETTLED_S / trial.motion.dt)))
         if not free.any():
             return None
         values.append(float(np.mean(trial.plates.feet[side][free, axis])))
     return np.array([min(values, key=abs)]), ORDINARY_N
-
-
-def near(loaded: np.ndarray, reach: int) -> np.ndarray:
-    """Samples that are loaded, or up to so many away from one that is."""
-    return np.convolve(loaded, np.ones(2 * reach + 1), mode="same") > 0.0
 
 
 def _displaced(trial: WalkTrial, sides: tuple[str, ...], axis: int) -> np.ndarray:
