@@ -23,6 +23,8 @@ from fes_pin.workers import in_parallel
 TENTHS = 10
 """Pieces into which the error of a free simulation is divided where there are fewer than `FOLDS` trials."""
 
+Pairs = Sequence[tuple[LikelihoodFit, LikelihoodFit, Sequence[Trial]]]
+"""Fits, each with the fit whose white noise is the unit of its errors so that models can be compared, and trials."""
 _Predicted = tuple[dict[str, np.ndarray], dict[str, np.ndarray]]
 
 
@@ -108,15 +110,11 @@ def _averaged(std: float, time: float) -> float:
     return std * float(np.sqrt(max(2.0 * x * (1.0 - x * (1.0 - np.exp(-1.0 / x))), 0.0)))
 
 
-def squared_errors(
-    pairs: Sequence[tuple[LikelihoodFit, LikelihoodFit, Sequence[Trial]]], ahead_s: float | None
-) -> Errors:
+def squared_errors(pairs: Pairs, ahead_s: float | None) -> Errors:
     """Return squared errors over a horizon, by seconds of each trial; or of free simulations, by trials.
 
     Parameters
     ----------
-    pairs
-        A fit, the fit whose white noise is the unit of its errors so that models can be compared, and trials.
     ahead_s
         The horizon, s; None for free simulations, whose errors are correlated all through a trial. Where there are few
         trials, each is divided into tenths.
@@ -228,18 +226,15 @@ def noise_that_is_small(fitted: LikelihoodFit) -> StateSpaceNoise:
     """
     if is_simulated(fitted.noise, fitted.trials) and not any(fitted.noise.ar.values()):
         rough = first_guess(fitted.model, fitted.trials).white
-        return replace(
-            fitted.noise, white={n: float(np.fmin(v, rough.get(n, v))) for n, v in fitted.noise.white.items()}
-        )
+        white = {n: float(np.fmin(v, rough.get(n, v))) for n, v in fitted.noise.white.items()}
+        return replace(fitted.noise, white=white)
     less = {r.name: SMALL_SHARE / r.share for r in random_parts(fitted) if r.share > SMALL_SHARE}
     std = {n: value * less.get(n, 1.0) for n, value in fitted.noise.std.items()}
     return replace(fitted.noise, std=std) if less else fitted.noise
 
 
-def errors_ahead(
-    pairs: Sequence[tuple[LikelihoodFit, LikelihoodFit, Sequence[Trial]]], horizon_s: float, falling: bool
-) -> Ahead:
-    """Return E of the first output one sample ahead, over the horizon and free; `pairs` as in `squared_errors`."""
+def errors_ahead(pairs: Pairs, horizon_s: float, falling: bool) -> Ahead:
+    """Return E of the first output one sample ahead, over the horizon and free."""
     work = [(fitted, floor, trial) for fitted, floor, trials in pairs for trial in trials]
     missed, around = np.sum(in_parallel(lambda one: _sums(*one, horizon_s), work), axis=0)
     one_step, horizon, free, noise = (float(v) for v in 100.0 * missed / np.maximum(around, 1e-300))

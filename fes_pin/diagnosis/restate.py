@@ -95,10 +95,8 @@ def _errors_of_halves(made: Made, trial: Trial) -> tuple[Errors, Errors]:
     """Return errors on a trial of the model fitted to the others: as stated, and at the estimate of its other half."""
     misread, others = made.misread, made.misread.others
     plain = free_errors(others.model, [trial], others.noise)
-    by_half = [
-        free_errors(others.model, [others.model.rig.restated(trial, misread.condition, v)], others.noise)
-        for v in misread.halves
-    ]
+    restated = [others.model.rig.restated(trial, misread.condition, v) for v in misread.halves]
+    by_half = [free_errors(others.model, [one], others.noise) for one in restated]
     odd, _ = halves(len(plain.squares))
     squares = np.where(odd, by_half[1].squares, by_half[0].squares)  # each piece by the value of the other half
     return plain, Errors(squares, plain.spread, plain.noise)

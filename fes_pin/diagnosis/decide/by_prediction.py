@@ -93,14 +93,10 @@ def _without(fitted: LikelihoodFit, held: Sequence[int]) -> Model:
 def _error(model: Model, trials: Sequence[Trial], noise: StateSpaceNoise) -> float:
     """Return the mean over trials of the logarithm of the mean squared error of a simulation."""
     if model.own_unknowns():
-        residuals = [np.concatenate(_in_deviations(model, t, noise)) for t in trials]
+        missed = [free_residuals(model, t, noise) for t in trials]
+        residuals = [np.concatenate([v[np.isfinite(v)] / noise.white[n] for n, v in one.items()]) for one in missed]
     else:
         problem = LikelihoodProblem(model, trials, replace(noise, ar={}), ())
         residuals = [p.residual for p in minimise(problem, model.parameters()).parts]
     means = [float(r @ r) / max(len(r), 1) for r in residuals]
     return float(np.mean([math.log(max(m, 1e-12)) if math.isfinite(m) else math.inf for m in means]))
-
-
-def _in_deviations(model: Model, trial: Trial, noise: StateSpaceNoise) -> list[np.ndarray]:
-    missed = free_residuals(model, trial, noise)
-    return [values[np.isfinite(values)] / noise.white[n] for n, values in missed.items()]
