@@ -15,7 +15,7 @@ from fes_pin.contrasts.result import Contrast
 from fes_pin.contrasts.verdict import ContrastVerdict
 from fes_pin.data.asked import asked
 from fes_pin.data.log import EFFORT, Log
-from fes_pin.data.provenance import Provenance, provenance_now
+from fes_pin.data.provenance import provenance_now
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
@@ -84,7 +84,11 @@ def contrast(
     tell = asked(study, seed, limit, progress)
     catalogue = catalogue_of(library)
     measured = measured_study(grouped_study(study, after, by, groups))
-    made = _provenance(study, after, seed)
+    made = provenance_now(study, seed)
+    if after is not None:  # the files of each study are listed by its name
+        both = zip(labels_of(study, after), (study, after), strict=True)
+        files = {f"{label}/{path}": sha for label, one in both for path, sha in one.inputs().items()}
+        made = replace(made, inputs=files)
     warnings = [*measured.warnings, *check_study(measured.study, nominal_model(measured.study))]
     with one_thread_each(), noting_stops() as stops:
         end = math.inf if limit is None else began + limit
@@ -193,15 +197,6 @@ class _Work:
             warnings=tuple(said),
             catalogue=self.catalogue,
         )
-
-
-def _provenance(study: Study, after: Study | None, seed: int) -> Provenance:
-    """Return the provenance of a contrast, with the files of each study listed by its name."""
-    made = provenance_now(study, seed)
-    if after is None:
-        return made
-    both = zip(labels_of(study, after), (study, after), strict=True)
-    return replace(made, inputs={f"{label}/{path}": sha for label, one in both for path, sha in one.inputs().items()})
 
 
 __all__ = ["contrast"]

@@ -148,7 +148,8 @@ def forecasts(model: Model, trial: Trial, noise: StateSpaceNoise, horizon_s: flo
     ahead, stride = reach_of(trial, horizon_s)
     outputs = tuple(n for n in model.rig.outputs(trial.kind) if n in trial.columns)
     starts = range(0, max(len(trial) - ahead, 1), stride)
-    batches = [starts[k :: _lanes(ahead, stride)] for k in range(min(_lanes(ahead, stride), len(starts)))]
+    lanes = math.ceil((1 + SEEN_AGAIN) * (ahead + stride) / stride)  # runs, so that each sees enough between two
+    batches = [starts[k::lanes] for k in range(min(lanes, len(starts)))]
     shown = [masked(trial, outputs, [range(s + 1, s + ahead + stride) for s in own]) for own in batches]
     problem = LikelihoodProblem(model, shown, noise, (), starts=[trial] * len(shown))
     out = {n: PredictedOutput(np.array(trial[n]), np.zeros(len(trial))) for n in outputs}
@@ -168,11 +169,6 @@ def reach_of(trial: Trial, horizon_s: float) -> tuple[int, int]:
     """Return the samples of a horizon, and the samples by which the newest one that is used may be older."""
     ahead = max(1, round(horizon_s / trial.dt))
     return ahead, max(1, round(STRIDE * ahead))
-
-
-def _lanes(ahead: int, stride: int) -> int:
-    """Return the number of runs that share the predictions of a trial, so that each sees enough between two of them."""
-    return math.ceil((1 + SEEN_AGAIN) * (ahead + stride) / stride)
 
 
 def falls(model: Model, trials: Sequence[Trial]) -> bool:

@@ -184,7 +184,8 @@ class LikelihoodProblem(Problem, NoisyProblem):
         noise.
         """
         run = self.residual_run(values, unknowns)
-        found, limits = self._with_autoregressions(run), self.noise_limits
+        orders, limits = {n: (len(ar),) for n, ar in self.noise.ar.items()}, self.noise_limits
+        found = replace(self.noise, ar={**self.noise.ar, **autoregressions(run, orders)})
         if self.is_simulated:
             powers = residual_powers([with_noise(one, found) for one in run])
             white = {f"white.{n}": found.white[n] * math.sqrt(power) for n, power in powers.items()}
@@ -194,11 +195,6 @@ class LikelihoodProblem(Problem, NoisyProblem):
             return 0.0
         self.noise = found
         return before - after
-
-    def _with_autoregressions(self, run: Sequence[PredictedTrial]) -> StateSpaceNoise:
-        """Return the noise with autoregressions of its orders, from the innovations of a run."""
-        orders = {n: (len(ar),) for n, ar in self.noise.ar.items()}
-        return replace(self.noise, ar={**self.noise.ar, **autoregressions(run, orders)})
 
     def residual_run(self, values: Mapping[str, float], unknowns: Unknowns) -> list[PredictedTrial]:
         """Return every trial as predicted, of which the noise of simulated trials is estimated."""
@@ -233,22 +229,15 @@ class LikelihoodProblem(Problem, NoisyProblem):
         at, squares = [self.free.index(n) for n in self._scales], sum(float(p.residual @ p.residual) for p in parts)
         if not (np.isfinite(squares) and squares > 0.0):
             return parts
-        along = np.zeros(len(self.free))
-        along[at] = self._missed_slopes(parts, at, values, unknowns) / squares
-        return [replace(p, jacobian=p.jacobian + np.outer(p.residual, along)) for p in parts]
-
-    def _missed_slopes(
-        self, parts: Sequence[Linearized], at: Sequence[int], values: Mapping[str, float], unknowns: Unknowns
-    ) -> np.ndarray:
-        """Return the error of slopes at constant gains in half the cost, by parameter; 0 where it is not finite."""
-        now, out = whitened_sse(parts), np.zeros(len(at))
+        now, along = whitened_sse(parts), np.zeros(len(self.free))
         sizes = np.sqrt(sum(np.sum(p.jacobian[:, at] ** 2, axis=0) for p in parts))
         felt = np.flatnonzero(sizes) if np.isfinite(now) else np.empty(0, dtype=int)
         names, steps = [self._scales[k] for k in felt], FOLLOWED_STEP / sizes[felt]
         moved = [{**values, n: values[n] + float(h)} for n, h in zip(names, steps, strict=True)]
         slopes = 0.5 * (np.array(self.costs([(m, unknowns) for m in moved])) - now) / steps
-        out[felt] = -slopes - sum(p.residual @ p.jacobian[:, at] for p in parts)[felt]
-        return np.nan_to_num(out)
+        missed = -slopes - sum(p.residual @ p.jacobian[:, at] for p in parts)[felt]
+        along[np.array(at)[felt]] = np.nan_to_num(missed) / squares
+        return [replace(p, jacobian=p.jacobian + np.outer(p.residual, along)) for p in parts]
 
     def whitened(self, one: PredictedTrial) -> Linearized:
         """Return the same with the logarithms of the variances."""
