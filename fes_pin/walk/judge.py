@@ -19,14 +19,14 @@ def other_leg(designs: Designs, one: WalkFit) -> float | None:
 
     Channels are in units of the set's residual in them.
     """
-    along = [(trial, designs.signals(one.names, trial)) for trial in designs.design(one.names).trials]
-    left = np.concatenate([trial.residual - x @ one.fitted.values for trial, x in along])
+    trials = designs.design(one.names).trials
+    along = [np.dstack([trial.residual, designs.signals(one.names, trial)]) for trial in trials]
+    left = np.concatenate(along) @ np.r_[1.0, -one.fitted.values]
     scale = 1.0 / np.maximum(np.sqrt(np.mean(left**2, axis=0)), FLOOR_N)
     legs: dict[str, list[np.ndarray]] = {"left": [], "right": []}
-    for trial, x in along:
-        both = scale[:, None] * np.concatenate([trial.residual[..., None], x], axis=2)
+    for trial, both in zip(trials, along, strict=True):
         for side, rows in trial.plates.single_supports():
-            legs[side].append(both[rows].reshape(-1, both.shape[2]))
+            legs[side].append((scale[:, None] * both[rows]).reshape(-1, both.shape[2]))
     if not all(legs.values()):
         return None
     one_leg, other = (np.concatenate(parts) for parts in legs.values())

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import groupby
 
 import numpy as np
 
@@ -98,14 +99,14 @@ class WalkModels(FittedSets[WalkFit, None]):
 
     def begin(self, base: WalkFit, starts: Mapping[Names, None]) -> dict[Names, WalkFit]:
         """Fit sets within the limit of time, those with the same number of parameters and clock together."""
-        groups: dict[tuple[int, bool], list[Names]] = {}
-        for names in starts:
-            count = sum(len(self.designs.forms[n].parameters) for n in names)
-            groups.setdefault((count, self.designs.shift in names), []).append(names)
+
+        def kind(names: Names) -> tuple[int, bool]:
+            return len(self.designs.plausible(names)), self.designs.shift in names
+
         out: dict[Names, WalkFit] = {}
-        for group in groups.values():
+        for _, group in groupby(sorted(starts, key=kind), key=kind):
             check_limit()
-            out |= {one.names: one for one in self._fit_alike(group)}
+            out |= {one.names: one for one in self._fit_alike(list(group))}
         return out
 
     def fit(self, names: Names) -> WalkFit:
