@@ -44,6 +44,7 @@ SETS = {
 SAGITTAL = [
     f"{side}_{joint}" for side in ("left", "right") for joint in ("hip_flexion", "knee_flexion", "ankle_dorsiflexion")
 ]
+KNOWN = [name for name, known in zip(JOINT_NAMES, walk.known, strict=True) if known]
 sagittal_only = np.isin(JOINT_NAMES, SAGITTAL).astype(float)
 STRENGTHS = (PARALYSED_BAND[0], PARALYSED, PARALYSED_BAND[1], HEALTHY)
 
@@ -74,7 +75,7 @@ for name, nerves in SETS.items():
         sagittal = fp.allocate_walk(walk.torque, channels, walk.q, walk.rates, weights=sagittal_only)
         full = fp.allocate_walk(walk.torque, channels, walk.q, walk.rates, weights=weights)
         assert max(sagittal.residual.max(), full.residual.max()) < 1e-9
-        row.append((attained(sagittal, SAGITTAL)[0], attained(full, walk.known_joints)[0]))
+        row.append((attained(sagittal, SAGITTAL)[0], attained(full, KNOWN)[0]))
         if strength == PARALYSED:
             results[name] = (sagittal, full)
     cells = [" - ".join(f"{100 * r[k]:3.0f}" for r in row) + " %" for k in range(2)]
