@@ -13,7 +13,7 @@ from fes_pin.diagnosis.remainder.lack_of_fit import lack_of_fit
 from fes_pin.infer.held_out import FOLDS, marginal_cost
 from fes_pin.infer.levels import CLAIM_LEVEL
 from fes_pin.infer.result import FITTED, Evidence, Gain, Remainder
-from fes_pin.infer.verdict import State, Verdict, Weighed
+from fes_pin.infer.verdict import Claim, State, Verdict, Weighed
 from fes_pin.workers import in_parallel
 
 
@@ -44,8 +44,12 @@ class ContrastVerdict(Verdict[Grouped, ContrastModels, ContrastWeighed]):
 
     def __init__(self, search: ContrastSearch) -> None:
         super().__init__(search)
-        self.claims = (self.drop_unsupported, self.settle)
         self._costs: dict[Grouped, float] = {}
+
+    @property
+    def claims(self) -> Sequence[Claim[Grouped, ContrastModels, ContrastWeighed]]:
+        """The claims in their order: a contrast has one estimator, and its folds do not search."""
+        return self.drop_unsupported, self.settle
 
     def weigh(self, found: Found) -> ContrastWeighed:
         """Return the evidence of held-out trials and of the tests of lack of fit on a set."""

@@ -27,7 +27,6 @@ from fes_pin.infer.problem import Linearized
 from fes_pin.infer.projection import Projection, without_locals
 from fes_pin.infer.result import ParameterEstimate
 from fes_pin.models.model import Model
-from fes_pin.workers import in_parallel
 
 NAME = "condition_misread"
 DESCRIBED = f"""{NAME} (rig; rigs: ankle, joint, muscle)
@@ -94,7 +93,7 @@ class Misread:
 
 
 @dataclass(frozen=True)
-class _Step:
+class _Estimated:
     """Estimate of a condition from its own trial: difference from the stated value in its unit, standard deviation, and
     mean square of the residual."""
 
@@ -102,9 +101,14 @@ class _Step:
     std: float
     left: float
 
-    @property
-    def z(self) -> float:
-        return self.value / self.std
+
+@dataclass(frozen=True)
+class _Near:
+    """A trial at a value of a condition: linearized in the parameters, and the whitened derivative by the condition,
+    shape (m,)."""
+
+    part: Linearized
+    column: np.ndarray
 
 
 def find_misread(model: Model, trials: Sequence[Trial]) -> Misread | None:
@@ -158,28 +162,16 @@ def _screen(whole: Fit, wanted: Sequence[Pick], sizes: Mapping[str, float]) -> l
     white = under_own_noise(whole, longest=0)
     projection = Projection(white.parts)
 
-    def score(pick: Pick) -> float:
-        i, name = pick
+    def score(pick: Pick, near: _Near) -> float:
         columns = np.zeros((len(projection.residual), 1))
-        columns[projection.trials[i], 0] = _column(white, white.trials[i], name, sizes[name])
+        columns[projection.trials[pick[0]], 0] = near.column
         left = projection(columns)[:, 0]
         power, before = float(left @ left), float(np.sum(columns**2))
         return float(left @ projection.residual) ** 2 / power if power > 1e-9 * max(before, 1e-300) else 0.0
 
-    scores = in_parallel(score, list(wanted))
+    near = _near(white, [(white.trials[i], name) for i, name in wanted], sizes)
+    scores = [score(*one) for one in zip(wanted, near, strict=True)]
     return [wanted[k] for k in np.argsort(scores)[::-1][:CANDIDATES] if scores[k] > MISREAD_SCORE]
-
-
-def _column(fitted: Fit, trial: Trial, name: str, step: float) -> np.ndarray:
-    """Return the whitened derivative of a trial's simulation by a condition, shape (m,)."""
-    rig, there = fitted.model.rig, fitted.model.rig.stated(trial)[name]
-    low, high = (_linearized(fitted, rig.restated(trial, name, there + s)) for s in (-step, step))
-    return (low.residual - high.residual) / (2.0 * step)
-
-
-def _linearized(fitted: Fit, trial: Trial) -> Linearized:
-    problem = Problem(fitted.model, [trial], fitted.noise, fitted.free)
-    return problem.linearize(fitted.values, problem.start_unknowns())[0]
 
 
 def _left_out(whole: Fit, pick: Pick, wanted: Sequence[Pick], sizes: Mapping[str, float]) -> Misread | None:
@@ -190,48 +182,73 @@ def _left_out(whole: Fit, pick: Pick, wanted: Sequence[Pick], sizes: Mapping[str
     fitted = under_own_noise(near, max_iterations=MAX_ITERATIONS)
     if not math.isfinite(fitted.sse):
         return None
-    own = _step(fitted, trials[i], name, sizes[name])
-    steps = [_step(fitted, trials[k], n, sizes[n], 1) for k, n in wanted if k != i]
-    finite = [s for s in steps if math.isfinite(s.z)]
-    if len(finite) < FEWEST_STATED - 1 or not math.isfinite(own.z):
+    own = _estimated(fitted, trials[i], name, sizes)
+    others = [_step(fitted, one) for one in _near(fitted, [(trials[k], n) for k, n in wanted if k != i], sizes)]
+    finite = [move / std for move, std in others if math.isfinite(std)]
+    if len(finite) < FEWEST_STATED - 1 or not math.isfinite(own.std):
         return None
-    phi = max(1.0, float(np.mean([s.z**2 for s in finite])))
-    t = abs(own.z) / math.sqrt(phi)
+    phi = max(1.0, float(np.mean(np.square(finite))))
+    t = abs(own.value / own.std) / math.sqrt(phi)
     p = min(1.0, 2.0 * len(wanted) * float(special.stdtr(len(finite), -t)))
     usual = max(float(part.residual @ part.residual) / len(part.residual) for part in fitted.parts)
     if not p < CLAIM_LEVEL or own.left > EXPLAINED_AS_WELL * max(usual, 1.0):
         return None
     stated = whole.model.rig.stated(trials[i])[name]
-    odd, even = (stated + _step(fitted, trials[i], name, sizes[name], half=k).value for k in (0, 1))
+    odd, even = (stated + _estimated(fitted, trials[i], name, sizes, k).value for k in (0, 1))
     value, std = stated + own.value, own.std * math.sqrt(phi)
     return Misread(trials[i].name, name, stated, value, std, p, (odd, even), whole, fitted)
 
 
-def _step(fitted: Fit, trial: Trial, name: str, size: float, steps: int = STEPS, half: int | None = None) -> _Step:
-    """Estimate a condition from its own trial by Gauss-Newton steps, as a difference from the stated value.
+def _near(fitted: Fit, wanted: Sequence[tuple[Trial, str]], sizes: Mapping[str, float]) -> list[_Near]:
+    """Return trials near the values of a condition of each, by central differences; one run for all."""
+    rig, each = fitted.model.rig, list[Trial]()
+    for trial, name in wanted:
+        there, size = rig.stated(trial)[name], sizes[name]
+        each += [trial, *(rig.restated(trial, name, there + s) for s in (-size, size))]
+    parts = _linearized(fitted, each)
+    found = zip(parts[::3], parts[1::3], parts[2::3], [sizes[n] for _, n in wanted], strict=True)
+    return [_Near(part, (low.residual - high.residual) / (2.0 * size)) for part, low, high, size in found]
+
+
+def _linearized(fitted: Fit, trials: Sequence[Trial]) -> list[Linearized]:
+    problem = Problem(fitted.model, trials, fitted.noise, fitted.free)
+    return problem.linearize(fitted.values, problem.start_unknowns())
+
+
+def _step(fitted: Fit, near: _Near, half: int | None = None) -> tuple[float, float]:
+    """Return the Gauss-Newton step of a condition and its standard deviation, infinite where it is not identifiable.
 
     Parameters
     ----------
     half
         0 or 1: from the odd or from the even quarters of the trial alone.
     """
+    part, covariance = near.part, np.where(np.isfinite(fitted.covariance), fitted.covariance, 0.0)
+    column = without_locals(part, near.column[:, None])[:, 0]
+    r, j = without_locals(part, part.residual[:, None])[:, 0], without_locals(part, part.jacobian)
+    if half is not None:
+        column = np.where(halves(len(column))[half], column, 0.0)
+    power = float(column @ column)
+    if not power > 0.0 or not math.isfinite(power):
+        return 0.0, math.inf
+    shift = column @ j / power
+    return float(column @ r) / power, math.sqrt(1.0 / power + max(float(shift @ covariance @ shift), 0.0))
+
+
+def _estimated(
+    fitted: Fit, trial: Trial, name: str, sizes: Mapping[str, float], half: int | None = None
+) -> _Estimated:
+    """Estimate a condition from its own trial by Gauss-Newton steps; see `_step`."""
     rig, now = fitted.model.rig, trial
     begun = rig.stated(trial)[name]
-    covariance = np.where(np.isfinite(fitted.covariance), fitted.covariance, 0.0)
-    for _ in range(steps):
-        part = _linearized(fitted, now)
-        column = without_locals(part, _column(fitted, now, name, size)[:, None])[:, 0]
-        r, j = without_locals(part, part.residual[:, None])[:, 0], without_locals(part, part.jacobian)
-        if half is not None:
-            column = np.where(halves(len(column))[half], column, 0.0)
-        power = float(column @ column)
-        if not power > 0.0 or not math.isfinite(power):
-            return _Step(0.0, math.inf, math.inf)
-        move = float(column @ r) / power
-        shift = column @ j / power
-        std = math.sqrt(1.0 / power + max(float(shift @ covariance @ shift), 0.0))
+    for _ in range(STEPS):
+        (near,) = _near(fitted, [(now, name)], sizes)
+        move, std = _step(fitted, near, half)
+        if not math.isfinite(std):
+            return _Estimated(0.0, math.inf, math.inf)
         now = rig.restated(now, name, rig.stated(now)[name] + move)
         if abs(move) < ENDS * std:
             break
-    r = without_locals(part, _linearized(fitted, now).residual[:, None])[:, 0]
-    return _Step(rig.stated(now)[name] - begun, std, float(r @ r) / max(len(r), 1))
+    (there,) = _linearized(fitted, [now])
+    r = without_locals(near.part, there.residual[:, None])[:, 0]
+    return _Estimated(rig.stated(now)[name] - begun, std, float(r @ r) / max(len(r), 1))

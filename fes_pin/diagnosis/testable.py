@@ -168,7 +168,7 @@ def _shifted(model: Model, trials: Sequence[Trial], fitted: Fit) -> list[str]:
         return []
     sums = [float(p.residual @ p.residual) / len(p.residual) for p in fitted.parts]
     worst = [trials[i] for i in np.argsort(sums)[::-1][:MOST_LOOKED_AT]]
-    shifts = [_shift(rough_fit(model, [t for t in trials if t is not one]).model, one) for one in worst]
+    shifts = [_shift(model, [t for t in trials if t is not one], one) for one in worst]
     usual = float(np.median([shift if share < SMALL_SHARE else 0.0 for shift, share in shifts]))
     out = []
     for trial, (shift, share) in zip(worst, shifts, strict=True):
@@ -178,12 +178,12 @@ def _shifted(model: Model, trials: Sequence[Trial], fitted: Fit) -> list[str]:
     return out
 
 
-def _shift(model: Model, trial: Trial) -> tuple[float, float]:
+def _shift(model: Model, others: Sequence[Trial], trial: Trial) -> tuple[float, float]:
     """Return the lag in s of a trial's reading behind its simulation, and the share of its error at that lag."""
     name = model.rig.output(trial.kind)
     if name not in trial or not model.rig.input_columns(trial):
         return 0.0, 1.0
-    measured, simulated = trial[name], simulated_trial(model, trial)[name]
+    measured, simulated = trial[name], simulated_trial(rough_fit(model, others).model, trial)[name]
     most = int(LONGEST_SHIFT * len(trial))
     lags = np.arange(-most, most + 1, max(1, most // 200))
     inside = simulated[most : len(trial) - most]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import as_number, instance, number, whole
 from fes_pin.data.results import Saveable
-from fes_pin.data.schema import unknown
+from fes_pin.data.schema import IMPOSED, unknown
 from fes_pin.data.show import by_columns, frame
 from fes_pin.data.trial import Trial
 from fes_pin.identify.problem import Problem
@@ -253,9 +253,12 @@ def from_beginnings(problem: Problem, plain: F, again: Callable[[Mapping[str, fl
 
 
 def fit_multistart(problem: Problem, max_iterations: int = MAX_ITERATIONS) -> Fit:
-    """Fit a problem from its model's values, and from afar where that leaves a gross misfit; return the better fit."""
+    """Fit a problem from its model's values, and from afar where that leaves a gross misfit; return the better fit.
+
+    The error of an imposed motion does not grow with time.
+    """
     plain = fit_problem(problem, problem.model.parameters(), max_iterations=max_iterations)
-    if plain.reduced < GROSS:
+    if plain.reduced < GROSS or all(t.kind == IMPOSED for t in problem.trials):
         return plain
     return from_beginnings(problem, plain, partial(fit_problem, problem, max_iterations=max_iterations))
 

@@ -108,12 +108,11 @@ class Verdict(ABC, Generic[F, M, W]):
 
     def __init__(self, search: Search[F, M]) -> None:
         self.search = search
-        self.claims: Sequence[Claim[F, M, W]] = (
-            self.drop_unsupported,
-            self.settle,
-            self.drop_rarely_chosen,
-            self.switch_estimator,
-        )
+
+    @property
+    def claims(self) -> Sequence[Claim[F, M, W]]:
+        """The claims in their order."""
+        return self.drop_unsupported, self.settle, self.drop_rarely_chosen, self.switch_estimator
 
     @abstractmethod
     def weigh(self, found: SearchResult[F]) -> W:

@@ -21,6 +21,9 @@ from fes_pin.models.predictions import PredictedOutput, PredictedTrial, Readings
 from fes_pin.models.rigs.base import Rig
 from fes_pin.models.simulate import Block, EachTrial, OnTrials, Values, max_step, spread
 
+_COUNTED = "_counted"
+"""Where a trial keeps which of its readings are counts: many models predict it in turn."""
+
 
 @dataclass(frozen=True, eq=False)
 class StateSpaceNoise(ReadOnly, Mapping[str, Noise]):
@@ -199,11 +202,22 @@ def read_columns(rig: Rig, trial: Trial, outputs: tuple[str, ...], correlation_s
     if correlation_s is None:
         once = np.ones(columns.shape)
         return ReadColumns(followed, measured, once, Readings(outputs, followed, once))
-    hunting = np.column_stack([hunts(trial[name]) for name in outputs])
-    often = np.column_stack([repeated(c, h) for c, h in zip(columns.T, hunting.T, strict=True)])
-    counted = np.array([count_of(c) > 0.0 for c in columns.T])
+    hunting, often, counted = _counts(trial, outputs)
     readings = Readings(outputs, followed & ~hunting, np.where(counted, often, 1.0))
     return ReadColumns(followed, measured, often, readings)
+
+
+def _counts(trial: Trial, outputs: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return which readings hunt, how many are equal in a row, shape (n, outputs) each, and which outputs are counts."""
+    known, found = vars(trial).get(_COUNTED, ((), ()))
+    if known != outputs:
+        columns = [trial[name] for name in outputs]
+        hunting = [hunts(c) for c in columns]
+        often = [repeated(c, h) for c, h in zip(columns, hunting, strict=True)]
+        counted = np.array([count_of(c) > 0.0 for c in columns])
+        found = np.column_stack(hunting), np.column_stack(often), counted
+        vars(trial)[_COUNTED] = outputs, found
+    return found
 
 
 def measured_outputs(model: Model, trial: Trial) -> tuple[str, ...]:

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -70,8 +69,9 @@ class OnTrials:
     def side_by_side(self) -> Iterator[list[int]]:
         """Yield places of trials of one batch: those of the same key and of similar length."""
         groups: dict[Any, list[int]] = {}
+        keys = {trial_id: self.key(trial) for trial_id, trial in {id(t): t for t in self.trials}.items()}
         for i, trial in enumerate(self.trials):
-            groups.setdefault(self.key(trial), []).append(i)
+            groups.setdefault(keys[id(trial)], []).append(i)
         for members in groups.values():
             members.sort(key=lambda i: len(self.trials[i]))
             most = widest(self.columns)
@@ -214,7 +214,7 @@ class Block:
         self.constants = np.array([[c.get(n, 0.0) for c in known] for n in self.layout.constants], dtype=float)
         self.constants = self.constants.reshape(-1, width)
         self.guess = np.array([self.rig.guess(t) for t in padded], dtype=float)
-        self._latest = lru_cache(maxsize=1)(self._inputs)  # other threads ask for other ones
+        self._latest: tuple[tuple[int, ...], np.ndarray] | None = None
 
     def _inputs(self, shift: tuple[int, ...]) -> np.ndarray:
         """Return inputs of all lanes, shape (count, inputs, width), each delayed by whole samples; zero before.
@@ -228,6 +228,13 @@ class Block:
                 values = driving_values(trial, name, self.rig.schema.imposed)
                 u[late : len(trial), j, lane] = values[: len(trial) - late]
         return u
+
+    def _delayed(self, shift: tuple[int, ...]) -> np.ndarray:
+        """Return the result of `_inputs`, kept for the latest shift: a cache of this method would hold its block."""
+        latest = self._latest  # another thread may replace it
+        if latest is None or latest[0] != shift:
+            self._latest = latest = (shift, self._inputs(shift))
+        return latest[1]
 
     def _set(self, constants: np.ndarray, name: str, values: Sequence[float]) -> None:
         """Write a constant of each lane; unused lanes equal the last trial."""
@@ -249,7 +256,7 @@ class Block:
         shift = tuple(math.floor(late / t.dt + 1e-9) for late, t in zip(delays, self.trials, strict=True))
         for name, each in {**known, "shift": shift}.items():
             self._set(constants, name, each)
-        return self.program.run(self._latest(shift), p, constants, self.guess, self.substeps)
+        return self.program.run(self._delayed(shift), p, constants, self.guess, self.substeps)
 
 
 def spread(sensitivities: np.ndarray, places: tuple[int, ...], width: int) -> np.ndarray:

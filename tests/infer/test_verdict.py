@@ -109,8 +109,11 @@ class TwoEstimators(Claims):
 
     def __init__(self, error):
         super().__init__(SimpleNamespace())
-        self.claims = (self.switch_estimator,)
         self.asked, self.error = 0, error
+
+    @property
+    def claims(self):
+        return (self.switch_estimator,)
 
     def weigh(self, found):
         return Weighed({}, {}, NOISE)
