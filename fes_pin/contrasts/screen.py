@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -127,10 +127,15 @@ class Screen:
         self._nominal, self._trials, self._library = nominal, trials, library
         self._effects = [e for e in library.effects if library.felt(e)]
         self._by_group = {g: Library(nominal, own, library.effects) for g, own in trials.items()}
-        self.scores = cache(self._scores)
+        self._scores: dict[Grouped, ItemScores] = {}
 
-    def _scores(self, base: Grouped) -> ItemScores:
+    def scores(self, base: Grouped) -> ItemScores:
         """Return the scores of every item that a set does not have."""
+        if base not in self._scores:
+            self._scores[base] = self._scored(base)
+        return self._scores[base]
+
+    def _scored(self, base: Grouped) -> ItemScores:
         projection, made = Projection(base.parts), list(self._columns(base))
         left = np.concatenate([projection(np.nan_to_num(c.columns)) for c in made], axis=1)
         gram, along = left.T @ left, left.T @ projection.residual

@@ -1,7 +1,7 @@
 """The verdict on causes of a walk: those that are named, with their size, significance and equivalents."""
 
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 
 from fes_pin.infer.distributions import chi2_tail, normal_quantile
 from fes_pin.infer.held_out import is_supported
@@ -42,7 +42,7 @@ class WalkVerdict(Verdict[WalkFit, WalkModels, Weighed]):
     def __init__(self, search: WalkSearch) -> None:
         super().__init__(search)
         self.models, self.errors = search.models, StrideErrors(search.models)
-        self.other_leg = cache(self._other_leg)
+        self.other_leg = cache(partial(_on_other_leg, self.models))
 
     def weigh(self, found: SearchResult[WalkFit]) -> Weighed:
         """Return the evidence of held-out strides and of the test of lack of fit on a set."""
@@ -64,13 +64,6 @@ class WalkVerdict(Verdict[WalkFit, WalkModels, Weighed]):
         if p_value >= (WALK_LEVEL if weighed.evidence else CERTAIN_LEVEL) or (other is not None and other <= 0.0):
             return False
         return not weighed.evidence or is_supported(weighed.evidence[name], weighed.gains[name], alone)
-
-    def _other_leg(self, name: str) -> float | None:
-        """Return the gain of a form on the other leg; None of one leg's form, and of a clock's, which is of no leg."""
-        designs = self.models.designs
-        form = designs.forms[name]
-        of_none = form.site.startswith(("left", "right")) or form.shifts
-        return None if of_none else other_leg(designs, self.models.fit((name,)))
 
     def lack_of_fit(self, state: Judgement) -> Remainder:
         """Return the lack of fit: the residual repeats in every stride, or held-out strides rejected a cause."""
@@ -100,6 +93,13 @@ class WalkVerdict(Verdict[WalkFit, WalkModels, Weighed]):
             evidence=weighed.evidence.get(name),
             further={"other_leg": self.other_leg(name)},
         )
+
+
+def _on_other_leg(models: WalkModels, name: str) -> float | None:
+    """Return the gain of a form on the other leg; None of one leg's form, and of a clock's, which is of no leg."""
+    form = models.designs.forms[name]
+    of_none = form.site.startswith(("left", "right")) or form.shifts
+    return None if of_none else other_leg(models.designs, models.fit((name,)))
 
 
 def marker_noise(designs: Designs) -> Cause | None:
