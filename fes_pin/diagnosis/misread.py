@@ -235,9 +235,7 @@ def _step(fitted: Fit, near: _Near, half: int | None = None) -> tuple[float, flo
     return float(column @ r) / power, math.sqrt(1.0 / power + max(float(shift @ covariance @ shift), 0.0))
 
 
-def _estimated(
-    fitted: Fit, trial: Trial, name: str, sizes: Mapping[str, float], half: int | None = None
-) -> _Estimated:
+def _estimated(fitted: Fit, trial: Trial, name: str, sizes: Mapping[str, float], half: int | None = None) -> _Estimated:
     """Estimate a condition from its own trial by Gauss-Newton steps; see `_step`."""
     rig, now = fitted.model.rig, trial
     begun = rig.stated(trial)[name]

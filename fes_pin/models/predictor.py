@@ -208,7 +208,7 @@ def read_columns(rig: Rig, trial: Trial, outputs: tuple[str, ...], correlation_s
 
 
 def _counts(trial: Trial, outputs: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return which readings hunt, how many are equal in a row, shape (n, outputs) each, and which outputs are counts."""
+    """Return which readings hunt and how many are equal in a row, shape (n, outputs) each, and which are counts."""
     known, found = vars(trial).get(_COUNTED, ((), ()))
     if known != outputs:
         columns = [trial[name] for name in outputs]
