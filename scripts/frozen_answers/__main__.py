@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import json
-import statistics
+import tempfile
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from harness.compare import compared
 from harness.generator import shared
 
-from frozen_answers.answers import answer, differences
+from frozen_answers.answers import answer, beside_truth, differences
 from frozen_answers.studies import Frozen, studies
 
 TABLE = Path(__file__).with_name("answers.jsonl")
@@ -25,7 +26,7 @@ def read(table: Path) -> dict[str, dict[str, Any]]:
 
 
 def freeze(wanted: list[Frozen], table: Path) -> None:
-    """Answer the studies that the table does not hold, and add them to it as they come."""
+    """Answer the studies that a table does not hold, and add them to it as they come."""
     done = read(table)
     for one in wanted:
         if one.name not in done:
@@ -33,20 +34,27 @@ def freeze(wanted: list[Frozen], table: Path) -> None:
                 file.write(json.dumps(answer(one)) + "\n")
 
 
-def compare(wanted: list[Frozen], table: Path, loosely: bool) -> int:
-    """Print what differs, study by study, and the ratio of processor times; the number of studies that differ."""
-    frozen, odd, ratios = read(table), 0, []
-    known = [one for one in wanted if one.name in frozen]
-    for one in known:
-        old, new = frozen[one.name], answer(one)
-        if lines := differences(old, new, loosely):
-            odd += 1
-            typer.echo(f"{one.name} (hidden: {', '.join(one.item.hidden) or '-'})")
-            typer.echo("\n".join(f"    {line}" for line in lines))
-        if "cpu_s" in old and "cpu_s" in new:
-            ratios.append(new["cpu_s"] / max(old["cpu_s"], 0.1))
-    median = f"; processor time {statistics.median(ratios):.2f} of the frozen in the median" if ratios else ""
-    typer.echo(f"{len(known) - odd} of {len(known)} the same{median}")
+def compare(wanted: list[Frozen], table: Path, store: Path, loosely: bool) -> int:
+    """Print what differs, study by study, then who is right; the number of studies that differ.
+
+    Parameters
+    ----------
+    store
+        Answers of this code; those that it lacks are added.
+    """
+    frozen, odd, known = read(table), 0, list[Frozen]()
+    for one in wanted:
+        if one.name in frozen:
+            known.append(one)
+            freeze([one], store)
+            if lines := differences(frozen[one.name], read(store)[one.name], loosely):
+                odd += 1
+                typer.echo(f"{one.name} (hidden: {', '.join(one.item.hidden) or '-'})")
+                typer.echo("\n".join(f"    {line}" for line in lines))
+    typer.echo(f"{len(known) - odd} of {len(known)} the same")
+    answers, made = read(store), [one for one in known if one.kind != "measured"]
+    rows = [[beside_truth(one, row[one.name], answers[one.name]["truth"]) for one in made] for row in (answers, frozen)]
+    typer.echo("\n".join(compared(rows[0], {row.key: row for row in rows[1]})))
     return odd
 
 
@@ -59,13 +67,17 @@ def main(
         bool, typer.Option("--loosely", help="Verdicts, sets, and values beyond 0.3 of their deviation.")
     ] = False,
     table: Annotated[Path, typer.Option(help="The table.")] = TABLE,
+    store: Annotated[Path | None, typer.Option(help="File of answers, with which a comparison goes on.")] = None,
 ) -> None:
     """Freeze the answers of some 300 studies, or show what differs from the frozen ones."""
     wanted = [one for one in studies(shared()) if kind in (None, one.kind)]
     wanted = wanted if every else wanted[:count]
     if new:
         freeze(wanted, table)
-    elif compare(wanted, table, loosely):
+        return
+    with tempfile.TemporaryDirectory(prefix="same") as folder:
+        odd = compare(wanted, table, store or Path(folder) / "answers.jsonl", loosely)
+    if odd:
         raise typer.Exit(1)
 
 

@@ -5,8 +5,12 @@ from __future__ import annotations
 import tempfile
 import time
 from collections.abc import Iterator
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
+
+from harness.generator import Truth
+from harness.row import Row, judged
 
 from fes_pin.infer.result import shown
 from frozen_answers.studies import Frozen
@@ -26,12 +30,13 @@ def answer(one: Frozen) -> dict[str, Any]:
     Returns
     -------
     dict
-        `kind`, `key`, `hidden`, `answer` (the record, numbers to four digits) or `error`, and `cpu_s`, the processor
-        time of the answer alone.
+        `kind`, `key`, `hidden`, `truth`, `answer` (the record, numbers to four digits) or `error`, and `cpu_s`, the
+        processor time of the answer alone.
     """
     row: dict[str, Any] = {"kind": one.kind, "key": one.item.key, "hidden": list(one.item.hidden)}
     with tempfile.TemporaryDirectory(prefix="frozen") as folder:
-        study, _ = one.generator.make(one.item, Path(folder))
+        study, truth = one.generator.make(one.item, Path(folder))
+        row["truth"] = asdict(truth)
         began = time.process_time()
         try:
             record = one.generator.ask(study).record()
@@ -48,6 +53,14 @@ def _rounded(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [_rounded(one) for one in value]
     return shown(value, DIGITS) if isinstance(value, float) else value
+
+
+def beside_truth(one: Frozen, row: dict[str, Any], truth: dict[str, Any]) -> Row:
+    """A row beside what is true of its study; its key is the study's name in the table."""
+    item, known = replace(one.item, key=one.name), {"code": "", "cpu_s": row.get("cpu_s", 0.0)}
+    if "error" in row:
+        return Row(item.key, item.hidden, item.part, item.outside, error=row["error"], **known)
+    return judged(item, Truth(**truth), row["answer"], **known)
 
 
 def named(row: dict[str, Any]) -> list[Any]:
