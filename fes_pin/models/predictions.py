@@ -43,6 +43,12 @@ class Readings:
         return bool(self.seen.all())
 
     @cached_property
+    def places(self) -> slice | np.ndarray:
+        """Where the seen entries lie among all, sample by sample: a slice where they follow each other."""
+        at = np.flatnonzero(self.seen)
+        return slice(at[0], at[-1] + 1) if len(at) and at[-1] - at[0] == len(at) - 1 else at
+
+    @cached_property
     def again(self) -> np.ndarray:
         """Share of each seen reading's noise that repeats an earlier one, 1 - 1 / n, shape (m,)."""
         return np.asarray(1.0 - 1.0 / self.of_seen(self.repeats))
@@ -53,8 +59,8 @@ class Readings:
         return np.flatnonzero(self.again)
 
     def of_seen(self, array: np.ndarray) -> np.ndarray:
-        """Return the seen entries of an array (n, outputs, ...), sample by sample; a view where all are seen."""
-        return array.reshape(self.seen.size, *array.shape[2:]) if self.all_seen else array[self.seen]
+        """Return the seen entries of an array (n, outputs, ...), sample by sample; a view where `places` is a slice."""
+        return np.asarray(array.reshape(self.seen.size, *array.shape[2:])[self.places])
 
 
 @dataclass(frozen=True)
