@@ -1,14 +1,16 @@
 """What the generators make: studies that are read as they were made, with what is true of them."""
 
 import re
+from dataclasses import asdict
 from itertools import islice
 from pathlib import Path
 
 import pytest
 from confusion_matrix import stimuli
+from frozen_answers.answers import beside_truth
 from frozen_answers.studies import COUNTS, studies
 from harness import run as runs
-from harness.generator import GENERATORS, Item, generator_of
+from harness.generator import GENERATORS, Item, Truth, generator_of
 from harness.run import answered
 
 import fes_pin as fp
@@ -92,6 +94,18 @@ def test_frozen_answers_are_of_studies_that_there_are(shared):
 
     assert len(wanted) == len(set(wanted)) and sum(COUNTS.values()) + 71 == len(wanted)
     assert set(read(TABLE)) == set(wanted)
+
+
+@pytest.mark.shared
+def test_a_frozen_answer_is_right_or_wrong_about_its_own_study(shared):
+    from frozen_answers.__main__ import TABLE, read
+
+    frozen, truth = read(TABLE), asdict(Truth())
+    some = [one for one in studies(shared) if one.kind == "free" and len(one.item.hidden) == 1]
+    one, other = some[0], next(o for o in some if o.item.hidden != some[0].item.hidden)
+    assert beside_truth(one, frozen[one.name], truth).right
+    assert not beside_truth(one, frozen[other.name], truth).right
+    assert beside_truth(one, {"error": "InputError: no"}, truth).error == "InputError: no"
 
 
 ROOMS = {"body", "data", "models", "paper"}
