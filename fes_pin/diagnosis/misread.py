@@ -13,6 +13,7 @@ therefore not taken for a misreading. A restated trial must also be explained as
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from scipy import special
@@ -92,8 +93,7 @@ class Misread:
         return f"trial {self.trial} states {self.condition} = {self.stated:.4g}; it was {self.value:.4g}"
 
 
-@dataclass(frozen=True)
-class _Estimated:
+class _Estimated(NamedTuple):
     """Estimate of a condition from its own trial: difference from the stated value in its unit, standard deviation, and
     mean square of the residual."""
 
@@ -102,8 +102,7 @@ class _Estimated:
     left: float
 
 
-@dataclass(frozen=True)
-class _Near:
+class _Near(NamedTuple):
     """A trial at a value of a condition: linearized in the parameters, and the whitened derivative by the condition,
     shape (m,)."""
 
@@ -143,8 +142,7 @@ def takes_most(found: Misread) -> bool:
     whole = found.whole
     restated = restated_trials(whole.model, whole.trials, found)
     after = fit_problem(Problem(whole.model, restated, whole.noise), whole.values)
-    wrong = max(whole.sse - whole.samples, 0.0)
-    return 2.0 * (after.sse - after.samples) < wrong
+    return 2.0 * (after.sse - after.samples) < max(whole.sse - whole.samples, 0.0)
 
 
 def _sizes(model: Model, trials: Sequence[Trial]) -> dict[str, float]:
@@ -177,14 +175,13 @@ def _screen(whole: Fit, wanted: Sequence[Pick], sizes: Mapping[str, float]) -> l
 def _left_out(whole: Fit, pick: Pick, wanted: Sequence[Pick], sizes: Mapping[str, float]) -> Misread | None:
     """Return the misreading of one trial's condition by a fit of the others; None if the trial is no outlier."""
     (i, name), trials = pick, whole.trials
-    rest = [*trials[:i], *trials[i + 1 :]]
-    near = fit_problem(Problem(whole.model, rest, noise_of(whole, longest=0)), whole.values)
-    fitted = under_own_noise(near, max_iterations=MAX_ITERATIONS)
+    others = Problem(whole.model, [*trials[:i], *trials[i + 1 :]], noise_of(whole, longest=0))
+    fitted = under_own_noise(fit_problem(others, whole.values), max_iterations=MAX_ITERATIONS)
     if not math.isfinite(fitted.sse):
         return None
     own = _estimated(fitted, trials[i], name, sizes)
-    others = [_step(fitted, one) for one in _near(fitted, [(trials[k], n) for k, n in wanted if k != i], sizes)]
-    finite = [move / std for move, std in others if math.isfinite(std)]
+    steps = [_step(fitted, one) for one in _near(fitted, [(trials[k], n) for k, n in wanted if k != i], sizes)]
+    finite = [move / std for move, std in steps if math.isfinite(std)]
     if len(finite) < FEWEST_STATED - 1 or not math.isfinite(own.std):
         return None
     phi = max(1.0, float(np.mean(np.square(finite))))

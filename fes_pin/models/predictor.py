@@ -214,8 +214,7 @@ def _counts(trial: Trial, outputs: tuple[str, ...]) -> tuple[np.ndarray, np.ndar
         columns = [trial[name] for name in outputs]
         hunting = [hunts(c) for c in columns]
         often = [repeated(c, h) for c, h in zip(columns, hunting, strict=True)]
-        counted = np.array([count_of(c) > 0.0 for c in columns])
-        found = np.column_stack(hunting), np.column_stack(often), counted
+        found = np.column_stack(hunting), np.column_stack(often), np.array([count_of(c) > 0.0 for c in columns])
         vars(trial)[_COUNTED] = outputs, found
     return found
 
