@@ -25,10 +25,11 @@ def test_practice(shared, name):
         assert any(cause in (c.name, *c.equivalents) for c in diagnosis.causes), str(diagnosis)
 
 
-def test_a_servo_rubs(shared):
-    """Its log was interpolated: no answer of the controller is seen in it, and free simulation explains nothing."""
+def test_a_servo_is_not_explained(shared):
+    """Its effort was computed, at a scale that differs between trials, and its log was interpolated.
+
+    No answer of its controller is seen in the log. Friction is significant, and no held-out trial confirms it.
+    """
     diagnosis = diagnose_joint(read_study(shared / "data" / "servo_pendulum"))
-    assert "coulomb_friction" in [c.name for c in diagnosis.causes]
-    held = (diagnosis.ahead.nominal_held_out, diagnosis.ahead.extended_held_out)
-    assert held[1].horizon < 0.6 * held[0].horizon
-    assert diagnosis.remainder.unexplained  # its torque is computed, by no one scale
+    assert {c.name for c in diagnosis.causes} <= {"coulomb_friction"}
+    assert diagnosis.remainder.unexplained
