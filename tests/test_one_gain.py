@@ -41,6 +41,11 @@ def shares(text):
     return re.search(r"explains (-?\d+) % of the squared error of (.*?) \(.*: E .*?, (.*?);", text).groups()
 
 
+def test_an_error_that_grows_is_explained_by_none():
+    words = str(Explained("free simulations", FITTED, 0.030, 0.042, 0.001))
+    assert words.startswith("none of the squared error of free simulations: E 0.03 % -> 0.042 %"), words
+
+
 def test_one_cause_by_two_measures_says_which(tmp_path):
     """Once a study said "explains 56 %" and "explains 2 %" of one cause and its values, depending on the limit."""
     found = replace(diagnosis_of(tmp_path, 310.0), nominal_error=(100.0, None), extended_error=(44.0, None))

@@ -248,12 +248,12 @@ class Explained:
         return 100.0 * gone / max(self.nominal - (self.noise or 0.0), gone, 1e-300)
 
     def __str__(self) -> str:
-        above, alone = "", ""
-        if self.noise is not None:
-            above = f" ({self.above_noise:.0f} % of what is above the noise)"
-            alone = f"; noise alone leaves {percent(self.noise)}"
-        share = f"{self.of(self.nominal):.0f} % of the squared error of {self.what}{above}"
-        return f"{share}: E {percent(self.nominal)} -> {percent(self.extended)}, {ON[self.on]}{alone}"
+        gone, noise = self.of(self.nominal), self.noise
+        above = f" ({self.above_noise:.0f} % of what is above the noise)" if noise is not None and gone >= 0.0 else ""
+        alone = f"; noise alone leaves {percent(noise)}" if noise is not None else ""
+        share = f"{gone:.0f} %" if gone >= 0.0 else "none"
+        errors = f"E {percent(self.nominal)} -> {percent(self.extended)}, {ON[self.on]}"
+        return f"{share} of the squared error of {self.what}{above}: {errors}{alone}"
 
     def record(self) -> dict[str, Any]:
         """As JSON files have it."""

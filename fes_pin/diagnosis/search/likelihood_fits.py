@@ -176,9 +176,9 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         return without_memory(guess, self.trials) if known and known.timed else guess
 
     def candidates(self, base: LikelihoodFit) -> dict[str, Candidate[Starts]]:
-        """Return the causes that a fit does not have, each with its shapes of largest score."""
+        """Return the causes that a fit lacks and whose scores are finite, each with its shapes of largest score."""
         by_effect = best_by_effect(self.library.scores(base).scored)
-        return {n: Candidate(many[0].gain, _of_much(many)) for n, many in by_effect.items()}
+        return {n: Candidate(many[0].gain, some) for n, many in by_effect.items() if (some := _of_much(many))}
 
     def begin(self, base: LikelihoodFit, starts: Mapping[Names, Starts]) -> dict[Names, LikelihoodFit]:
         """Return the best first fit of each set: at the noise of the base, with little process noise, and from afar."""
