@@ -9,7 +9,6 @@ from fes_pin.data.study import read_study
 from fes_pin.diagnosis.diagnosis import diagnose_joint
 from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
 from fes_pin.identify.likelihood import LikelihoodProblem
-from fes_pin.infer.search import Search
 from fes_pin.models.nominal import nominal_model
 from fes_pin.view.report import report_html
 from fes_pin.workers import OutOfTime, time_limit
@@ -39,14 +38,14 @@ def test_without_time_nothing_is_claimed(study):
 
 def test_what_has_earned_its_place_is_told(study, monkeypatch):
     """The clock runs out when pairs are about to be fitted."""
-    extend = Search._extend
+    extend = LikelihoodFits.extend
 
-    def out_of_time(search, size):
-        if size == 2:
+    def out_of_time(sets, base, most=None):
+        if len(base) == 1:
             raise OutOfTime
-        extend(search, size)
+        extend(sets, base, most)
 
-    monkeypatch.setattr(Search, "_extend", out_of_time)
+    monkeypatch.setattr(LikelihoodFits, "extend", out_of_time)
     stopped = diagnose_joint(study, limit=1e3)
     assert [c.name for c in stopped.causes] == ["coulomb_friction"] and stopped.verdict == "stopped"
     assert any("limit of 1000 s" in w for w in stopped.warnings)

@@ -45,7 +45,8 @@ def test_less_one_cause_a_set_that_runs_away_is_grown_from_the_part_that_does_no
     nominal = sets.nominal()
     sets.extend(())
     known = sets.fits.pop(("coulomb_friction",))
-    away = nominal.model + CoulombFriction(torque_nm=1e200) + EffortGain()
+    away = nominal.model + CoulombFriction(torque_nm=1e6) + EffortGain()
     unknown = np.full((len(away.fitted_parameters()),) * 2, np.inf)
-    sets.fits[names] = replace(nominal, model=away, free=away.fitted_parameters(), covariance=unknown)
+    of_it = {"model": away, "free": away.fitted_parameters(), "parameters": away.parameters()}
+    sets.fits[names] = replace(nominal, **of_it, covariance=unknown)
     assert sets.without(names, "effort_gain").sse == pytest.approx(known.sse, abs=1.0)
