@@ -9,9 +9,9 @@ import numpy as np
 from fes_pin.data.results import Plan
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
-from fes_pin.identify.ahead import falls
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit
+from fes_pin.identify.per_trial import falls
 from fes_pin.identify.problem import measured_columns
 from fes_pin.infer.covariance import least_squares_step
 from fes_pin.infer.levels import SEPARABLE, SURE

@@ -122,6 +122,11 @@ def evidence_of(folds: Sequence[Fold], found: Found, alike: Again) -> dict[str, 
     return {n: Evidence.of(predicted[n] - predicted[""]) for n in found.without}
 
 
+def fitted_evidence(found: Found) -> dict[str, Evidence]:
+    """Return the evidence for each cause in the likelihood of the fitted trials."""
+    return {n: Evidence.of(less.sse - found.best.sse) for n, less in found.without.items()}
+
+
 def _cost(fitted: LikelihoodFit) -> float:
     return marginal_cost(fitted, {n: one.scale for n, one in fitted.model.parameter_info().items()})
 

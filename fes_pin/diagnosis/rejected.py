@@ -1,18 +1,17 @@
 """Rejected causes: held-out trials do not support them, or the recorded input does not move the rig."""
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from fes_pin.diagnosis.errors_ahead import RandomPart, are_large, free_errors, random_parts
-from fes_pin.identify.fit import Fit, rough_noise
-from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.diagnosis.errors_ahead import RandomPart, are_large, random_parts
+from fes_pin.identify.fit import Fit, noise_of, rough_noise
+from fes_pin.identify.likelihood import LikelihoodProblem, is_simulated
 from fes_pin.identify.likelihood_fit import LikelihoodFit
-from fes_pin.infer.levels import CERTAIN_LEVEL, FORM_SHARE, NOTHING_PERCENT, SMALL_PERCENT, SMALL_SHARE
-from fes_pin.infer.optimize import WORTH
+from fes_pin.infer.levels import CERTAIN_LEVEL, FORM_SHARE, NOTHING_PERCENT, SEPARABLE, SMALL_PERCENT, SMALL_SHARE
 from fes_pin.infer.result import Remainder
+from fes_pin.infer.text import WHOLE
 from fes_pin.infer.verdict import Rejected
 
 UNMOVED = "the motion is as likely without the recorded input, so something else moves the rig"
@@ -30,7 +29,7 @@ def is_moved_by_what_is_recorded(fitted: LikelihoodFit) -> bool:
         return True
     still = [t.with_columns(**{n: np.zeros(len(t)) for n in inputs[id(t)]}) for t in fitted.trials]
     (without,) = LikelihoodProblem(fitted.model, still, fitted.noise).costs([(fitted.values, fitted.unknowns)])
-    return without > fitted.sse + WORTH
+    return without > fitted.sse + SEPARABLE
 
 
 def with_rejected_causes(
@@ -72,18 +71,17 @@ def no_noise(fitted: LikelihoodFit) -> str | None:
     at 0.95 and 12 at 0.99. 270 studies without a cause, of three rigs in three kinds of noise, have 8.3 at most
     (`scripts/benchmarks/adequate.py --count 30`).
     """
-    problem = LikelihoodProblem(fitted.model, fitted.trials, fitted.noise)
-    if not problem.is_simulated:
+    if not is_simulated(fitted.noise, fitted.trials):
         return None
-    ratio = slowness(fitted)
-    percent = free_errors(fitted.model, fitted.trials, rough_noise(fitted.model, fitted.trials)).error_percent()
+    ratio, name = max((ratio, name) for name, ratio in slowness(fitted).items())
+    around = np.concatenate([t[name] - np.nanmean(t[name]) for t in fitted.trials if name in t])
+    percent = WHOLE * noise_of(fitted, 0)[name].std ** 2 / float(np.nanmean(around**2))
     if SMALL_SHARE * ratio <= 1.0 or percent <= SMALL_PERCENT:
         return None
     return f"an error of {percent:.3g} %, {ratio:.3g} times the scatter from sample to sample, is no measurement noise"
 
 
-def slowness(fitted: Fit) -> float:
-    """Return the largest ratio of a channel's residual in free simulation to its scatter from sample to sample."""
+def slowness(fitted: Fit) -> dict[str, float]:
+    """Return the ratio of the residual of each channel in free simulation to its scatter from sample to sample."""
     rough = rough_noise(fitted.model, fitted.trials)
-    errors = {n: free_errors(fitted.model, [t for t in fitted.trials if n in t], {n: m}) for n, m in rough.items()}
-    return max((math.sqrt(e.squares.sum() / e.noise.sum()) for e in errors.values()), default=0.0)
+    return {n: one.std / rough[n].std for n, one in noise_of(fitted, 0).items()}

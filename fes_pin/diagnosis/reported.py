@@ -102,7 +102,7 @@ def _cause(verdict: RigVerdict, state: RigState, one: Effect, best: LikelihoodFi
     Its gains are found `on` such data. A likelihood is no evidence where the model has a lack of fit.
     """
     found, name, weighed = state.found, one.name, state.weighed
-    evidence = None if weighed.lack_of_fit.unexplained else weighed.evidence.get(name)
+    evidence = None if verdict.lack_of_fit(state).unexplained else weighed.evidence[name]
     alike = alike_in(found, name)
     return Cause(
         name=name,
@@ -112,6 +112,6 @@ def _cause(verdict: RigVerdict, state: RigState, one: Effect, best: LikelihoodFi
         p_value=found.p_values[name],
         gain_fit=100.0 * share_in(found, name),
         gain_held_out=replace(weighed.gains[name], on=on),
-        evidence=replace(evidence, on=on) if evidence else None,
+        evidence=None if evidence is None else replace(evidence, on=on),
         chosen_again=share_of(verdict.chosen(state), alike),
     )

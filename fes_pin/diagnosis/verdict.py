@@ -18,6 +18,7 @@ from fes_pin.diagnosis.errors_ahead import (
     are_large,
     errors_ahead,
     random_parts,
+    squared_errors,
 )
 from fes_pin.diagnosis.estimators import found_with_white_process_noise, judged_again, least_error
 from fes_pin.diagnosis.held_out import (
@@ -25,6 +26,7 @@ from fes_pin.diagnosis.held_out import (
     Fold,
     as_random_as_in_all,
     evidence_of,
+    fitted_evidence,
     folds_of,
     gains_of,
     make_folds,
@@ -33,9 +35,10 @@ from fes_pin.diagnosis.held_out import (
 from fes_pin.diagnosis.rejected import UNMOVED, is_moved_by_what_is_recorded, no_noise, with_rejected_causes
 from fes_pin.diagnosis.remainder.lack_of_fit import lack_of_fit
 from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodModels, LikelihoodSearch
-from fes_pin.identify.ahead import falls
 from fes_pin.identify.likelihood_fit import LikelihoodFit
-from fes_pin.infer.levels import FORM_SHARE
+from fes_pin.identify.per_trial import falls
+from fes_pin.infer.held_out import held_out_gain
+from fes_pin.infer.levels import FORM_SHARE, NOTHING_PERCENT
 from fes_pin.infer.result import Remainder
 from fes_pin.infer.text import WHOLE
 from fes_pin.infer.verdict import State, Verdict, Weighed
@@ -82,7 +85,6 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
         self.models, self.test = search.models, tuple(test)
         self.refitted, self._alike = Again(refit), Again(as_random_as_in_all)
         self._chosen: dict[int, tuple[Found, list[LikelihoodFit]]] = {}
-        self._unmoved: set[int] = set()
         self._with_white_noise: LikelihoodFit | None = None
 
     def weigh(self, found: Found) -> RigWeighed:
@@ -91,7 +93,7 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
         within = folds or [Fold(found.nominal, found.best, found.without, self.models.trials)]
         return RigWeighed(
             gains=gains_of(within, found.without, self.models.judged_s, self.models.seed),
-            evidence=evidence_of(folds, found, self._alike) if folds else {},
+            evidence=evidence_of(folds, found, self._alike) if folds else fitted_evidence(found),
             lack_of_fit=lack_of_fit(found.best),
             folds=folds,
             random=random_parts(found.best),
@@ -102,26 +104,27 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
         """Return the state to which no claim objects; one without causes where the input does not move the rig."""
         search = search or self.search
         if not is_moved_by_what_is_recorded(found.best):
-            self._unmoved.add(id(search))
             found = search.result(())
         return super().of(found, search, replaced)
 
     def unsupported(self, state: RigState) -> list[str]:
         """Return the causes that held-out trials do not support.
 
-        Where process noise is large, a cause that explains no more than an error of form is not supported either.
+        Where process noise is large, a cause that explains no more than an error of form is not supported either. Where
+        there is a lack of fit, none is if the sets that folds choose predict no better than the nominal model.
         """
         gains = state.weighed.gains
         if are_large(state.weighed.random) and (form := [n for n in gains if gains[n].low < WHOLE * FORM_SHARE]):
             return form
-        return super().unsupported(state)
+        return super().unsupported(state) or ([] if self._predicts(state) else list(state.names))
 
     def lack_of_fit(self, state: RigState) -> Remainder:
-        """Return the lack of fit: by its tests, process noise that is too large, or a cause that was rejected."""
-        stages = {e.name: str(e.stage) for e in self.models.library.effects}
-        left = with_rejected_causes(state.weighed.lack_of_fit, state.weighed.random, state.rejected, stages)
-        wrong = not left.unexplained and state.weighed.no_noise is not None
-        return replace(left, unexplained=True, where="time") if wrong else left
+        """Return the lack of fit: by its tests, process noise that is too large, or a cause that was rejected.
+
+        A set without one has that of the estimator that was replaced: with white process noise tests of lack of fit
+        have little power.
+        """
+        return self._lack_of_fit(state)[0]
 
     def is_rarely_chosen(self, state: RigState, name: str) -> bool:
         """Return whether most folds choose neither a cause nor one of its equivalents."""
@@ -155,7 +158,7 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
     def chosen(self, state: RigState) -> list[LikelihoodFit]:
         """Return for each fold the fit to all trials of the set that is chosen without its own; none without folds."""
         found, folds = state.found, state.weighed.folds
-        if not folds or not folds[0].within or id(state.search) in self._unmoved:
+        if not folds or not folds[0].within:
             return []
         if id(found) not in self._chosen:
             fits = {**state.search.possible(), found.best.names: found.best}
@@ -182,18 +185,26 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
         return out
 
     def remainder(self, state: RigState) -> tuple[Remainder, str | None]:
-        """Return the lack of fit of a set, and its reason where no test finds it.
+        """Return the lack of fit of a set, and its reason where no test finds it."""
+        left, reason = self._lack_of_fit(state)
+        is_moved = not left.unexplained or is_moved_by_what_is_recorded(state.found.best)
+        return left, reason if is_moved else UNMOVED
 
-        A set without one has that of the estimator that was replaced: with white process noise tests of lack of fit
-        have little power.
-        """
-        left = self.lack_of_fit(state)
-        if state.replaced is not None and not left.unexplained:
-            return self.remainder(state.replaced)
-        if id(state.search) in self._unmoved:
-            return left, UNMOVED
-        untested = left.unexplained and left.where == "time" and not state.weighed.lack_of_fit.unexplained
-        return left, state.weighed.no_noise if untested else None
+    def _predicts(self, state: RigState) -> bool:
+        """Return False where the set that each fold chooses predicts its trials no better than the nominal model."""
+        folds = self.folds(state)
+        if not folds or not state.names or not self.lack_of_fit(state).unexplained:
+            return True
+        pairs = [(f.nominal, f.best, f.test) for f in folds], [(f.chosen or f.best, f.best, f.test) for f in folds]
+        nominal, chosen = (squared_errors(one, self.models.judged_s) for one in pairs)
+        return held_out_gain(nominal, nominal, chosen, self.models.seed).percent > NOTHING_PERCENT
+
+    def _lack_of_fit(self, state: RigState) -> tuple[Remainder, str | None]:
+        weighed, stages = state.weighed, {e.name: str(e.stage) for e in self.models.library.effects}
+        left = with_rejected_causes(weighed.lack_of_fit, weighed.random, state.rejected, stages)
+        if not left.unexplained and weighed.no_noise is not None:
+            return replace(left, unexplained=True, where="time"), weighed.no_noise
+        return (left, None) if left.unexplained or state.replaced is None else self._lack_of_fit(state.replaced)
 
     def by_the_other(self, state: RigState) -> LikelihoodFit | None:
         """Return the same set fitted by the other estimator; None without another, or where that found another set."""

@@ -26,7 +26,6 @@ from fes_pin.models.autoregression import weights_ahead
 from fes_pin.models.model import Model
 from fes_pin.models.predictions import PredictedOutput
 from fes_pin.models.predictor import StateSpaceNoise, masked
-from fes_pin.models.simulate import Simulator
 
 STRIDE = 0.25
 """Share of the horizon by which the newest sample that a prediction uses may be older than the horizon."""
@@ -169,15 +168,3 @@ def reach_of(trial: Trial, horizon_s: float) -> tuple[int, int]:
     """Return the samples of a horizon, and the samples by which the newest one that is used may be older."""
     ahead = max(1, round(horizon_s / trial.dt))
     return ahead, max(1, round(STRIDE * ahead))
-
-
-def falls(model: Model, trials: Sequence[Trial]) -> bool:
-    """Return whether a free simulation enlarges an initial error by more than `RUNAWAY`: the rig falls by itself."""
-    unknowns = tuple(dict.fromkeys(n for t in trials for n in model.rig.unknowns(t.kind)))
-    if not unknowns:
-        return False
-    simulator = Simulator(model, trials, unknowns)
-    with np.errstate(all="ignore"):
-        run = simulator.run(model.parameters(), simulator.start(model.parameters()))
-        largest = max(float(np.abs(one.sensitivities[:, 0, 0]).max()) for one in run)
-    return not largest < RUNAWAY

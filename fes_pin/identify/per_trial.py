@@ -7,15 +7,18 @@ ones and vice versa (cross-fitting), so that no sample takes part in its own pre
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 import numpy as np
 
 from fes_pin.data.trial import Trial, derived_trial
+from fes_pin.identify.fit import fit_problem, from_beginnings
 from fes_pin.identify.likelihood import LikelihoodProblem, is_simulated
 from fes_pin.identify.likelihood_fit import LikelihoodFit
-from fes_pin.identify.problem import unknown_names
+from fes_pin.identify.problem import Problem, unknown_names
 from fes_pin.identify.process_noise import spread_of_start
-from fes_pin.infer.noise import NoiseModel
+from fes_pin.infer.levels import RUNAWAY
+from fes_pin.infer.noise import Noise, NoiseModel
 from fes_pin.infer.problem import Linearized, normal_equations
 from fes_pin.models.least_squares import least_squares
 from fes_pin.models.model import Model
@@ -40,6 +43,10 @@ def predictions(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> lis
     """
     simulator, values = Simulator(model, trials), model.parameters()
     start = simulator.start(values)
+    if falls(model, trials):
+        white = {n: Noise(one.std) for n, one in noise.items()}
+        problem = Problem(model, trials, white, ())
+        start = from_beginnings(problem, fit_problem(problem, values), partial(fit_problem, problem)).unknowns
     if not model.own_unknowns():
         return [s.readings for s in simulator.run(values, start)]
     outputs = {n for t in trials for n in model.rig.outputs(t.kind)}
@@ -48,6 +55,18 @@ def predictions(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> lis
     own = [[{**s, **one[k][1]} for s, one in zip(start, each, strict=True)] for k in (0, 1)]
     runs = [simulator.run(values, unknowns) for unknowns in own]
     return [np.where(one[0][0][:, None], a.readings, b.readings) for one, a, b in zip(each, *runs, strict=True)]
+
+
+def falls(model: Model, trials: Sequence[Trial]) -> bool:
+    """Return whether a free simulation enlarges an initial error by more than `RUNAWAY`: the rig falls by itself."""
+    unknowns = tuple(dict.fromkeys(n for t in trials for n in model.rig.unknowns(t.kind)))
+    if not unknowns:
+        return False
+    simulator = Simulator(model, trials, unknowns)
+    with np.errstate(all="ignore"):
+        run = simulator.run(model.parameters(), simulator.start(model.parameters()))
+        largest = max(float(np.abs(one.sensitivities[:, 0, 0]).max()) for one in run)
+    return not largest < RUNAWAY
 
 
 def halves(count: int) -> tuple[np.ndarray, np.ndarray]:

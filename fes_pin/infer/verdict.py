@@ -13,8 +13,10 @@ from typing import Generic, TypeVar
 
 from fes_pin.infer.fits import F
 from fes_pin.infer.held_out import is_supported
+from fes_pin.infer.levels import NOTHING_PERCENT
 from fes_pin.infer.result import Evidence, Gain, Remainder
 from fes_pin.infer.search import M, Search, SearchResult
+from fes_pin.infer.text import WHOLE
 
 
 @dataclass(frozen=True)
@@ -45,7 +47,7 @@ class Weighed:
     gains
         Gains on held-out data; on the fitted data where none could be held out.
     evidence
-        Evidence in the likelihood of held-out data; empty where none could be held out.
+        Evidence in the likelihood of the same data.
     lack_of_fit
         Lack of fit of the set.
     """
@@ -119,16 +121,13 @@ class Verdict(ABC, Generic[F, M, W]):
         """Return the evidence of held-out data and of the tests of lack of fit on a set."""
 
     def lack_of_fit(self, state: State[F, M, W]) -> Remainder:
-        """Return the lack of fit of a set, in view of the rejected candidates."""
+        """Return the lack of fit of a set, in view of the rejected candidates and of the estimator replaced."""
         return state.weighed.lack_of_fit
 
     def unsupported(self, state: State[F, M, W]) -> list[str]:
-        """Return the candidates that held-out data do not support."""
-        weighed, names = state.weighed, state.names
-        if not weighed.evidence:
-            return [n for n in names if len(names) > 1 and not weighed.gains[n].is_material]
-        open_ = weighed.lack_of_fit.unexplained
-        known = {n: None if open_ else weighed.evidence[n] for n in names}
+        """Return the candidates that held-out data do not support; where none could be held out, the fitted data."""
+        weighed, names, wrong = state.weighed, state.names, self.lack_of_fit(state).unexplained
+        known = {n: None if wrong else weighed.evidence[n] for n in names}
         return [n for n, e in known.items() if not is_supported(e, weighed.gains[n], alone=len(names) == 1)]
 
     def is_rarely_chosen(self, state: State[F, M, W], name: str) -> bool:
@@ -183,12 +182,12 @@ class Verdict(ABC, Generic[F, M, W]):
         return self._without_weakest(state, [n for n in state.names if self.is_rarely_chosen(state, n)])
 
     def switch_estimator(self, state: State[F, M, W]) -> State[F, M, W] | None:
-        """Take the verdict of another estimator of the same data if it predicts them better; this is tried once.
+        """Take the verdict of another estimator of the same data if it predicts materially better; tried once.
 
         Data that the study itself holds out are not used: gains on them would be optimistic.
         """
-        other = None if state.replaced else self.by_another_estimator(state)
-        if other is None or not self.prediction_error(other) < self.prediction_error(state):
+        other, material = None if state.replaced else self.by_another_estimator(state), 1.0 - NOTHING_PERCENT / WHOLE
+        if other is None or not self.prediction_error(other) < material * self.prediction_error(state):
             return None
         return replace(other, steps=(*state.steps, *other.steps))
 

@@ -12,17 +12,18 @@ from fes_pin.diagnosis.search.library import Library
 from fes_pin.diagnosis.search.likelihood_maxima import less, likeliest, look, maximum_from_afar, process_noises
 from fes_pin.diagnosis.search.possible import is_possible
 from fes_pin.diagnosis.search.score import Scored, best_by_effect
-from fes_pin.diagnosis.search.starts import STARTED, STARTS, from_afar, refinements, started
+from fes_pin.diagnosis.search.starts import STARTED, STARTS, at_null, from_afar, refinements, started
 from fes_pin.identify.ahead import default_horizon
 from fes_pin.identify.correlation_time import with_new_noise
 from fes_pin.identify.likelihood import LikelihoodProblem
-from fes_pin.identify.likelihood_fit import LikelihoodFit, at_noise, maximise, maximum_from
+from fes_pin.identify.likelihood_fit import LikelihoodFit, at_noise, fit_of, maximise, maximum_from
 from fes_pin.identify.process_noise import first_guess, stilled, without_memory
 from fes_pin.infer.covariance import step_gain
 from fes_pin.infer.fits import Candidate, FittedSets, Names
 from fes_pin.infer.maximise import ROUNDS
 from fes_pin.infer.optimize import WORTH
-from fes_pin.infer.problem import Unknowns, normal_equations
+from fes_pin.infer.optimum import minimise
+from fes_pin.infer.problem import Unknowns, completed, normal_equations
 from fes_pin.infer.scoring import LITTLE
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import StateSpaceNoise
@@ -189,8 +190,11 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         return {n: min((*fits, restarted.get(n, fits[0])), key=lambda f: f.criterion) for n, fits in each}
 
     def _first_fits(self, base: LikelihoodFit, starts: Starts, models: Sequence[Model]) -> list[LikelihoodFit]:
-        others = [] if base.model.effects else self._elsewhere(starts[0].effect)
-        return [*(look(one, base) for one in models), *others]
+        """Return first fits of a set; where all are worse than the base, also the one from next to its null."""
+        looks, effect = [look(one, base) for one in models], starts[0].effect
+        if all(f.sse > base.sse + WORTH for f in looks):
+            looks.append(look(base.model + at_null(effect), base))
+        return [*looks, *(self._elsewhere(effect) if base is self.fits[()] else [])]
 
     def _elsewhere(self, effect: Effect) -> list[LikelihoodFit]:
         """Return fits of one cause alone from far sizes, with the start values of the nominal model.
@@ -223,6 +227,29 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
     def under_noise_of(self, other: LikelihoodFit, fits: Sequence[LikelihoodFit]) -> list[LikelihoodFit]:
         """Return fits, with their parameters, under the noise of another fit of the same trials."""
         return in_parallel(lambda f: at_noise(f, other.noise), fits)
+
+    def converge_rivals(self, names: Names, name: str) -> None:
+        """See `Sets`; a rival that does not explain half of what the cause does, but would at the set, begins there.
+
+        Its first fits began at the nominal model, from which no descent may lead to its optimum.
+        """
+        super().converge_rivals(names, name)
+        rest, whole = tuple(n for n in names if n != name), self.fits[names]
+        half = 0.5 * (self.fits[rest].criterion + whole.criterion)
+        problem = LikelihoodProblem(whole.model - name, self.trials, whole.noise)
+        unknowns = completed(problem.start_unknowns(), whole.unknowns)
+        base = fit_of(problem, minimise(problem, problem.model.parameters(), unknowns, 0))
+        known = {tuple(sorted((*rest, n))): one for n, one in self.candidates(base).items()}
+        enough = STARTED * known[names].gain if names in known else math.inf
+        far = {k: one.start for k, one in known.items() if one.gain > enough and not self._is_below(k, half)}
+        begun = self.begin(base, far)
+        for k, fitted in zip(begun, self.converged(list(begun.values())), strict=True):
+            if k not in self.fits or fitted.criterion < self.fits[k].criterion:
+                self.fits[k] = fitted
+                self._converged.add(k)
+
+    def _is_below(self, names: Names, criterion: float) -> bool:
+        return names in self.fits and self.fits[names].criterion < criterion
 
     def step_gain(self, fitted: LikelihoodFit) -> float:
         """Return the gain of a further step of a fit by its slope and curvature; 0 where it has converged."""
@@ -260,8 +287,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         fitted = self._parts(names)[0]
         for one in effects:
             if one.name not in fitted.names:
-                nothing = {n: one.nulls()[n] for n in one.amplitudes()}
-                fitted = self._maximum(fitted.model + started(one, nothing), fitted.noise, fitted.unknowns)
+                fitted = self._maximum(fitted.model + at_null(one), fitted.noise, fitted.unknowns)
         return fitted
 
     def is_possible(self, fitted: LikelihoodFit) -> bool:

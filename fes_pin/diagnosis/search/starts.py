@@ -41,6 +41,11 @@ def started(effect: Effect, amplitudes: Mapping[str, float]) -> Effect:
     return replace(effect, **values)
 
 
+def at_null(effect: Effect) -> Effect:
+    """Return the effect next to its null."""
+    return started(effect, {n: effect.nulls()[n] for n in effect.amplitudes()})
+
+
 def refinements(model: Model, effect: Effect, measured: Mapping[str, np.ndarray]) -> list[Model]:
     """Return starts with one more refinement of an effect switched on.
 
