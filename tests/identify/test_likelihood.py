@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from fes_pin.data.trial import Trial
-from fes_pin.identify.per_trial import falls, one_step, over_horizon
+from fes_pin.identify.ahead import one_step, over_horizon
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import maximise
+from fes_pin.identify.per_trial import falls
 from fes_pin.identify.process_noise import driving_size, first_guess
 from fes_pin.infer.problem import whitened_sse
 from fes_pin.models.effects.coulomb_friction import CoulombFriction

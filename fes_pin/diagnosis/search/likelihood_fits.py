@@ -15,6 +15,7 @@ from fes_pin.diagnosis.search.score import Scored, best_by_effect
 from fes_pin.diagnosis.search.starts import STARTED, STARTS, at_null, from_afar, refinements, started
 from fes_pin.identify.ahead import default_horizon
 from fes_pin.identify.correlation_time import with_new_noise
+from fes_pin.identify.fit import GROSS
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit, at_noise, fit_of, maximise, maximum_from
 from fes_pin.identify.process_noise import first_guess, stilled, without_memory
@@ -229,12 +230,15 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         return in_parallel(lambda f: at_noise(f, other.noise), fits)
 
     def converge_rivals(self, names: Names, name: str) -> None:
-        """See `Sets`; a rival that does not explain half of what the cause does, but would at the set, begins there.
+        """See `Sets`; where the set without the cause is a gross misfit, further rivals begin at the set.
 
-        Its first fits began at the nominal model, from which no descent may lead to its optimum.
+        Their first fits began at that misfit, from which a descent may not lead to their optimum. They begin again if
+        they would explain half of what the cause does there.
         """
         super().converge_rivals(names, name)
         rest, whole = tuple(n for n in names if n != name), self.fits[names]
+        if at_noise(self.fits[rest], whole.noise).reduced < GROSS:
+            return
         half = 0.5 * (self.fits[rest].criterion + whole.criterion)
         problem = LikelihoodProblem(whole.model - name, self.trials, whole.noise)
         unknowns = completed(problem.start_unknowns(), whole.unknowns)
