@@ -192,8 +192,7 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
 
     def _predicts(self, state: RigState) -> bool:
         """Return False where the set that each fold chooses predicts its trials no better than the nominal model."""
-        folds = self.folds(state)
-        if not folds or not state.names or not self.lack_of_fit(state).unexplained:
+        if not state.names or not self.lack_of_fit(state).unexplained or not (folds := self.folds(state)):
             return True
         pairs = [(f.nominal, f.best, f.test) for f in folds], [(f.chosen or f.best, f.best, f.test) for f in folds]
         nominal, chosen = (squared_errors(one, self.models.judged_s) for one in pairs)

@@ -41,6 +41,4 @@ def test_a_lack_of_fit_by_either_estimator_stays(own, replaced):
         weighed = RigWeighed({}, {}, left, (), (), None)
         return State(None, SimpleNamespace(without={}), weighed, {}, frozenset(), replaced=before)
 
-    left, reason = verdict.remainder(state(own, state(replaced)))
-    assert left.unexplained is (own or replaced)
-    assert reason is None
+    assert verdict.lack_of_fit(state(own, state(replaced))).unexplained is (own or replaced)

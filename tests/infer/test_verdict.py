@@ -31,11 +31,21 @@ class Claims(Verdict):
 CLAIMS = Claims(SimpleNamespace())
 
 
-def test_of_a_single_unit_a_candidate_together_with_others_gains_something():
+def test_a_candidate_together_with_others_gains_something():
     """Before, a torque that repeats was named beside friction for 0.00 % of the error."""
     gains = {"friction": gain(40.0), "periodic": gain(0.0)}
-    assert CLAIMS.unsupported(state(gains, {})) == ["periodic"]
-    assert CLAIMS.unsupported(state({"periodic": gain(0.0)}, {})) == []
+    likely = {n: Evidence(500.0, 500.0) for n in gains}
+    assert CLAIMS.unsupported(state(gains, likely)) == ["periodic"]
+    assert CLAIMS.unsupported(state({"periodic": gain(0.0)}, likely)) == []
+
+
+@pytest.mark.parametrize("wrong", [True, False])
+def test_a_candidate_alone_that_makes_predictions_worse_is_none(wrong):
+    """Where the model has a lack of fit its likelihood is no evidence, not even of a candidate alone."""
+    likely, left = {"friction": Evidence(500.0, 500.0)}, SOMETHING if wrong else NOISE
+    assert CLAIMS.unsupported(state({"friction": gain(-3.0)}, likely, left)) == ["friction"]
+    assert CLAIMS.unsupported(state({"friction": gain(-1.0)}, likely, left)) == ["friction"] * wrong
+    assert CLAIMS.unsupported(state({"friction": gain(40.0)}, {"friction": Evidence(-1.0, 0.0)})) == ["friction"]
 
 
 def test_of_several_units_a_candidate_together_with_others_needs_their_likelihood_too():
