@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from fes_pin.cli.group import needs
-from fes_pin.cli.options import Force, Libraries, output
+from fes_pin.cli.options import Force, Libraries, Limit, Seed, output
 from fes_pin.cli.progress import progress
 
 if TYPE_CHECKING:
@@ -29,8 +29,8 @@ def cohort(
     scheduler: Annotated[
         str | None, typer.Option(help="Address of a Dask scheduler, as tcp://host:8786: its workers diagnose.")
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of simulated critical values and bootstrap intervals.")] = 0,
-    limit: Annotated[float | None, typer.Option(min=0.0, help="Seconds of search for each study.")] = None,
+    seed: Seed = 0,
+    limit: Limit = None,
     library: Libraries = None,
     force: Force = False,
 ) -> None:

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from fes_pin.cli.group import needs
-from fes_pin.cli.options import Exclude, Force, Libraries, Trials, output, study_of
+from fes_pin.cli.options import Exclude, Force, Libraries, Limit, Seed, Trials, output, study_of
 from fes_pin.cli.progress import catalogue_with, print_result, progress, say_whose_code
 
 
@@ -19,10 +19,8 @@ def contrast(
         str | None, typer.Option(help="group, or a condition that every trial states. [default: group]")
     ] = None,
     groups: Annotated[str | None, typer.Option(help="Which groups, with commas between them.")] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of simulated critical values.")] = 0,
-    limit: Annotated[
-        float | None, typer.Option(min=0.0, help="Seconds of search; then the best set of changes so far.")
-    ] = None,
+    seed: Seed = 0,
+    limit: Limit = None,
     trials: Trials = None,
     exclude: Exclude = None,
     library: Libraries = None,

@@ -12,7 +12,7 @@ from fes_pin.cli.compare import compare
 from fes_pin.cli.contrast import contrast
 from fes_pin.cli.datasets import datasets
 from fes_pin.cli.group import App
-from fes_pin.cli.options import Exclude, Force, Libraries, Trials, output, study_of
+from fes_pin.cli.options import Exclude, Force, Libraries, Limit, Seed, Trials, output, study_of
 from fes_pin.cli.out import pulses, urdf
 from fes_pin.cli.own import check, new_study
 from fes_pin.cli.predict import predict
@@ -52,10 +52,8 @@ def before_any_command(
 def diagnose(
     study: Annotated[Path, typer.Argument(help="Folder of a study, or its study.toml.")],
     out: Annotated[Path, output("Folder for diagnosis.json, model.toml and report.html.")],
-    seed: Annotated[int, typer.Option(min=0, help="Of simulated critical values and bootstrap intervals.")] = 0,
-    limit: Annotated[
-        float | None, typer.Option(min=0.0, help="Seconds of search; then the answer is the best set of causes so far.")
-    ] = None,
+    seed: Seed = 0,
+    limit: Limit = None,
     tables: Annotated[
         str | None, typer.Option(help="csv or parquet: also trajectories.csv, samples and predictions of both models.")
     ] = None,
@@ -85,8 +83,7 @@ def diagnose(
             raise InputError("goes only with a rig; walking has no such tables", column="--tables")
         check_table(table)
     outputs = Outputs("diagnose", force)
-    names = (*answer_names(measured), *([table] if table else []))
-    outputs.check(out, names)  # what cannot be written is said before any work
+    outputs.check(out, (*answer_names(measured), *([table] if table else [])))  # said before any work
     with progress() as tell:
         to_be_said = [catalogue]
 

@@ -11,17 +11,7 @@ from fes_pin.infer.levels import CONFIDENCE_95
 from fes_pin.infer.text import percent, probability, rounded
 from fes_pin.view.drawing import Drawing
 from fes_pin.view.intervals import intervals_drawing
-from fes_pin.view.page import (
-    Content,
-    Markup,
-    document,
-    element,
-    figure,
-    folded,
-    html_table,
-    joined,
-    section,
-)
+from fes_pin.view.page import Content, Markup, document, element, figure, folded, html_table, joined, section
 from fes_pin.view.sections import header, provenance_parts, stage_mark
 
 FOREST = 40

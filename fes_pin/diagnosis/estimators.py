@@ -83,7 +83,9 @@ def judged_again(search: LikelihoodSearch, found: Found, white: LikelihoodFit) -
     """
 
     def begun() -> LikelihoodModels | None:
-        if not _predicts_better(white, search, found):
+        many = [[(f, found.best, f.trials)] for f in (found.nominal, found.best, white)]
+        nominal, coloured, new = (squared_errors(one, search.models.horizon_s) for one in many)
+        if not held_out_gain(nominal, coloured, new, search.models.seed).percent > NOTHING_PERCENT:
             return None
         return search.models.begun_with([white, *_parts_and_rivals(found)])
 
@@ -92,13 +94,6 @@ def judged_again(search: LikelihoodSearch, found: Found, white: LikelihoodFit) -
         return None
     again = LikelihoodSearch(sets, search.progress, Policy(given=white.names))
     return _ended(again, attempted(again.run, None, search.seconds_left))
-
-
-def _predicts_better(white: LikelihoodFit, search: LikelihoodSearch, found: Found) -> bool:
-    """Return whether errors over the horizon are smaller with white process noise."""
-    many = [[(f, found.best, f.trials)] for f in (found.nominal, found.best, white)]
-    nominal, coloured, new = (squared_errors(one, search.models.horizon_s) for one in many)
-    return held_out_gain(nominal, coloured, new, search.models.seed).percent > NOTHING_PERCENT
 
 
 def _parts_and_rivals(found: Found) -> list[LikelihoodFit]:

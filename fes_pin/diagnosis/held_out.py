@@ -105,12 +105,12 @@ def _problem(fitted: LikelihoodFit, trials: Sequence[Trial]) -> tuple[Likelihood
 
 
 def evidence_of(folds: Sequence[Fold], found: Found, alike: Again) -> dict[str, Evidence]:
-    """Return the evidence for each cause: what it adds to twice the log-likelihood of held-out trials.
+    """Return the evidence for each cause: what it adds to twice the log-likelihood of held-out trials, or of all.
 
     Held-out trials are predicted by fits to the others. Noise is that of all trials: estimated without a trial that is
     unlike the others, it makes that trial so unlikely that no cause is supported. See `infer.held_out.marginal_cost`.
     """
-    predicted = {n: 0.0 for n in ("", *found.without)}
+    predicted = {n: 0.0 if folds else f.sse for n, f in {"": found.best, **found.without}.items()}
     for fold in folds:
         whole = part = {"": found.best, **found.without}
         if fold.within:
@@ -120,11 +120,6 @@ def evidence_of(folds: Sequence[Fold], found: Found, alike: Again) -> dict[str, 
         for n in predicted:
             predicted[n] += _cost(whole[n]) - _cost(part[n])
     return {n: Evidence.of(predicted[n] - predicted[""]) for n in found.without}
-
-
-def fitted_evidence(found: Found) -> dict[str, Evidence]:
-    """Return the evidence for each cause in the likelihood of the fitted trials."""
-    return {n: Evidence.of(less.sse - found.best.sse) for n, less in found.without.items()}
 
 
 def _cost(fitted: LikelihoodFit) -> float:

@@ -12,6 +12,7 @@ from fes_pin.diagnosis.decide.chosen_again import share_of
 from fes_pin.diagnosis.decide.rivals import alike_in, estimates, experiment, not_identifiable, ranking
 from fes_pin.diagnosis.errors_ahead import AheadErrors, free_errors, noise_that_is_small
 from fes_pin.diagnosis.estimators import WHITE_PROCESS_NOISE
+from fes_pin.diagnosis.rejected import UNMOVED, is_moved_by_what_is_recorded
 from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodSearch
 from fes_pin.diagnosis.verdict import RigState, RigVerdict
@@ -42,7 +43,7 @@ def diagnosis_of(
     """Return the diagnosis of a rig from a search by the likelihood that has run."""
     verdict = RigVerdict(search, trials[1])
     state = verdict.of(found)
-    found, (left, reason) = state.found, verdict.remainder(state)
+    found, left = state.found, verdict.lack_of_fit(state)
     again = [f.best for f in state.weighed.folds if f.within]
     best, other = as_wide_as_trials_differ(with_honest_intervals(found.best), again), verdict.by_the_other(state)
     if other is not None:
@@ -70,7 +71,7 @@ def diagnosis_of(
         warnings=(*said, WHITE_PROCESS_NOISE) if best.noise.timed else said,
         random=state.weighed.random,
         is_driven=search.models.judged_s is not None,
-        reason=reason,
+        reason=left.reason if not left.unexplained or is_moved_by_what_is_recorded(found.best) else UNMOVED,
         ahead=AheadErrors(search.models.horizon_s, *fitted, *(held or (None, None))),
     )
 

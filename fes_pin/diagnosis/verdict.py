@@ -12,33 +12,24 @@ from dataclasses import dataclass, replace
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.decide.chosen_again import ChosenAgain, is_chosen, share_of
 from fes_pin.diagnosis.decide.rivals import alike_in
-from fes_pin.diagnosis.errors_ahead import (
-    Ahead,
-    RandomPart,
-    are_large,
-    errors_ahead,
-    random_parts,
-    squared_errors,
-)
+from fes_pin.diagnosis.errors_ahead import Ahead, Pairs, RandomPart, are_large, errors_ahead, random_parts
 from fes_pin.diagnosis.estimators import found_with_white_process_noise, judged_again, least_error
 from fes_pin.diagnosis.held_out import (
     Again,
     Fold,
     as_random_as_in_all,
     evidence_of,
-    fitted_evidence,
     folds_of,
     gains_of,
     make_folds,
     refit,
 )
-from fes_pin.diagnosis.rejected import UNMOVED, is_moved_by_what_is_recorded, no_noise, with_rejected_causes
+from fes_pin.diagnosis.rejected import is_moved_by_what_is_recorded, no_noise, with_rejected_causes
 from fes_pin.diagnosis.remainder.lack_of_fit import lack_of_fit
 from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodModels, LikelihoodSearch
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.per_trial import falls
-from fes_pin.infer.held_out import held_out_gain
-from fes_pin.infer.levels import FORM_SHARE, NOTHING_PERCENT
+from fes_pin.infer.levels import FORM_SHARE
 from fes_pin.infer.result import Remainder
 from fes_pin.infer.text import WHOLE
 from fes_pin.infer.verdict import State, Verdict, Weighed
@@ -93,7 +84,7 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
         within = folds or [Fold(found.nominal, found.best, found.without, self.models.trials)]
         return RigWeighed(
             gains=gains_of(within, found.without, self.models.judged_s, self.models.seed),
-            evidence=evidence_of(folds, found, self._alike) if folds else fitted_evidence(found),
+            evidence=evidence_of(folds, found, self._alike),
             lack_of_fit=lack_of_fit(found.best),
             folds=folds,
             random=random_parts(found.best),
@@ -116,7 +107,11 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
         gains = state.weighed.gains
         if are_large(state.weighed.random) and (form := [n for n in gains if gains[n].low < WHOLE * FORM_SHARE]):
             return form
-        return super().unsupported(state) or ([] if self._predicts(state) else list(state.names))
+        weak = super().unsupported(state)
+        if weak or not (gains and self.lack_of_fit(state).unexplained):
+            return weak
+        nominal, extended = map(self._judged, self.errors(state)[-1])
+        return [] if extended < nominal else list(gains)
 
     def lack_of_fit(self, state: RigState) -> Remainder:
         """Return the lack of fit: by its tests, process noise that is too large, or a cause that was rejected.
@@ -124,7 +119,11 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
         A set without one has that of the estimator that was replaced: with white process noise tests of lack of fit
         have little power.
         """
-        return self._lack_of_fit(state)[0]
+        weighed, stages = state.weighed, {e.name: str(e.stage) for e in self.models.library.effects}
+        left = with_rejected_causes(weighed.lack_of_fit, weighed.random, state.rejected, stages)
+        if not left.unexplained and weighed.no_noise is not None:
+            return replace(left, unexplained=True, where="time", reason=weighed.no_noise)
+        return left if left.unexplained or state.replaced is None else self.lack_of_fit(state.replaced)
 
     def is_rarely_chosen(self, state: RigState, name: str) -> bool:
         """Return whether most folds choose neither a cause nor one of its equivalents."""
@@ -142,18 +141,12 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
         return self.of(found, search, replaced=state)
 
     def prediction_error(self, state: RigState) -> float:
-        """Return E of a set on the fitted trials by cross-validation, percent.
-
-        For a single trial it is E of the fit itself. A rig in closed loop is judged by errors over the horizon, others
-        by those of free simulations.
-        """
-        best, train = state.found.best, self.models.trials
-        folds = self.folds(state)
+        """Return E of a set on the fitted trials by cross-validation, percent; of a single trial, of the fit itself."""
+        best, train, folds = state.found.best, self.models.trials, self.folds(state)
         if not (folds and folds[0].within):
             folds = make_folds(replace(state.found, nominal=best, without={}), train, (), self.refitted)
         pairs = [(f.chosen or f.best, f.best, f.test) for f in folds]
-        error = errors_ahead(pairs or [(best, best, train)], self.models.horizon_s, self._falls(state))
-        return error.horizon if error.free is None or self.models.judged_s is not None else error.free
+        return self._judged(self._ahead(state, pairs or [(best, best, train)]))
 
     def chosen(self, state: RigState) -> list[LikelihoodFit]:
         """Return for each fold the fit to all trials of the set that is chosen without its own; none without folds."""
@@ -161,8 +154,7 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
         if not folds or not folds[0].within:
             return []
         if id(found) not in self._chosen:
-            fits = {**state.search.possible(), found.best.names: found.best}
-            choose = ChosenAgain(fits, state.search.improves)
+            choose = ChosenAgain({**state.search.possible(), found.best.names: found.best}, state.search.improves)
             self._chosen[id(found)] = found, [choose.without(out) for out in folds_of(self.models.trials)]
         return self._chosen[id(found)][1]
 
@@ -179,36 +171,19 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
         found, out = state.found, []
         whole = [Fold(found.nominal, found.best, found.without, self.models.trials)]
         for folds in filter(None, (whole, self.folds(state))):
-            fits = [(f.nominal, f.best, f.test) for f in folds], [(f.chosen or f.best, f.best, f.test) for f in folds]
-            nominal, best = (errors_ahead(one, self.models.horizon_s, self._falls(state)) for one in fits)
-            out.append((nominal, best))
+            nominal = self._ahead(state, [(f.nominal, f.best, f.test) for f in folds])
+            out.append((nominal, self._ahead(state, [(f.chosen or f.best, f.best, f.test) for f in folds])))
         return out
-
-    def remainder(self, state: RigState) -> tuple[Remainder, str | None]:
-        """Return the lack of fit of a set, and its reason where no test finds it."""
-        left, reason = self._lack_of_fit(state)
-        is_moved = not left.unexplained or is_moved_by_what_is_recorded(state.found.best)
-        return left, reason if is_moved else UNMOVED
-
-    def _predicts(self, state: RigState) -> bool:
-        """Return False where the set that each fold chooses predicts its trials no better than the nominal model."""
-        if not state.names or not self.lack_of_fit(state).unexplained or not (folds := self.folds(state)):
-            return True
-        pairs = [(f.nominal, f.best, f.test) for f in folds], [(f.chosen or f.best, f.best, f.test) for f in folds]
-        nominal, chosen = (squared_errors(one, self.models.judged_s) for one in pairs)
-        return held_out_gain(nominal, nominal, chosen, self.models.seed).percent > NOTHING_PERCENT
-
-    def _lack_of_fit(self, state: RigState) -> tuple[Remainder, str | None]:
-        weighed, stages = state.weighed, {e.name: str(e.stage) for e in self.models.library.effects}
-        left = with_rejected_causes(weighed.lack_of_fit, weighed.random, state.rejected, stages)
-        if not left.unexplained and weighed.no_noise is not None:
-            return replace(left, unexplained=True, where="time"), weighed.no_noise
-        return (left, None) if left.unexplained or state.replaced is None else self._lack_of_fit(state.replaced)
 
     def by_the_other(self, state: RigState) -> LikelihoodFit | None:
         """Return the same set fitted by the other estimator; None without another, or where that found another set."""
         other = self._with_white_noise if state.replaced is None else state.replaced.found.best
         return other if other is not None and other.names == state.found.best.names else None
 
-    def _falls(self, state: RigState) -> bool:
-        return self.models.answered and falls(state.found.best.model, self.models.trials)
+    def _ahead(self, state: RigState, pairs: Pairs) -> Ahead:
+        is_falling = self.models.answered and falls(state.found.best.model, self.models.trials)
+        return errors_ahead(pairs, self.models.horizon_s, is_falling)
+
+    def _judged(self, error: Ahead) -> float:
+        """Return the error that judges causes: over the horizon in closed loop, else of free simulations."""
+        return error.horizon if error.free is None or self.models.judged_s is not None else error.free

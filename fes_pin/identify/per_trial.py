@@ -18,7 +18,7 @@ from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.problem import Problem, unknown_names
 from fes_pin.identify.process_noise import spread_of_start
 from fes_pin.infer.levels import RUNAWAY
-from fes_pin.infer.noise import Noise, NoiseModel
+from fes_pin.infer.noise import NoiseModel
 from fes_pin.infer.problem import Linearized, normal_equations
 from fes_pin.models.least_squares import least_squares
 from fes_pin.models.model import Model
@@ -36,21 +36,22 @@ STEPS = 3
 def predictions(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> list[np.ndarray]:
     """Return the readings that a model predicts of measured trials, shape (n, outputs) each; see the module.
 
+    A simulation starts from the first readings; that of a rig that falls, from an initial state that is fitted.
+
     Parameters
     ----------
     noise
         Noise by output column, by which channels are weighted.
     """
     simulator, values = Simulator(model, trials), model.parameters()
+    outputs = {n for t in trials for n in model.rig.outputs(t.kind)}
+    white = StateSpaceNoise({n: max(noise[n].std, 1e-12) if n in noise else math.inf for n in outputs})
     start = simulator.start(values)
     if falls(model, trials):
-        white = {n: Noise(one.std) for n, one in noise.items()}
         problem = Problem(model, trials, white, ())
         start = from_beginnings(problem, fit_problem(problem, values), partial(fit_problem, problem)).unknowns
     if not model.own_unknowns():
         return [s.readings for s in simulator.run(values, start)]
-    outputs = {n for t in trials for n in model.rig.outputs(t.kind)}
-    white = StateSpaceNoise({n: max(noise[n].std, 1e-12) if n in noise else math.inf for n in outputs})
     each = [cross_fitted_unknowns(model, t, white, s) for t, s in zip(trials, start, strict=True)]
     own = [[{**s, **one[k][1]} for s, one in zip(start, each, strict=True)] for k in (0, 1)]
     runs = [simulator.run(values, unknowns) for unknowns in own]

@@ -203,11 +203,15 @@ class Evidence:
 
 @dataclass(frozen=True)
 class Remainder:
-    """Lack of fit: whether residuals of the model are more than noise, its p-value, and where they are largest."""
+    """Lack of fit: whether residuals of the model are more than noise, its p-value, and where they are largest.
+
+    `reason` says in words why there is one where no test finds it.
+    """
 
     unexplained: bool
     p_value: float
     where: str | None
+    reason: str | None = None
 
     def record(self) -> dict[str, Any]:
         """As JSON files have it."""

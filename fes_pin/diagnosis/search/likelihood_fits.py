@@ -17,14 +17,13 @@ from fes_pin.identify.ahead import default_horizon
 from fes_pin.identify.correlation_time import with_new_noise
 from fes_pin.identify.fit import GROSS
 from fes_pin.identify.likelihood import LikelihoodProblem
-from fes_pin.identify.likelihood_fit import LikelihoodFit, at_noise, fit_of, maximise, maximum_from
+from fes_pin.identify.likelihood_fit import LikelihoodFit, at_noise, maximise, maximum_from
 from fes_pin.identify.process_noise import first_guess, stilled, without_memory
 from fes_pin.infer.covariance import step_gain
 from fes_pin.infer.fits import Candidate, FittedSets, Names
 from fes_pin.infer.maximise import ROUNDS
 from fes_pin.infer.optimize import WORTH
-from fes_pin.infer.optimum import minimise
-from fes_pin.infer.problem import Unknowns, completed, normal_equations
+from fes_pin.infer.problem import Unknowns, normal_equations
 from fes_pin.infer.scoring import LITTLE
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import StateSpaceNoise
@@ -239,21 +238,18 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         rest, whole = tuple(n for n in names if n != name), self.fits[names]
         if at_noise(self.fits[rest], whole.noise).reduced < GROSS:
             return
-        half = 0.5 * (self.fits[rest].criterion + whole.criterion)
-        problem = LikelihoodProblem(whole.model - name, self.trials, whole.noise)
-        unknowns = completed(problem.start_unknowns(), whole.unknowns)
-        base = fit_of(problem, minimise(problem, problem.model.parameters(), unknowns, 0))
+        half, bare = 0.5 * (self.fits[rest].criterion + whole.criterion), whole.model - name
+        base = at_noise(replace(whole, model=bare, parameters=bare.parameters()), whole.noise)
         known = {tuple(sorted((*rest, n))): one for n, one in self.candidates(base).items()}
         enough = STARTED * known[names].gain if names in known else math.inf
-        far = {k: one.start for k, one in known.items() if one.gain > enough and not self._is_below(k, half)}
+        far = {
+            k: one.start for k, one in known.items() if one.gain > enough and self.fits.get(k, base).criterion > half
+        }
         begun = self.begin(base, far)
         for k, fitted in zip(begun, self.converged(list(begun.values())), strict=True):
-            if k not in self.fits or fitted.criterion < self.fits[k].criterion:
+            if fitted.criterion < self.fits.get(k, base).criterion:
                 self.fits[k] = fitted
                 self._converged.add(k)
-
-    def _is_below(self, names: Names, criterion: float) -> bool:
-        return names in self.fits and self.fits[names].criterion < criterion
 
     def step_gain(self, fitted: LikelihoodFit) -> float:
         """Return the gain of a further step of a fit by its slope and curvature; 0 where it has converged."""
