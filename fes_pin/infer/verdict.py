@@ -47,7 +47,7 @@ class Weighed:
     gains
         Gains on held-out data; on the fitted data where none could be held out.
     evidence
-        Evidence in the likelihood of the same data.
+        Evidence in the likelihood of the same data; empty where a front end has none.
     lack_of_fit
         Lack of fit of the set.
     """

@@ -12,6 +12,10 @@ from oracle.studies import joint_rig, pendulum_urdf
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.diagnosis import diagnose_joint
+from fes_pin.identify.ahead import free_residuals
+from fes_pin.infer.noise import Noise
+from fes_pin.models.nominal import nominal_model
+from fes_pin.models.simulate import Simulator
 
 DT = 5e-3
 
@@ -45,6 +49,21 @@ def test_a_twin_is_found_where_a_fit_from_far_off_does_not_arrive(tmp_path):
     """On a joint that tumbles an offset of the sensor is a tilt of the base: the same motion, read the same."""
     study = far_driven(86, {"sensor_offset": TYPICAL["sensor_offset"]}, tmp_path)
     assert named(diagnose_joint(study)) == [{"sensor_offset", "base_tilt"}]
+
+
+def test_a_free_simulation_of_a_joint_that_tumbles_starts_where_its_trial_says(tmp_path):
+    """From the first reading, 0.1 degrees off, a simulation of the true model errs by turns."""
+    study = far_driven(86, {}, tmp_path)
+    start = study.start
+    model = nominal_model(study).with_parameters(
+        {"inertia_scale": start["inertia_scale"] / 1.4, "damping": start["damping"] / 0.6}
+    )
+    read, missed = Simulator(model, study.trials), []
+    for trial, run in zip(study.trials, read.run(model.parameters(), read.start(model.parameters())), strict=True):
+        (residual,) = free_residuals(model, trial, {"position": Noise(2e-3, (), 2e-3)}).values()
+        assert np.std(residual) == pytest.approx(2e-3, rel=0.1)
+        missed.append(np.abs(trial["position"] - run.readings[:, 0]).max())
+    assert max(missed) > 1.0
 
 
 def trains(seed, late=0, dt=1e-3, seconds=4.0):

@@ -11,7 +11,7 @@ from scipy.signal import lfilter
 
 from fes_pin.data.study import read_study
 from fes_pin.diagnosis.diagnosis import diagnose_joint
-from fes_pin.diagnosis.errors_ahead import RandomPart
+from fes_pin.diagnosis.errors_ahead import Ahead, RandomPart
 from fes_pin.diagnosis.rejected import with_rejected_causes
 from fes_pin.diagnosis.verdict import RigVerdict, RigWeighed
 from fes_pin.infer.result import Evidence, Gain, Remainder
@@ -21,11 +21,19 @@ NOTHING = Remainder(False, 0.5, None)
 LITTLE = (RandomPart("effort", 0.1, 0.1, 0.01),)
 
 
-def unsupported(evidence, low, random):
+class Judged(RigVerdict):
+    """A verdict with given errors of free simulation, percent, of the nominal model and of what folds choose."""
+
+    held_out = 1.0, 0.5
+
+    def errors(self, state):
+        return [tuple(Ahead(e, e, e) for e in (1.0, 0.1)), tuple(Ahead(e, e, e) for e in self.held_out)]
+
+
+def unsupported(evidence, low, random, held_out=Judged.held_out):
     """What is refused of a friction with the low end of its gain."""
-    verdict = RigVerdict(
-        SimpleNamespace(models=SimpleNamespace(horizon_s=0.3, library=SimpleNamespace(effects=()))), ()
-    )
+    verdict = Judged(SimpleNamespace(models=SimpleNamespace(judged_s=None, library=SimpleNamespace(effects=()))), ())
+    verdict.held_out = held_out
     gains = {"coulomb_friction": Gain(low + 1.0, low, low + 2.0)}
     found = SimpleNamespace(without={"coulomb_friction": None})
     return verdict.unsupported(
@@ -58,6 +66,14 @@ def test_beside_what_no_cause_explains_a_cause_is_more_than_an_error_of_form(low
     evidence = {"coulomb_friction": Evidence(500.0, 500.0)}
     assert (unsupported(evidence, low, large) != []) is refused
     assert unsupported(evidence, low, LITTLE) == []
+
+
+@pytest.mark.parametrize(("extended", "refused"), [(0.9, False), (1.0, True), (1.2, True)])
+def test_beside_a_lack_of_fit_the_sets_that_folds_choose_predict_better(extended, refused):
+    """A stop of a gain of 23 % was named for a detent: with the choice of each fold its error had grown."""
+    evidence, large = {"coulomb_friction": Evidence(500.0, 500.0)}, (RandomPart("effort", 1.0, 1.1, 0.32),)
+    assert (unsupported(evidence, 20.0, large, (1.0, extended)) != []) is refused
+    assert unsupported(evidence, 20.0, LITTLE, (1.0, extended)) == []
 
 
 def test_one_trial_unlike_the_others_silences_no_cause(tmp_path):
