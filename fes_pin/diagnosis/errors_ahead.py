@@ -236,12 +236,12 @@ def noise_that_is_small(fitted: LikelihoodFit) -> StateSpaceNoise:
 def errors_ahead(pairs: Pairs, horizon_s: float, falling: bool) -> Ahead:
     """Return E of the first output one sample ahead, over the horizon and free."""
     work = [(fitted, floor, trial) for fitted, floor, trials in pairs for trial in trials]
-    missed, around = np.sum(in_parallel(lambda one: _sums(*one, horizon_s), work), axis=0)
+    missed, around = np.sum(in_parallel(lambda one: _sums(*one, horizon_s, falling), work), axis=0)
     one_step, horizon, free, noise = (float(v) for v in 100.0 * missed / np.maximum(around, 1e-300))
     return Ahead(one_step, horizon, None if falling else free, noise)
 
 
-def _sums(fitted: LikelihoodFit, floor: LikelihoodFit, trial: Trial, horizon_s: float) -> np.ndarray:
+def _sums(fitted: LikelihoodFit, floor: LikelihoodFit, trial: Trial, horizon_s: float, falling: bool) -> np.ndarray:
     """Return squared errors of the first output of a trial and the squares of its deviations, shape (2, 4).
 
     The columns are: one sample ahead, over the horizon, free, and over the horizon by noise alone; in units of the
@@ -249,14 +249,16 @@ def _sums(fitted: LikelihoodFit, floor: LikelihoodFit, trial: Trial, horizon_s: 
     """
     name = fitted.model.rig.output(trial.kind)
     measured, (predicted, noise) = trial[name], _predicted(fitted, trial, horizon_s)
-    free = free_residuals(fitted.model, trial, fitted.noise)[name]
-    if is_simulated(fitted.noise, [trial]):
+    simulated = is_simulated(fitted.noise, [trial])
+    none = falling and not simulated
+    free = np.full(len(trial), np.nan) if none else free_residuals(fitted.model, trial, fitted.noise)[name]
+    if simulated:
         next_one = free - forecast(np.nan_to_num(free), fitted.noise[name], trial.dt, 0.0)
     else:
         next_one = one_step(fitted.model, trial, fitted.noise)[name]
     missed, unit = (next_one, measured - predicted[name], free), floor.noise.white[name] ** 2
     begun = 0, _first(fitted, trial, horizon_s), 0
-    one, ahead, simulated = (
+    one, ahead, alone = (
         _lines(measured, m, unit, noise[name])[:, k:].sum(axis=1) for m, k in zip(missed, begun, strict=True)
     )
-    return np.array([[one[0], ahead[0], simulated[0], ahead[2]], [one[1], ahead[1], simulated[1], ahead[1]]])
+    return np.array([[one[0], ahead[0], alone[0], ahead[2]], [one[1], ahead[1], alone[1], ahead[1]]])
