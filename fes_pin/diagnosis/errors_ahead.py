@@ -249,8 +249,7 @@ def _sums(fitted: LikelihoodFit, floor: LikelihoodFit, trial: Trial, horizon_s: 
     """
     name = fitted.model.rig.output(trial.kind)
     measured, (predicted, noise) = trial[name], _predicted(fitted, trial, horizon_s)
-    simulated = is_simulated(fitted.noise, [trial])
-    none = falling and not simulated
+    none = not (simulated := is_simulated(fitted.noise, [trial])) and falling
     free = np.full(len(trial), np.nan) if none else free_residuals(fitted.model, trial, fitted.noise)[name]
     if simulated:
         next_one = free - forecast(np.nan_to_num(free), fitted.noise[name], trial.dt, 0.0)

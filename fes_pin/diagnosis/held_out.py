@@ -11,7 +11,7 @@ from fes_pin.infer.held_out import FOLDS, Errors, deal, held_out_gain, marginal_
 from fes_pin.infer.maximise import together
 from fes_pin.infer.optimum import minimise
 from fes_pin.infer.problem import Unknowns
-from fes_pin.infer.result import Evidence, Gain
+from fes_pin.infer.result import CROSS_VALIDATED, FITTED, Evidence, Gain
 from fes_pin.infer.search import SearchResult
 from fes_pin.workers import in_parallel
 
@@ -110,16 +110,15 @@ def evidence_of(folds: Sequence[Fold], found: Found, alike: Again) -> dict[str, 
     Held-out trials are predicted by fits to the others. Noise is that of all trials: estimated without a trial that is
     unlike the others, it makes that trial so unlikely that no cause is supported. See `infer.held_out.marginal_cost`.
     """
-    predicted = {n: 0.0 if folds else f.sse for n, f in {"": found.best, **found.without}.items()}
+    on, every = CROSS_VALIDATED if folds else FITTED, {"": found.best, **found.without}
+    predicted = {n: 0.0 if folds else f.sse for n, f in every.items()}
     for fold in folds:
-        whole = part = {"": found.best, **found.without}
-        if fold.within:
-            part = dict(zip(whole, alike([(f, fold.best.trials) for f in whole.values()]), strict=True))
-        else:
-            whole = dict(zip(part, alike([(f, (*f.trials, *fold.test)) for f in part.values()]), strict=True))
+        trials = fold.best.trials if fold.within else (*found.best.trials, *fold.test)
+        others = dict(zip(every, alike([(f, trials) for f in every.values()]), strict=True))
+        whole, part = (every, others) if fold.within else (others, every)
         for n in predicted:
             predicted[n] += _cost(whole[n]) - _cost(part[n])
-    return {n: Evidence.of(predicted[n] - predicted[""]) for n in found.without}
+    return {n: replace(Evidence.of(predicted[n] - predicted[""]), on=on) for n in found.without}
 
 
 def _cost(fitted: LikelihoodFit) -> float:

@@ -98,12 +98,11 @@ def unfitted(study: Study, nominal: LikelihoodFit, reason: str, test: Sequence[T
 
 
 def _cause(verdict: RigVerdict, state: RigState, one: Effect, best: LikelihoodFit, on: str) -> Cause:
-    """Return the report of one cause; `best` has the intervals of the sandwich estimator.
+    """Return the report of one cause, whose gains are found `on` such data.
 
-    Its gains are found `on` such data. A likelihood is no evidence where the model has a lack of fit.
+    `best` has the intervals of the sandwich estimator.
     """
-    found, name, weighed = state.found, one.name, state.weighed
-    evidence = None if verdict.lack_of_fit(state).unexplained else weighed.evidence[name]
+    found, name, evidence = state.found, one.name, verdict.evidence(state)[one.name]
     alike = alike_in(found, name)
     return Cause(
         name=name,
@@ -112,7 +111,7 @@ def _cause(verdict: RigVerdict, state: RigState, one: Effect, best: LikelihoodFi
         equivalents=alike[1:],
         p_value=found.p_values[name],
         gain_fit=100.0 * share_in(found, name),
-        gain_held_out=replace(weighed.gains[name], on=on),
+        gain_held_out=replace(state.weighed.gains[name], on=on),
         evidence=None if evidence is None else replace(evidence, on=on),
         chosen_again=share_of(verdict.chosen(state), alike),
     )

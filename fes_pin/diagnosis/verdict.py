@@ -108,7 +108,7 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
         if are_large(state.weighed.random) and (form := [n for n in gains if gains[n].low < WHOLE * FORM_SHARE]):
             return form
         weak = super().unsupported(state)
-        if weak or not (gains and self.lack_of_fit(state).unexplained):
+        if weak or not (gains and state.weighed.folds and self.lack_of_fit(state).unexplained):
             return weak
         nominal, extended = map(self._judged, self.errors(state)[-1])
         return [] if extended < nominal else list(gains)

@@ -14,7 +14,7 @@ from typing import Generic, TypeVar
 from fes_pin.infer.fits import F
 from fes_pin.infer.held_out import is_supported
 from fes_pin.infer.levels import NOTHING_PERCENT
-from fes_pin.infer.result import Evidence, Gain, Remainder
+from fes_pin.infer.result import FITTED, Evidence, Gain, Remainder
 from fes_pin.infer.search import M, Search, SearchResult
 from fes_pin.infer.text import WHOLE
 
@@ -124,11 +124,19 @@ class Verdict(ABC, Generic[F, M, W]):
         """Return the lack of fit of a set, in view of the rejected candidates and of the estimator replaced."""
         return state.weighed.lack_of_fit
 
+    def evidence(self, state: State[F, M, W]) -> dict[str, Evidence | None]:
+        """Return the evidence for each candidate; None where there is a lack of fit, but of fitted data alone.
+
+        A likelihood says little of a wrong model. Its errors of prediction, which no fit minimises, say less of the
+        data that it was fitted to.
+        """
+        wrong = self.lack_of_fit(state).unexplained
+        return {n: None if wrong and e.on != FITTED else e for n, e in state.weighed.evidence.items()}
+
     def unsupported(self, state: State[F, M, W]) -> list[str]:
         """Return the candidates that held-out data do not support; where none could be held out, the fitted data."""
-        weighed, names, wrong = state.weighed, state.names, self.lack_of_fit(state).unexplained
-        known = {n: None if wrong else weighed.evidence[n] for n in names}
-        return [n for n, e in known.items() if not is_supported(e, weighed.gains[n], alone=len(names) == 1)]
+        known, gains = self.evidence(state), state.weighed.gains
+        return [n for n, e in known.items() if not is_supported(e, gains[n], alone=len(known) == 1)]
 
     def is_rarely_chosen(self, state: State[F, M, W], name: str) -> bool:
         """Return whether most folds of the data choose a set without a candidate."""

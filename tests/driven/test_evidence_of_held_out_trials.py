@@ -37,7 +37,7 @@ def unsupported(evidence, low, random, held_out=Judged.held_out):
     gains = {"coulomb_friction": Gain(low + 1.0, low, low + 2.0)}
     found = SimpleNamespace(without={"coulomb_friction": None})
     return verdict.unsupported(
-        State(None, found, RigWeighed(gains, evidence, NOTHING, (), random, None), {}, frozenset(gains))
+        State(None, found, RigWeighed(gains, evidence, NOTHING, (None,), random, None), {}, frozenset(gains))
     )
 
 

@@ -7,7 +7,7 @@ import pytest
 from infer.regression import COUNT, Regression, RegressionVerdict
 
 from fes_pin.infer.held_out import deal
-from fes_pin.infer.result import Evidence, Gain
+from fes_pin.infer.result import FITTED, Evidence, Gain
 from fes_pin.infer.search import Search
 from fes_pin.infer.verdict import State, Verdict, Weighed, word_of
 
@@ -34,9 +34,9 @@ CLAIMS = Claims(SimpleNamespace())
 def test_a_candidate_together_with_others_gains_something():
     """Before, a torque that repeats was named beside friction for 0.00 % of the error."""
     gains = {"friction": gain(40.0), "periodic": gain(0.0)}
-    likely = {n: Evidence(500.0, 500.0) for n in gains}
-    assert CLAIMS.unsupported(state(gains, likely)) == ["periodic"]
-    assert CLAIMS.unsupported(state({"periodic": gain(0.0)}, likely)) == []
+    likely = Evidence(500.0, 500.0)
+    assert CLAIMS.unsupported(state(gains, dict.fromkeys(gains, likely))) == ["periodic"]
+    assert CLAIMS.unsupported(state({"periodic": gain(0.0)}, {"periodic": likely})) == []
 
 
 @pytest.mark.parametrize("wrong", [True, False])
@@ -46,6 +46,13 @@ def test_a_candidate_alone_that_makes_predictions_worse_is_none(wrong):
     assert CLAIMS.unsupported(state({"friction": gain(-3.0)}, likely, left)) == ["friction"]
     assert CLAIMS.unsupported(state({"friction": gain(-1.0)}, likely, left)) == ["friction"] * wrong
     assert CLAIMS.unsupported(state({"friction": gain(40.0)}, {"friction": Evidence(-1.0, 0.0)})) == ["friction"]
+
+
+def test_of_fitted_data_alone_the_likelihood_judges_with_a_lack_of_fit_too():
+    """Friction was dropped beneath a random torque: its likelihood gains 80, free simulations of one trial nothing."""
+    likely = {"friction": Evidence(80.0, 80.0, on=FITTED)}
+    assert CLAIMS.unsupported(state({"friction": Gain(-40.0, -113.0, 21.0)}, likely, SOMETHING)) == []
+    assert CLAIMS.unsupported(state({"friction": Gain(-40.0, -113.0, -1.0)}, likely, SOMETHING)) == ["friction"]
 
 
 def test_of_several_units_a_candidate_together_with_others_needs_their_likelihood_too():
