@@ -125,12 +125,11 @@ def next_experiment(
     """
     pair = name, next(iter(rivals))
     if falls(best.model, best.trials):
-        why = f"{' and '.join(pair)}: the rig falls unless its controller holds it, and no effort is proposed"
+        why = "small errors grow in a simulation of this rig, so that no effort is proposed"
         return NextExperiment(f"{why}; move it further, or another way, and diagnose again", pair)
     found = _best(best, rivals, list(candidates(study)), study)
     if found is None:
-        why = f"no trial was found for {' and '.join(pair)} that stays near what has been measured"
-        return NextExperiment(why, pair)
+        return NextExperiment("no trial that stays near what has been measured was found", pair)
     expected, trial = _refined(best, rivals, found, study)
     closest = min(expected, key=lambda n: expected[n].worth)
     pair, separation = (name, closest), expected[closest]
