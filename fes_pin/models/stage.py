@@ -245,6 +245,12 @@ class Effect:
         return {n: info.grid or (getattr(cls, n),) for n, info in cls.parameters().items()}
 
     @classmethod
+    def bounded(cls, values: Grids) -> Grids:
+        """Return values that a search proposes, each within its physical bounds."""
+        info = cls.parameters()
+        return {n: tuple(map(info[n].nearest, many)) for n, many in values.items()}
+
+    @classmethod
     def far_sizes(cls, measured: Measured) -> Grids:
         """Return sizes of amplitudes that no descent reaches and at which fits start too; `measured` as in `grids`."""
         info = cls.parameters()

@@ -47,7 +47,7 @@ class Library:
 
     def grid(self, effect: type[Effect]) -> list[Effect]:
         """Return the effect at its null with every combination of its shapes, in every form that a screen tries."""
-        grids = effect.grids(self.measured)
+        grids = effect.bounded(effect.grids(self.measured))
         shapes = effect.shapes()
         start: dict[str, Any] = {n: near_null(effect, n) for n in effect.amplitudes()}
         return [

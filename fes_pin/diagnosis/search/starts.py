@@ -27,7 +27,9 @@ def near_null(effect: type[Effect], name: str) -> float:
 
 def from_afar(effect: Effect, measured: Mapping[str, np.ndarray]) -> list[Effect]:
     """Return the effect at its far sizes on the measured trials; see `Effect.far_sizes`."""
-    chosen: list[dict[str, Any]] = [{n: value} for n, many in effect.far_sizes(measured).items() for value in many]
+    chosen: list[dict[str, Any]] = [
+        {n: v} for n, many in effect.bounded(effect.far_sizes(measured)).items() for v in many
+    ]
     return [replace(effect, **one) for one in chosen]
 
 
@@ -51,7 +53,7 @@ def refinements(model: Model, effect: Effect, measured: Mapping[str, np.ndarray]
 
     A value equal to the refinement's null switches nothing on and gives no start.
     """
-    out, info, refined, grids = [], effect.parameters(), effect.refined(), effect.grids(measured)
+    out, info, refined, grids = [], effect.parameters(), effect.refined(), effect.bounded(effect.grids(measured))
     for names in effect.refinements():
         if names[0] in refined or not fits_rig(model, info[names[0]]):
             continue

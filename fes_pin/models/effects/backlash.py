@@ -28,7 +28,7 @@ class Backlash(Effect):
     Krasnosel'skii and Pokrovskii, Systems with Hysteresis, Springer 1989.
     """
 
-    half_width: float = parameter(0.01, unit="{q}", null=0.0, lower=0.0, upper=10.0, scale=0.005)
+    half_width: float = parameter(0.01, unit="{q}", null=0.0, lower=0.0, scale=0.005)
 
     name, stage, signal, rigs = "backlash", Stage.JOINT, "play", ("joint",)
     memories = ("followed",)

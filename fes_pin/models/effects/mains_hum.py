@@ -17,8 +17,8 @@ class MainsHum(Effect):
     may share the phase; others begin at any phase, and both amplitudes are each trial's own.
     """
 
-    in_phase: float = parameter(0.001, unit="{y}", null=0.0, lower=-100.0, upper=100.0, scale=0.001)
-    quadrature: float = parameter(0.0, unit="{y}", null=0.0, lower=-100.0, upper=100.0, scale=0.001)
+    in_phase: float = parameter(0.001, unit="{y}", null=0.0, scale=0.001)
+    quadrature: float = parameter(0.0, unit="{y}", null=0.0, scale=0.001)
     frequency_hz: float = parameter(50.0, unit="Hz", grid=(50.0, 60.0), fitted=False)
 
     name, stage, signal, rigs = "mains_hum", Stage.SENSOR, "reading", ("ankle", "joint", "muscle")

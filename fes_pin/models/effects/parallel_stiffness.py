@@ -26,7 +26,7 @@ class ParallelStiffness(Effect):
     """
 
     stiffness_nm_per_rad: float = parameter(0.05, unit="{effort}/{q}", null=0.0, lower=0.0, upper=1e8, scale=0.05)
-    rest_angle_rad: float = parameter(1.6, unit="{q}", lower=-20.0, upper=20.0, scale=0.1, times="stiffness_nm_per_rad")
+    rest_angle_rad: float = parameter(1.6, unit="{q}", scale=0.1, times="stiffness_nm_per_rad")
     hardening_per_rad2: float = refinement(0.0, unit="1/{q}2", lower=0.0, upper=1e7, scale=1.0, grid=(1.0,))
 
     name, stage, signal, rigs = "parallel_stiffness", Stage.JOINT, "torque", ("ankle", "joint", "muscle")

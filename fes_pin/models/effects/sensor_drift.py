@@ -18,7 +18,7 @@ class SensorDrift(Effect):
     Source: the warming of a bridge or of its amplifier.
     """
 
-    rate_per_s: float = parameter(0.001, unit="{y}/s", null=0.0, lower=-100.0, upper=100.0, scale=0.0005)
+    rate_per_s: float = parameter(0.001, unit="{y}/s", null=0.0, scale=0.0005)
     settling_per_s: float = refinement(0.0, unit="1/s", lower=0.0, upper=10.0, scale=0.1, grid=(0.2,))
 
     name, stage, signal, rigs = "sensor_drift", Stage.SENSOR, "reading", ("ankle", "joint", "muscle")

@@ -15,7 +15,7 @@ class SensorOffset(Effect):
     Source: a potentiometer or bridge that was not zeroed.
     """
 
-    offset: float = parameter(0.01, unit="{y}", null=0.0, lower=-1000.0, upper=1000.0, scale=0.005)
+    offset: float = parameter(0.01, unit="{y}", null=0.0, scale=0.005)
 
     name, stage, signal, rigs = "sensor_offset", Stage.SENSOR, "reading", ("ankle", "joint", "muscle")
 
