@@ -4,7 +4,7 @@ from fes_pin.data.schema import IMPOSED
 from fes_pin.diagnosis.decide.by_prediction import FEWEST, best_predicting
 from fes_pin.diagnosis.decide.rivals import not_excluded
 from fes_pin.diagnosis.errors_ahead import squared_errors
-from fes_pin.diagnosis.search.likelihood_fits import MEASUREMENT, PROCESS, WHITE
+from fes_pin.diagnosis.search.likelihood_fits import MEASUREMENT, PROCESS
 from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodModels, LikelihoodSearch
 from fes_pin.identify.likelihood_fit import LikelihoodFit, with_white_process_noise
 from fes_pin.identify.process_noise import step_s
@@ -45,17 +45,16 @@ def least_error(search: LikelihoodSearch) -> tuple[LikelihoodSearch, Found] | No
 
     Where a model is wrong, a likelihood with process noise or autoregressive measurement noise takes its error for
     noise. Least squares give the model that predicts best from the inputs alone (Ljung, System Identification,
-    2nd ed., section 8.3). Causes are chosen by their predictions of trials left out; where there are too few trials,
-    none is chosen.
+    2nd ed., section 8.3). Causes are chosen by their predictions of trials left out. Where there are too few trials,
+    they are those that bring a model near the data that is far from it.
     """
     if search.models.answered or search.was_stopped:
         return None
-    other = LikelihoodSearch(search.models.with_noise(WHITE), search.progress)
+    other = LikelihoodSearch(search.models.least_squares, search.progress)
 
     def chosen() -> Found:
         if len(search.models.trials) < FEWEST:
-            other.models.nominal()
-            return other.result(())
+            return other.result(other.models.approach())
         return other.result(best_predicting(other, other.run().best.names))
 
     return _ended(other, attempted(chosen, None, search.seconds_left))

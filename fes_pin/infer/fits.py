@@ -75,6 +75,10 @@ class Sets(ABC, Generic[F]):
     def without(self, names: Names, name: str) -> F:
         """Return the fit of a set without one candidate."""
 
+    def first(self) -> Names:
+        """Return the fitted set that a search begins with: the nominal model, or one nearer to the data."""
+        return ()
+
     def noise_p_value(self, gain: float, degrees: int) -> float:
         """Return the family-wise p-value of a gain in twice the log-likelihood against the noise."""
         return self.family.p_value(gain, degrees)

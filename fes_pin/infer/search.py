@@ -97,6 +97,7 @@ class Search(Generic[F, M]):
             self._sets.nominal()
         self._kept: Names = ()
         try:
+            self._kept = self._sets.first()
             given = self.policy.given
             return self.settle(self._backward(self._found_forward() if given is None else given))
         except OutOfTime:

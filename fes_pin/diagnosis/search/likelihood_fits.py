@@ -1,6 +1,7 @@
 """Fits of sets of causes by the likelihood, each with its process and measurement noise."""
 
 import copy
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -13,16 +14,19 @@ from fes_pin.diagnosis.search.likelihood_maxima import less, likeliest, look, ma
 from fes_pin.diagnosis.search.possible import is_possible
 from fes_pin.diagnosis.search.score import Scored, best_by_effect
 from fes_pin.diagnosis.search.starts import STARTED, STARTS, at_null, from_afar, refinements, started
+from fes_pin.identify.afar import followed, following, is_far, misfit_percent
 from fes_pin.identify.ahead import default_horizon
 from fes_pin.identify.correlation_time import with_new_noise
 from fes_pin.identify.fit import GROSS
 from fes_pin.identify.likelihood import LikelihoodProblem
-from fes_pin.identify.likelihood_fit import LikelihoodFit, at_noise, maximise, maximum_from
+from fes_pin.identify.likelihood_fit import LikelihoodFit, at_noise, fit_of, maximise, maximum_from
 from fes_pin.identify.process_noise import first_guess, stilled, without_memory
 from fes_pin.infer.covariance import step_gain
 from fes_pin.infer.fits import Candidate, FittedSets, Names
+from fes_pin.infer.levels import MOST_CAUSES, SMALL_SHARE
 from fes_pin.infer.maximise import ROUNDS
 from fes_pin.infer.optimize import WORTH
+from fes_pin.infer.optimum import minimise
 from fes_pin.infer.problem import Unknowns, normal_equations
 from fes_pin.infer.scoring import LITTLE
 from fes_pin.models.model import Model
@@ -43,6 +47,11 @@ RESTART_SETS = 3
 """Sets that are fitted further from little process noise: those of lowest criterion after one alternation. Without that
 alternation the best cause of a muscle, by 20 000 in twice the log-likelihood, was not among the first eight of
 twenty."""
+
+NEAREST, FITTED = 3, 8
+"""Sets of a size that are extended by least squares, and candidates by which each is; see `infer.search.Policy`."""
+MORE = 2.0
+"""Ratio of the errors E of two fits above which one is farther from the data."""
 
 Starts = list[Scored]
 """Shapes of a cause by which a set is extended, with their linear estimates, best first."""
@@ -96,6 +105,10 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
             self.most_candidates = None
         self.library = Library(self.model, trials, effects, answered)
         self._calm: StateSpaceNoise | None = None
+        self._following = None if answered else following(self.model, self.trials)
+        self._followed: dict[Names, LikelihoodFit] = {}
+        self._far: dict[LikelihoodFit, bool] = {}
+        self._rough: Self | None = None
         self._compared: dict[tuple[Names, str], LikelihoodFit] = {}
 
     @property
@@ -110,7 +123,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         """Return the same trials and causes with some fits to start from; the process noise is timed as in these."""
         other = copy.copy(self)
         other.fits = {f.names: f for f in fits}
-        other._converged, other._begun, other._compared = set(), set(), {}
+        other._converged, other._begun, other._compared, other._far = set(), set(), {}, {}
         return other
 
     def with_noise(self, noise: str) -> Self:
@@ -136,7 +149,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         guess = first_guess(self.model, self.trials)
         none = stilled(self.model, self.trials, guess) if self.answered else replace(guess, std={}, time={})
         calm = self.calm.get(()) or maximum_from_afar(self.model, self.trials, none)
-        calm = calm if self.noise == WHITE or () in self.calm else self._with_orders(calm)
+        calm = calm if self.noise == WHITE or () in self.calm else self._coloured(calm)
         self._calm = calm.noise
         return min(calm, self.with_process_noise(calm), key=lambda f: f.criterion) if self.noise == PROCESS else calm
 
@@ -155,6 +168,20 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         problem = LikelihoodProblem(fitted.model, self.trials, fitted.noise)
         noise = problem.with_orders(fitted.values, fitted.unknowns)
         return self._maximum(fitted.model, noise, fitted.unknowns)
+
+    def _coloured(self, fitted: LikelihoodFit) -> LikelihoodFit:
+        """Return a fit by least squares again with autoregressive noise; where that leads away, with its values kept.
+
+        Autoregressive noise takes up any slow error: far from the data its likelihood may be larger where a simulation
+        is worse.
+        """
+        problem = LikelihoodProblem(fitted.model, self.trials, fitted.noise)
+        problem.noise = problem.with_orders(fitted.values, fitted.unknowns)
+        problem.renew(fitted.values, fitted.unknowns)
+        found = self._maximum(fitted.model, problem.noise, fitted.unknowns)
+        if self.is_far(found) and misfit_percent(found) > MORE * misfit_percent(fitted):
+            return fit_of(problem, minimise(problem, fitted.values, fitted.unknowns, 0))
+        return found
 
     def _maximum(
         self, model: Model, noise: StateSpaceNoise, unknowns: Unknowns | None = None, rounds: int = ROUNDS
@@ -178,16 +205,103 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
 
     def candidates(self, base: LikelihoodFit) -> dict[str, Candidate[Starts]]:
         """Return the causes that a fit lacks and whose scores are finite, each with its shapes of largest score."""
-        by_effect = best_by_effect(self.library.scores(base).scored)
+        by_effect = best_by_effect(self.library.scores(self.scored_in(base)).scored)
         return {n: Candidate(many[0].gain, some) for n, many in by_effect.items() if (some := _of_much(many))}
 
     def begin(self, base: LikelihoodFit, starts: Mapping[Names, Starts]) -> dict[Names, LikelihoodFit]:
         """Return the best first fit of each set: at the noise of the base, with little process noise, and from afar."""
+        if self.is_far(base):
+            return self._begin_far(base, starts)
         begun = {k: [base.model + started(s.effect, s.amplitudes) for s in many] for k, many in starts.items()}
         looks = in_parallel(lambda k: self._first_fits(base, starts[k], begun[k]), list(starts))
         restarted = self.calm or self._restarted({names: models[0] for names, models in begun.items()}, base)
         each = zip(begun, looks, strict=True)
         return {n: min((*fits, restarted.get(n, fits[0])), key=lambda f: f.criterion) for n, fits in each}
+
+    def is_far(self, fitted: LikelihoodFit) -> bool:
+        """Return whether a fit is far from the data (`identify.afar`); never in closed loop, where a filter is used."""
+        if self._following is None:
+            return False
+        if fitted not in self._far:
+            self._far[fitted] = is_far(fitted)
+        return self._far[fitted]
+
+    def scored_in(self, base: LikelihoodFit) -> LikelihoodFit:
+        """Return the fit in which causes are scored: the fit itself, or far from the data a filter that follows it."""
+        return self._follow(base) if self.is_far(base) else base
+
+    def _follow(self, base: LikelihoodFit) -> LikelihoodFit:
+        """Return the fit of the same causes by a filter that follows the data."""
+        if base.names not in self._followed:
+            begun = base.model if base.names else self.model
+            self._followed[base.names] = self._first_followed([begun])
+        return self._followed[base.names]
+
+    def _first_followed(self, models: Sequence[Model]) -> LikelihoodFit:
+        assert self._following is not None
+        return followed(models, self.trials, self._following)
+
+    @property
+    def least_squares(self) -> Self:
+        """The same trials and causes, fitted by least squares."""
+        if self._rough is None:
+            self._rough = self if self.noise == WHITE else self.with_noise(WHITE)
+        return self._rough
+
+    def first(self) -> Names:
+        """Return the set that a search begins with: where the nominal model is far, the set nearest by least squares.
+
+        A likelihood with autoregressive noise compares small deviations. Far from the data the noise takes up every
+        error, and least squares compare.
+        """
+        if self.noise == WHITE or not self.is_far(self.fits[()]):
+            return ()
+        best = self.least_squares.approach()
+        for names in itertools.chain.from_iterable(itertools.combinations(best, k) for k in range(1, len(best) + 1)):
+            if names in self.least_squares.fits:
+                self.fits[names] = self._from_least_squares(self.least_squares.fits[names])
+        return best
+
+    def approach(self) -> Names:
+        """Return the smallest set that is not far from the data, or the nearest of at most `MOST_CAUSES`."""
+        best: Names = ()
+        fits = self.fits
+        self.nominal()
+        while self.is_far(fits[best]) and len(best) < MOST_CAUSES:
+            for names in self.near(len(best))[:NEAREST]:
+                self.extend(names, FITTED if names else None)
+            larger = [n for n in self.ranked(len(best) + 1) if self.is_possible(fits[n])]
+            if not larger or misfit_percent(fits[larger[0]]) > (1.0 - SMALL_SHARE) * misfit_percent(fits[best]):
+                break
+            best = larger[0]
+        return best
+
+    def _begin_far(self, base: LikelihoodFit, starts: Mapping[Names, Starts]) -> dict[Names, LikelihoodFit]:
+        """Return first fits of sets that extend one far from the data: by least squares, begun by a filter."""
+        if self.noise != WHITE:
+            rough = self.least_squares
+            if base.names not in rough.fits:
+                rough.fits[base.names] = rough._maximum(base.model, rough.fits[()].noise, base.unknowns)
+            made = rough.begin(rough.fits[base.names], {k: s for k, s in starts.items() if k not in rough.fits})
+            found = {k: rough.fits[k] if k in rough.fits else made[k] for k in starts}
+            return dict(zip(found, in_parallel(self._from_least_squares, list(found.values())), strict=True))
+        near = self._follow(base)
+
+        def begun(names: Names) -> LikelihoodFit:
+            effects = [started(s.effect, s.amplitudes) for s in starts[names]]
+            effects += from_afar(effects[0], self.library.measured) if base is self.fits[()] else []
+            self._followed[names] = first = self._first_followed([near.model + e for e in effects])
+            looks = [self._maximum(first.model, base.noise, first.unknowns)]
+            looks += [look(base.model + e, base) for e in effects]
+            return min(looks, key=lambda f: f.criterion)
+
+        return dict(zip(starts, in_parallel(begun, list(starts)), strict=True))
+
+    def _from_least_squares(self, fitted: LikelihoodFit) -> LikelihoodFit:
+        """Return a fit by least squares again with the noise of these fits."""
+        if self.noise == MEASUREMENT or not self.fits[()].noise.acting:
+            return self._coloured(fitted)
+        return self._maximum(fitted.model, self._guess(), fitted.unknowns, RESTART_ROUNDS)
 
     def _first_fits(self, base: LikelihoodFit, starts: Starts, models: Sequence[Model]) -> list[LikelihoodFit]:
         """Return first fits of a set; where all are worse than the base, also the one from next to its null."""

@@ -7,6 +7,7 @@ import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.search.starts import STARTS
+from fes_pin.identify.afar import followed, following
 from fes_pin.identify.fit import GROSS, from_beginnings
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit, at_noise, fit_of, maximise, maximum_from
@@ -26,9 +27,10 @@ SCREEN_ITERATIONS = 4
 
 
 def maximum_from_afar(model: Model, trials: Sequence[Trial], noise: StateSpaceNoise) -> LikelihoodFit:
-    """Return the maximum from the values of a model; after a gross misfit, also from fits to ever longer trials.
+    """Return the maximum from the values of a model; after a gross misfit, also from afar.
 
-    With process noise no misfit is gross: a filter follows the state even of a wrong model.
+    Further starts are a filter that follows the trials, and fits to ever longer beginnings of every trial. With process
+    noise no misfit is gross: a filter follows the state even of a wrong model.
     """
     rough = LikelihoodProblem(model, trials, noise)
     plain = maximise(LikelihoodProblem(model, trials, noise))
@@ -36,9 +38,14 @@ def maximum_from_afar(model: Model, trials: Sequence[Trial], noise: StateSpaceNo
         return plain
 
     def again(values: Mapping[str, float], unknowns: Unknowns) -> LikelihoodFit:
-        return maximise(LikelihoodProblem(model.with_parameters(values), trials, noise), unknowns)
+        problem = LikelihoodProblem(model.with_parameters(values), trials, noise)
+        return maximise(problem, completed(problem.start_unknowns(), unknowns))
 
-    return from_beginnings(rough, plain, again)
+    grown = from_beginnings(rough, plain, again)
+    if (driven := following(model, trials)) is None:
+        return grown
+    near = followed([model], trials, driven)
+    return min(grown, again(near.values, near.unknowns), key=lambda f: f.sse)
 
 
 def process_noises(calm: LikelihoodFit, scales: Sequence[float]) -> list[StateSpaceNoise]:

@@ -48,7 +48,7 @@ class LikelihoodModels(LikelihoodFits):
     def scored(self, found: Found) -> list[Scored]:
         """Return the score of every cause in the nominal model, and in the best set of those that it lacks."""
         more = self.library.scores(found.best).scored if found.best.model.effects else []
-        return self.library.scores(found.nominal).scored + more
+        return self.library.scores(self.scored_in(found.nominal)).scored + more
 
     def excess_scatter(self, larger: LikelihoodFit, smaller: LikelihoodFit) -> float:
         """See `infer.scatter.excess_scatter`."""

@@ -1,0 +1,68 @@
+"""Fits of models that are far from the data.
+
+A free simulation of a wrong model departs from the data, and the sum of squares of its errors has many minima. A Kalman
+filter with large process noise follows the data: its errors are those of one step, and nearly linear in the parameters,
+as those of the equation of motion are. Its fit is a start for the fit of free simulations, which are its limit without
+process noise. Source: Abarbanel, Creveling, Farsian and Kostuk, Dynamical state and parameter estimation, SIAM J.
+Applied Dynamical Systems 8 (2009), who couple the model to the data.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from fes_pin.data.trial import Trial
+from fes_pin.identify.fit import Fit
+from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.identify.likelihood_fit import LikelihoodFit, maximise
+from fes_pin.identify.problem import Problem
+from fes_pin.identify.process_noise import first_guess
+from fes_pin.infer.held_out import percent_of_spread
+from fes_pin.infer.levels import RUNAWAY, SMALL_PERCENT
+from fes_pin.infer.noise import Noise
+from fes_pin.infer.problem import completed
+from fes_pin.models.model import Model
+from fes_pin.models.predictor import StateSpaceNoise
+
+FOLLOWING = 30.0
+"""Process noise by which a filter follows the data, in units of the smallest: a tenth of what drives the rig."""
+
+
+def misfit_percent(fitted: Fit) -> float:
+    """Return E of a fit's free simulations of its trials from their fitted initial states, percent."""
+    trials, rig = fitted.trials, fitted.model.rig
+    outputs = dict.fromkeys(n for t in trials for n in rig.outputs(t.kind) if n in t)
+    around = {n: [np.nansum((t[n] - np.nanmean(t[n])) ** 2) for t in trials if n in t] for n in outputs}
+    units = {n: Noise(1.0, (), max(float(np.sqrt(np.sum(a))), 1e-300)) for n, a in around.items()}
+    problem = Problem(fitted.model, trials, units, ())
+    run = problem.innovations(fitted.values, completed(problem.start_unknowns(), fitted.unknowns))
+    with np.errstate(all="ignore"):
+        squares = [
+            float(np.sum((v / units[n].std) ** 2))
+            for one in run
+            for n, v in zip(one.outputs, one.values.T, strict=True)
+        ]
+    most = RUNAWAY**2 * len(outputs)
+    return percent_of_spread(np.clip(np.nan_to_num(squares, nan=most, posinf=most), 0.0, most), float(len(outputs)))
+
+
+def is_far(fitted: Fit) -> bool:
+    """Return whether a fit is far from the data: E of its free simulations is more than small."""
+    return misfit_percent(fitted) > SMALL_PERCENT
+
+
+def following(model: Model, trials: Sequence[Trial]) -> StateSpaceNoise | None:
+    """Return noise with which a filter of the model follows the trials; None where no process noise drives the rig.
+
+    No filter includes a low pass of trials.
+    """
+    guess = first_guess(model, trials)
+    if not guess.std or any(t.low_pass_hz for t in trials):
+        return None
+    return replace(guess, std={n: FOLLOWING * v for n, v in guess.std.items()})
+
+
+def followed(models: Sequence[Model], trials: Sequence[Trial], noise: StateSpaceNoise) -> LikelihoodFit:
+    """Return the likeliest fit of a filter that follows the trials, from the values of several models."""
+    return min((maximise(LikelihoodProblem(m, trials, noise), rounds=1) for m in models), key=lambda f: f.sse)
