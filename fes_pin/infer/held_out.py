@@ -90,13 +90,14 @@ class Errors:
 def held_out_gain(nominal: Errors, without: Errors, extended: Errors, seed: int) -> Gain:
     """Return the share of the nominal model's error above the noise that the step from `without` to `extended` removes.
 
-    The interval is a bootstrap over the units of evidence.
+    The interval is a bootstrap over the units of evidence, and so is the share of the error of `without` itself.
     """
     draws = np.random.default_rng(seed).integers(len(nominal.squares), size=(RESAMPLES, len(nominal.squares)))
     squares = (nominal.squares, without.squares, extended.squares, extended.noise, extended.scatter())
     many, one = _share(*(e[draws].sum(axis=1) for e in squares)), _share(*(e.sum() for e in squares))
     low, high = np.quantile(many, (0.025, 0.975))
-    return Gain(float(one), float(low), float(high))
+    given = np.quantile(_share(*(e[draws].sum(axis=1) for e in (without.squares, *squares[1:]))), 0.025)
+    return Gain(float(one), float(low), float(high), given=float(given))
 
 
 def _share(

@@ -63,6 +63,8 @@ SMALL_PERCENT = 100.0 * SMALL_SHARE**2
 """Error E that is small, in percent. Literature: a tenth of what Dombre, Fournier and Coiffet call a good fit."""
 NOTHING_PERCENT = SMALL_SHARE * SMALL_PERCENT
 """Gain that is negligible, in percent. Theory: a small share of a small error."""
+MOST_PERCENT = 50.0
+"""Share of an error that is most of it, in percent. Theory: what remains is smaller than what went."""
 RUNAWAY = 10.0
 """Limit of a prediction, in multiples of the largest reading: beyond it a simulation diverges. Theory: the inverse of
 `SMALL_SHARE`; the size of a divergent simulation has no meaning."""

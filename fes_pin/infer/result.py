@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar, TypeVar
 
 from fes_pin.infer.family import SMALLEST_P
-from fes_pin.infer.levels import CONFIDENCE_95, NOTHING_PERCENT
+from fes_pin.infer.levels import CONFIDENCE_95, MOST_PERCENT, NOTHING_PERCENT
 from fes_pin.infer.optimum import Optimum
 from fes_pin.infer.text import percent, probability, quantity
 
@@ -115,6 +115,8 @@ class Gain:
         Data on which it is found: a key of `ON`.
     measure
         What it is counted in.
+    given
+        Low end of the share of the error that the other causes leave, percent.
     """
 
     percent: float
@@ -123,6 +125,7 @@ class Gain:
     ahead_s: float | None = None
     on: str = CROSS_VALIDATED
     measure: ClassVar[str] = ERROR
+    given: float = math.nan
 
     def __str__(self) -> str:
         if self.is_none:
@@ -137,8 +140,11 @@ class Gain:
 
     @property
     def is_material(self) -> bool:
-        """Whether the low end of its interval is above `NOTHING_PERCENT`."""
-        return self.low > NOTHING_PERCENT
+        """Whether the low end of its interval is above `NOTHING_PERCENT`, or most of what other causes leave is.
+
+        Beside a large cause a smaller one removes little of the nominal model's error, and may remove all that is left.
+        """
+        return self.low > NOTHING_PERCENT or self.given > MOST_PERCENT
 
     @property
     def is_held_out(self) -> bool:

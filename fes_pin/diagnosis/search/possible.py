@@ -8,9 +8,10 @@ from fes_pin.identify.fit import Fit
 
 
 def is_possible(fitted: Fit, measured: Mapping[str, np.ndarray]) -> bool:
-    """Return False if the size of a cause in a fit is impossible: another cause is then mistaken for it.
+    """Return False if a cause in a fit is impossible: another cause is then mistaken for it.
 
-    A size is impossible if it ended at a bound other than its null, or if it is less than the readings can resolve.
+    It is impossible if its size or shape ended at a bound other than its null, or if its size is less than the readings
+    can resolve.
 
     Parameters
     ----------
@@ -19,7 +20,7 @@ def is_possible(fitted: Fit, measured: Mapping[str, np.ndarray]) -> bool:
     """
     for effect in fitted.model.effects:
         info, smallest = effect.parameters(), effect.smallest(measured)
-        for n in effect.amplitudes():
+        for n in (*effect.amplitudes(), *effect.shapes()):
             size = getattr(effect, n)
             if f"{effect.name}.{n}" in fitted.at_bound and size != info[n].null:
                 return False

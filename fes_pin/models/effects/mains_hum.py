@@ -2,8 +2,10 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from fes_pin.models.maths import TURN, cos, sin
-from fes_pin.models.stage import Effect, Scalar, Signals, Stage, parameter
+from fes_pin.models.stage import Effect, Grids, Measured, Scalar, Signals, Stage, parameter
 
 
 @dataclass(frozen=True)
@@ -23,6 +25,16 @@ class MainsHum(Effect):
 
     name, stage, signal, rigs = "mains_hum", Stage.SENSOR, "reading", ("ankle", "joint", "muscle")
     varies = True
+
+    @classmethod
+    def grids(cls, measured: Measured) -> Grids:
+        """The frequencies that sampling does not fold to less than a period in a trial: these would be an offset."""
+        grids, time = super().grids(measured), measured.get("time", np.empty(0))
+        if len(time) < 2:
+            return grids
+        rate = 1.0 / float(np.median(np.diff(time)))
+        folded = {f: abs(f - rate * round(f / rate)) for f in grids["frequency_hz"]}
+        return {**grids, "frequency_hz": tuple(f for f, seen in folded.items() if seen * np.max(time) >= 1.0)}
 
     def apply(self, value: Scalar, s: Signals) -> Scalar:
         phase = TURN * self.frequency_hz * s.time

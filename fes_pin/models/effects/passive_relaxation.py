@@ -2,7 +2,9 @@
 
 from dataclasses import dataclass
 
-from fes_pin.models.stage import ByName, Effect, Scalar, Signals, Stage, parameter
+import numpy as np
+
+from fes_pin.models.stage import Bounds, ByName, Effect, Measured, Scalar, Signals, Stage, parameter
 
 NOTHING = 1e-30
 """Below any square of a motion: a rig that begins at rest has 0 / 0."""
@@ -25,6 +27,11 @@ class PassiveRelaxation(Effect):
     name, stage, signal, rigs = "passive_relaxation", Stage.JOINT, "torque", ("ankle", "joint")
     states = ("relaxed",)
     dissipative = True
+
+    def limits(self, measured: Measured) -> Bounds:
+        """It relaxes within the longest trial; what relaxes more slowly is a spring there."""
+        longest = float(np.max(measured.get("time", np.zeros(1))))
+        return {"relaxation_s": (0.0, longest)} if longest > 0.0 else {}
 
     def apply(self, value: Scalar, s: Signals) -> Scalar:
         return value - self.stiffness_nm_per_rad * (s.q - s.own.relaxed)
