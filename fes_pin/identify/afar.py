@@ -19,7 +19,7 @@ from fes_pin.identify.likelihood_fit import LikelihoodFit, maximise
 from fes_pin.identify.problem import Problem
 from fes_pin.identify.process_noise import first_guess
 from fes_pin.infer.held_out import percent_of_spread
-from fes_pin.infer.levels import RUNAWAY, SMALL_PERCENT
+from fes_pin.infer.levels import CONFIDENCE_95, RUNAWAY, SMALL_PERCENT
 from fes_pin.infer.noise import Noise
 from fes_pin.infer.problem import completed
 from fes_pin.models.model import Model
@@ -66,3 +66,26 @@ def following(model: Model, trials: Sequence[Trial]) -> StateSpaceNoise | None:
 def followed(models: Sequence[Model], trials: Sequence[Trial], noise: StateSpaceNoise) -> LikelihoodFit:
     """Return the likeliest fit of a filter that follows the trials, from the values of several models."""
     return min((maximise(LikelihoodProblem(m, trials, noise), rounds=1) for m in models), key=lambda f: f.sse)
+
+
+def with_beliefs(fitted: LikelihoodFit, believed: Model) -> LikelihoodFit:
+    """Return a fit again with the nominal parameters that the data do not identify held at their believed values.
+
+    A parameter is not identified if half its interval is above twice its value and twice its believed value, and the
+    interval holds the latter. Its estimate would depend on where the fit began.
+    """
+    known, held = believed.parameters(), {}
+    for n in set(fitted.free) & set(known):
+        value, reach = fitted.values[n], fitted.reach(n)
+        if reach > CONFIDENCE_95 * max(abs(value), abs(known[n])) and abs(value - known[n]) < reach:
+            held[n] = known[n]
+    if not held:
+        return fitted
+    rig = replace(fitted.model.rig, fitted=tuple(n for n in fitted.model.rig.fitted_parameters() if n not in held))
+    model = Model(rig, fitted.model.effects).with_parameters(held)
+    return maximise(LikelihoodProblem(model, fitted.trials, fitted.noise), fitted.unknowns)
+
+
+def freed(model: Model, believed: Model) -> Model:
+    """Return a model in which every nominal parameter is fitted that the believed model fits."""
+    return Model(replace(model.rig, fitted=believed.rig.fitted), model.effects)

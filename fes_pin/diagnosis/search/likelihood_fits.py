@@ -10,11 +10,12 @@ from typing import Self
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.search.library import Library
+from fes_pin.diagnosis.search.likelihood_forms import refined_form
 from fes_pin.diagnosis.search.likelihood_maxima import less, likeliest, look, maximum_from_afar, process_noises
 from fes_pin.diagnosis.search.possible import is_possible
 from fes_pin.diagnosis.search.score import Scored, best_by_effect
 from fes_pin.diagnosis.search.starts import STARTED, STARTS, at_null, from_afar, refinements, started
-from fes_pin.identify.afar import followed, following, is_far, misfit_percent
+from fes_pin.identify.afar import followed, following, freed, is_far, misfit_percent, with_beliefs
 from fes_pin.identify.ahead import default_horizon
 from fes_pin.identify.correlation_time import with_new_noise
 from fes_pin.identify.fit import GROSS
@@ -210,6 +211,8 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
 
     def begin(self, base: LikelihoodFit, starts: Mapping[Names, Starts]) -> dict[Names, LikelihoodFit]:
         """Return the best first fit of each set: at the noise of the base, with little process noise, and from afar."""
+        if base.model.rig.fitted != self.model.rig.fitted:
+            base = replace(base, model=freed(base.model, self.model))
         if self.is_far(base):
             return self._begin_far(base, starts)
         begun = {k: [base.model + started(s.effect, s.amplitudes) for s in many] for k, many in starts.items()}
@@ -274,6 +277,9 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
             if not larger or misfit_percent(fits[larger[0]]) > (1.0 - SMALL_SHARE) * misfit_percent(fits[best]):
                 break
             best = larger[0]
+        refined = refined_form(fits[best], self.library.measured) if best else None
+        if refined is not None and MORE * misfit_percent(refined) < misfit_percent(fits[best]):
+            fits[best] = refined
         return best
 
     def _begin_far(self, base: LikelihoodFit, starts: Mapping[Names, Starts]) -> dict[Names, LikelihoodFit]:
@@ -289,7 +295,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
 
         def begun(names: Names) -> LikelihoodFit:
             effects = [started(s.effect, s.amplitudes) for s in starts[names]]
-            effects += from_afar(effects[0], self.library.measured) if base is self.fits[()] else []
+            effects += from_afar(effects[0], self.library.measured) if not base.names else []
             self._followed[names] = first = self._first_followed([near.model + e for e in effects])
             looks = [self._maximum(first.model, base.noise, first.unknowns)]
             looks += [look(base.model + e, base) for e in effects]
@@ -308,7 +314,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         looks, effect = [look(one, base) for one in models], starts[0].effect
         if all(f.sse > base.sse + WORTH for f in looks):
             looks.append(look(base.model + at_null(effect), base))
-        return [*looks, *(self._elsewhere(effect) if base is self.fits[()] else [])]
+        return [*looks, *(self._elsewhere(effect) if not base.names else [])]
 
     def _elsewhere(self, effect: Effect) -> list[LikelihoodFit]:
         """Return fits of one cause alone from far sizes, with the start values of the nominal model.
@@ -335,8 +341,8 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         return {names: fitted for (names, _), fitted in zip(lowest, gone_on, strict=True)}
 
     def converged(self, fits: Sequence[LikelihoodFit]) -> list[LikelihoodFit]:
-        """Return the converged fits."""
-        return in_parallel(lambda f: maximum_from(f, self.trials), fits)
+        """Return the converged fits, with nominal parameters that they do not identify as believed."""
+        return in_parallel(lambda f: with_beliefs(maximum_from(f, self.trials), self.model), fits)
 
     def under_noise_of(self, other: LikelihoodFit, fits: Sequence[LikelihoodFit]) -> list[LikelihoodFit]:
         """Return fits, with their parameters, under the noise of another fit of the same trials."""
