@@ -181,14 +181,12 @@ def _along(path: Path, model: Model, trial: Trial, horizon_s: float) -> Trial:
 
 
 def _errors(path: Path, measured: Sequence[Trial], found: Sequence[Trial], horizon_s: float | None) -> list[str]:
-    """E of each trial whose outputs were measured, and of all of them, in words."""
+    """E of each trial whose outputs were measured, and of all of them, in words; SI units of a model without noise."""
     from fes_pin.diagnosis.replay import squares_of
     from fes_pin.identify.stored import load_random
     from fes_pin.infer.held_out import percent_of_spread
 
-    random = load_random(path)
-    noise = random if isinstance(random, dict) else {}
-    squares = {}
+    noise, squares = load_random(path) or {}, {}
     for one, predicted in zip(measured, found, strict=True):
         if names := [n for n in predicted.columns if n in one]:
             squares[one.name] = squares_of(one, predicted, names, noise)
