@@ -73,8 +73,6 @@ def predict(
     from fes_pin.models.store import load_model
 
     catalogue = catalogue_with(library)
-    if out is not None:
-        check_table(out)
     loaded = load_model(model, library=catalogue)
     is_study = trial.is_dir() or trial.suffix.lower() == ".toml"
     _refuse_ignored(is_study, setting=setting, columns_of=columns_of, trials=trials, exclude=exclude)
@@ -85,6 +83,7 @@ def predict(
     outputs = Outputs("predict", force)
     if out is not None and out != STANDARD:
         outputs.check_file(out)
+        check_table(out)
     schema = loaded.rig.described()
     with _by_option(pairs("--set", setting)):
         odd = check_study(ToPredict(measured, schema, loaded.rig.constants, trial), loaded)
