@@ -73,8 +73,6 @@ def predict(
     from fes_pin.models.store import load_model
 
     catalogue = catalogue_with(library)
-    if out is not None:
-        check_table(out)
     loaded = load_model(model, library=catalogue)
     is_study = trial.is_dir() or trial.suffix.lower() == ".toml"
     _refuse_ignored(is_study, setting=setting, columns_of=columns_of, trials=trials, exclude=exclude)
@@ -85,6 +83,7 @@ def predict(
     outputs = Outputs("predict", force)
     if out is not None and out != STANDARD:
         outputs.check_file(out)
+        check_table(out)
     schema = loaded.rig.described()
     with _by_option(pairs("--set", setting)):
         odd = check_study(ToPredict(measured, schema, loaded.rig.constants, trial), loaded)
@@ -181,14 +180,12 @@ def _along(path: Path, model: Model, trial: Trial, horizon_s: float) -> Trial:
 
 
 def _errors(path: Path, measured: Sequence[Trial], found: Sequence[Trial], horizon_s: float | None) -> list[str]:
-    """E of each trial whose outputs were measured, and of all of them, in words."""
+    """E of each trial whose outputs were measured, and of all of them, in words; SI units of a model without noise."""
     from fes_pin.diagnosis.replay import squares_of
     from fes_pin.identify.stored import load_random
     from fes_pin.infer.held_out import percent_of_spread
 
-    random = load_random(path)
-    noise = random if isinstance(random, dict) else {}
-    squares = {}
+    noise, squares = load_random(path) or {}, {}
     for one, predicted in zip(measured, found, strict=True):
         if names := [n for n in predicted.columns if n in one]:
             squares[one.name] = squares_of(one, predicted, names, noise)

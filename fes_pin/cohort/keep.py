@@ -9,7 +9,7 @@ from fes_pin.cohort.one import Answer, Work
 from fes_pin.data.outputs import Outputs
 
 STATE = "state.json"
-"""Files next to each answer: the key of what it depends on, and the error if there was one."""
+"""Files next to each answer: the key of what it depends on, its files, and the error if there was one."""
 
 
 @dataclass(frozen=True)
@@ -32,13 +32,15 @@ class Store:
         return self.folder / "studies" / name
 
     def has(self, work: Work, key: str) -> bool:
-        """Return whether a valid answer exists: of the same files, versions, seed, limit and library."""
-        state = self._read(self.place(work.name) / STATE)
-        return state.get("key") == key and not state.get("again", False)
+        """Return whether a valid answer exists: of the same files, versions, seed, limit and library, and whole."""
+        place = self.place(work.name)
+        state = self._read(place / STATE)
+        is_whole = all((place / name).is_file() for name in state.get("files", ()))
+        return is_whole and state.get("key") == key and not state.get("again", False)
 
     def put(self, answer: Answer) -> None:
         """Keep an answer: all of its files, or none."""
-        state = {"key": answer.key, "error": answer.error, "again": answer.again}
+        state = {"key": answer.key, "files": sorted(answer.files), "error": answer.error, "again": answer.again}
         files = {**answer.files, STATE: json.dumps(state) + "\n"}
         place = self.place(answer.name)
         old = {p.name for p in place.iterdir() if p.is_file()} if place.is_dir() else set()

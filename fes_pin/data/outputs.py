@@ -4,7 +4,7 @@ import fcntl
 import hashlib
 import json
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -105,6 +105,23 @@ class Outputs:
     def _note(self, content: str | bytes) -> str:
         """What the record says of a file with this content."""
         return f"{self.command} {hashlib.sha256(content.encode() if isinstance(content, str) else content).hexdigest()}"
+
+
+def check_ending(path: str | Path, endings: Sequence[str]) -> None:
+    """Refuse a name that ends as a file of another kind than what is written; one without an ending may be a pipe.
+
+    Parameters
+    ----------
+    endings
+        Of what can be written: ".csv" ...
+
+    Raises
+    ------
+    InputError
+        Another ending.
+    """
+    if (found := Path(path).suffix) and found.lower() not in endings:
+        raise InputError(f"expected a name that ends in {' or '.join(endings)}, found {found}", file=path)
 
 
 def _place(path: str | Path) -> Path | None:

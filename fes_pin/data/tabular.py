@@ -1,4 +1,4 @@
-"""Tables out: Parquet by the suffix of the file, where pyarrow is installed; else CSV."""
+"""Tables out: CSV, or Parquet by the suffix of the file, where pyarrow is installed."""
 
 import csv
 import io
@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from fes_pin.data.libraries import optional_library
+from fes_pin.data.outputs import check_ending
 
 SUFFIXES = (".csv", ".parquet")
 
@@ -20,8 +21,9 @@ def check_table(path: str | Path) -> None:
     Raises
     ------
     InputError
-        Parquet without pyarrow.
+        A suffix that is none of `SUFFIXES`; Parquet without pyarrow.
     """
+    check_ending(path, SUFFIXES)
     if Path(path).suffix.lower() == ".parquet":
         optional_library("pyarrow.parquet", "parquet", "Parquet needs pyarrow", file=path)
 

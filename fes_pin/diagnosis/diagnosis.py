@@ -41,6 +41,12 @@ from fes_pin.workers import Progress, attempted, noting_stops, one_thread_each, 
 LOOKED = 0.1
 """Share of a limit of time that the checks of the fitted nominal model may take in addition."""
 
+UNCHECKED = (
+    "the limit of time ended the check for trials that are shifted in time and efforts of the opposite sign, which "
+    "fes-pin check makes"
+)
+"""Warning of a diagnosis whose limit of time ended that check."""
+
 
 def diagnose_joint(
     study: Study,
@@ -83,8 +89,9 @@ def diagnose_joint(
     catalogue, made = catalogue_of(library), provenance_now(study, seed)
     measured = measured_study(study)
     warnings = [*measured.warnings, *check_study(measured.study, nominal_model(measured.study))]
-    with time_limit(math.inf if limit is None else LOOKED * limit):
+    with time_limit(math.inf if limit is None else LOOKED * limit), noting_stops() as unchecked:
         warnings += given_away(measured.study)
+    warnings += [UNCHECKED] * bool(unchecked)
     with one_thread_each(), noting_stops() as stops:
         work = _Work(catalogue, seed, tell, math.inf if limit is None else time.perf_counter() + limit, stops)
         diagnosis = work.diagnosis_of_log(measured.study)

@@ -83,7 +83,7 @@ def testable_causes(study: Study, catalogue: Catalogue | None = None) -> Testabl
             library = Library(nominal, trials, effects)
             white = replace(first_guess(nominal, trials), std={}, time={})
             scores = library.scores(at_noise(fitted, white))
-            warnings = _given_away(nominal, trials, fitted)
+            warnings = [*_reversed(nominal, trials, fitted), *_shifted(nominal, trials, fitted)]
         except (ArithmeticError, np.linalg.LinAlgError) as problem:
             return f"the nominal model cannot be fitted ({problem})"
     kept = {n: max(one.kept for one in many) for n, many in best_by_effect(scores.scored).items()}
@@ -98,24 +98,23 @@ def testable_causes(study: Study, catalogue: Catalogue | None = None) -> Testabl
 
 
 def given_away(study: Study) -> list[str]:
-    """Return warnings about a study from a fit of its nominal model, as in `Testable`; none where time is over.
+    """Return warnings about a study from a fit of its nominal model, as in `Testable`; those found before time is over.
 
     There are none for a rig in closed loop: its diagnosis estimates the delay of efforts by the likelihood.
     """
     nominal, trials = _to_fit(study)
     if is_fed_back(nominal.rig, trials):
         return []
+    found: list[str] = []
 
-    def of_fit() -> list[str]:
+    def look() -> None:
         fitted = rough_fit(nominal, trials)
-        return _given_away(nominal, trials, fitted) if math.isfinite(fitted.sse) else []
+        for check in (_reversed, _shifted) if math.isfinite(fitted.sse) else ():
+            found.extend(check(nominal, trials, fitted))
 
     with one_thread_each():
-        return attempted(of_fit, [])
-
-
-def _given_away(model: Model, trials: Sequence[Trial], fitted: Fit) -> list[str]:
-    return [*_reversed(model, trials, fitted), *_shifted(model, trials, fitted)]
+        attempted(look, None)
+    return found
 
 
 def _to_fit(study: Study) -> tuple[Model, Sequence[Trial]]:

@@ -225,6 +225,31 @@ def test_what_a_diagnosis_wrote_it_replaces_and_takes_away(stopped, sandbox, mon
     assert set(json.loads((sandbox / "answer" / RECORD).read_text())) == set(os.listdir("answer")) - {RECORD}
 
 
+ENDINGS = {  # words, the option, an ending that is not written, those that are
+    "predict": (("predict", "model.toml", "study"), "--out", ".xlsx", ".csv or .parquet"),
+    "pulses": (("pulses", "pulses.csv", *PULSES), "--out", ".xlsx", ".csv or .parquet"),
+    "urdf": (("urdf", "model.toml", "study/rig.urdf"), "--out", ".csv", ".urdf or .xml"),
+    "body view": (("body", "view"), "--out", ".PDF", ".html or .htm"),
+    "body nerves": (("body", "nerves", "femoral"), "--map", ".xlsx", "png"),
+}
+
+
+@pytest.mark.parametrize("force", [(), ("--force",)], ids=["", "forced"])
+@pytest.mark.parametrize("name", ENDINGS)
+def test_an_ending_that_is_not_written_is_refused(sandbox, monkeypatch, capsys, name, force):
+    """A CSV file was written under the name of a spreadsheet, which no spreadsheet opens."""
+    words, option, ending, written = ENDINGS[name]
+    before = hashes(sandbox)
+    line = fails(monkeypatch, capsys, *words, option, f"new{ending}", *force)
+    assert line.startswith(f"fes-pin: new{ending}: expected a name that ends in ") and written in line
+    assert hashes(sandbox) == before
+
+
+def test_a_file_without_an_ending_is_csv(sandbox, monkeypatch):
+    assert run(monkeypatch, "pulses", "pulses.csv", *PULSES, "--out", "new") == 0
+    assert (sandbox / "new").read_text().startswith("time_s,")
+
+
 @pytest.mark.parametrize("change", ["changed", "of another command", "of nobody"])
 def test_what_is_not_as_this_command_wrote_it_needs_force(stopped, sandbox, monkeypatch, capsys, change):
     if change == "of nobody":
@@ -236,9 +261,7 @@ def test_what_is_not_as_this_command_wrote_it_needs_force(stopped, sandbox, monk
         (sandbox / "answer/model.toml").write_text((sandbox / "answer/model.toml").read_text() + "# mine\n")
         says = "was changed since fes-pin diagnose wrote it"
     else:
-        words = ("predict", "model.toml", "study/a.csv", "--out")
-        (sandbox / "answer").mkdir()
-        assert run(monkeypatch, *words, "answer/model.toml") == 0
+        Outputs("predict").write("answer", {"model.toml": "1"})
         says = "fes-pin predict wrote it"
     before = hashes(sandbox)
     capsys.readouterr()

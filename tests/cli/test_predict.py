@@ -3,12 +3,13 @@
 import csv
 import io
 import sys
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from cli.test_own import fails, run
-from diagnosis.hidden import study_of
+from diagnosis.hidden import slide, study_of
 
 from fes_pin.data.study import read_study, write_study
 from fes_pin.data.tabular import table_bytes
@@ -17,7 +18,7 @@ from fes_pin.diagnosis.replay import squares_of
 from fes_pin.infer.held_out import percent_of_spread
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.predict import predict
-from fes_pin.models.store import save_model
+from fes_pin.models.store import model_toml, save_model
 
 
 @pytest.fixture(scope="module")
@@ -51,6 +52,35 @@ def test_all_trials_of_a_study_are_predicted_under_their_own_conditions(made, mo
                 assert np.allclose(rows[f"{name}_residual"], trial[name] - values, rtol=0, atol=1e-12)
                 error = percent_of_spread(*squares_of(trial, predicted, [name], {}))
             assert line == f"{trial.name}: E {error:.3g} %"
+
+
+def test_the_error_of_all_trials_pools_their_squares_in_units_of_the_noise(monkeypatch, capsys, tmp_path):
+    """A position read to a nanometre beside a velocity in m/s: without units of noise the position counts nothing."""
+    study, std = slide(3, {}, trials=2), {"position": 1e-9, "velocity": 1e-2}
+    good, bad = study.trials
+    bad = bad.with_columns(position=bad["position"] * np.linspace(1.0, 3.0, len(bad)))
+    study = replace(study, trials=(good, bad), start={"inertia_scale": 1.1, "damping": 0.8})  # as it was simulated
+    write_study(study, tmp_path / "study")
+    study = read_study(tmp_path / "study")
+    model = nominal_model(study)
+    (tmp_path / "model.toml").write_text(model_toml(model, {"random": {"white": std, "std": {}, "time": {}}}))
+
+    sums = {}
+    for trial in study.trials:
+        missed, around = np.zeros(2)
+        predicted = predict(model, trial)
+        for name, unit in std.items():
+            missed += np.sum(((trial[name] - predicted[name]) / unit) ** 2)
+            around += np.sum(((trial[name] - np.mean(trial[name])) / unit) ** 2)
+        sums[trial.name] = missed, around
+    expected = [f"{name}: E {100 * missed / around:.3g} %" for name, (missed, around) in sums.items()]
+    missed, around = np.sum(list(sums.values()), axis=0)
+    expected.append(f"all trials: E {100 * missed / around:.3g} %")
+
+    assert run(monkeypatch, "predict", tmp_path / "model.toml", tmp_path / "study") == 0
+    assert capsys.readouterr().out.splitlines() == expected
+    each = [100 * m / a for m, a in sums.values()]
+    assert max(each) > 10 * min(each)
 
 
 def test_trials_are_chosen_and_excluded_by_name_and_pattern(made, monkeypatch, capsys):

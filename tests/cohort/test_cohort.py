@@ -78,6 +78,18 @@ def test_a_cohort_goes_on_where_it_was(tmp_path):
     assert calls(places)["bad"] == before["bad"] + 1  # another seed is another question
 
 
+@pytest.mark.parametrize("gone", ["report.html", "diagnosis.json"])
+def test_an_answer_that_lacks_a_file_is_made_again_and_no_other(tmp_path, gone):
+    """The page of the cohort linked a report that was not there."""
+    places, out = studies(tmp_path / "in", ["bad", "f1", "f2"]), tmp_path / "out"
+    first = run_cohort([places], out, run=quick)
+    before = calls(places)
+    (out / "studies/f1" / gone).unlink()
+    again = run_cohort([places], out, run=quick)
+    assert (out / "studies/f1" / gone).is_file() and again.studies == first.studies
+    assert {n: k - before[n] for n, k in calls(places).items()} == {"bad": 0, "f1": 1, "f2": 0}
+
+
 def test_parquet_says_what_the_csv_says(tmp_path):
     parquet = pytest.importorskip("pyarrow.parquet")
     run_cohort([studies(tmp_path / "in", ["bad", "f1", "f2"])], tmp_path / "out", run=quick)

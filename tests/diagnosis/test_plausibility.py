@@ -13,12 +13,12 @@ from diagnosis.hidden import study_of as made
 from fes_pin.data.errors import InputError
 from fes_pin.data.plausibility import ToPredict
 from fes_pin.diagnosis.checked import check
-from fes_pin.diagnosis.diagnosis import diagnose_joint
+from fes_pin.diagnosis.diagnosis import UNCHECKED, diagnose_joint
 from fes_pin.diagnosis.plausibility import check_study
 from fes_pin.diagnosis.testable import given_away
 from fes_pin.models.nominal import nominal_model
 from fes_pin.view.report import report_html
-from fes_pin.workers import time_limit
+from fes_pin.workers import OutOfTime, time_limit
 
 OUTPUTS = ("angle_rad", "force_n", "position", "velocity")
 INPUTS = ("pulse_width_us", "stim", "effort")
@@ -243,3 +243,23 @@ def test_a_limit_of_time_ends_what_a_fit_gives_away():
     with time_limit(-1.0):
         assert given_away(study) == []
     assert not any("answers" in words for words in diagnose_joint(study, limit=0.0).warnings)
+
+
+def test_a_check_that_a_limit_of_time_ended_is_said():
+    study = shifted(replace(study_of("muscle"), trials=study_of("muscle").trials[:4]))
+    assert UNCHECKED in diagnose_joint(study, limit=0.0).warnings
+    whole = diagnose_joint(study, limit=1e3).warnings
+    assert UNCHECKED not in whole and any("is it shifted in time?" in words for words in whole)
+
+
+def test_what_was_found_before_a_limit_of_time_stays(monkeypatch):
+    """Efforts of the opposite sign were found, then the time ended: nothing was said."""
+    study = study_of("joint")
+    turned = tuple(t.with_columns(effort=-t["effort"]) for t in study.trials)
+
+    def out_of_time(*_):
+        raise OutOfTime
+
+    monkeypatch.setattr("fes_pin.diagnosis.testable._shifted", out_of_time)
+    (found,) = given_away(replace(study, trials=turned))
+    assert "with the opposite sign of the effort" in found
