@@ -15,8 +15,8 @@ from harness import page
 from harness.compare import compared
 from harness.generator import GENERATORS, Item, generator_of
 from harness.row import Row
-from harness.run import rows_of, run
-from harness.table import HEAD, counts, lines_of, notes, table, worse, wrong
+from harness.run import REGRESSION, TEN_LINES, rows_of, run
+from harness.table import HEAD, against, counts, families, lines_of, notes, table, totals, worse, wrong
 
 
 def planned(name: str, count: int, seed: int, nulls: bool, only: list[str]) -> list[Item]:
@@ -28,7 +28,8 @@ def planned(name: str, count: int, seed: int, nulls: bool, only: list[str]) -> l
 def shown(rows: list[Row]) -> str:
     """The table of some rows, with notes and every study that was not answered rightly."""
     found = counts(rows)
-    return "\n".join([table(HEAD, lines_of(found)), "", *notes(found), *wrong(rows)])
+    parts = ["", families(rows)] if len({row.part for row in rows}) > 1 else []
+    return "\n".join([table(HEAD, lines_of(found)), *parts, "", *totals(rows), *notes(found), *wrong(rows)])
 
 
 def main(
@@ -44,6 +45,8 @@ def main(
     compare: Annotated[Path | None, typer.Option(help="Another store: both on the same studies.")] = None,
     check: Annotated[bool, typer.Option("--check", help="Exit code 1 if worse than the committed page.")] = False,
     regression: Annotated[bool, typer.Option("--regression", help="The answers of a ten-line regression.")] = False,
+    by_ten_lines: Annotated[bool, typer.Option("--ten-lines", help="Beside a ten-line fit of the motion.")] = False,
+    limit: Annotated[float | None, typer.Option(min=0.0, help="Seconds that the search of a study may take.")] = None,
     onto_page: Annotated[bool, typer.Option("--page", help="Write the counts into docs/accuracy.md.")] = False,
 ) -> None:
     """Hide known causes in studies, and count what the answers make of them."""
@@ -59,9 +62,15 @@ def main(
         rows = (
             [known[i.key] for i in items if i.key in known]
             if stored
-            else run(name, items, file, studies, workers, regression)
+            else run(name, items, file, studies, workers, REGRESSION * regression, limit)
         )
         typer.echo(f"\n{label}\n\n{shown(rows)}")
+        if by_ten_lines:
+            place = store / f"{label}, {TEN_LINES}.jsonl" if store else None
+            others = (
+                list(rows_of(place, None).values()) if stored else run(name, items, place, studies, workers, TEN_LINES)
+            )
+            typer.echo("\n".join([f"\n{label}, {TEN_LINES}\n", *totals(others), "", *against(rows, others)]))
         if compare:
             typer.echo("\n".join(["", *compared(rows, rows_of(compare / f"{label}.jsonl", None))]))
         if check:

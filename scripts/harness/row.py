@@ -34,6 +34,8 @@ class Row:
         Hash of the code that answered.
     error
         Of a study without an answer.
+    unseen
+        Error E of the answer's model on the trial that nobody was shown, percent; None where there is none.
     """
 
     key: str
@@ -49,6 +51,7 @@ class Row:
     errors: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     cpu_s: float = 0.0
     error: str | None = None
+    unseen: float | None = None
 
     @classmethod
     def of(cls, stored: Mapping[str, Any]) -> Row:
