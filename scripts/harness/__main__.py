@@ -11,7 +11,7 @@ import typer
 
 import fes_pin as fp
 from fes_pin.data.sources import code_hash
-from harness import page
+from harness import page, varied
 from harness.compare import compared
 from harness.generator import GENERATORS, Item, generator_of
 from harness.row import Row
@@ -33,7 +33,9 @@ def shown(rows: list[Row]) -> str:
 
 
 def main(
-    generators: Annotated[list[str], typer.Argument(help=f"{', '.join(GENERATORS)}; or folders of studies.")],
+    generators: Annotated[
+        list[str], typer.Argument(help=f"{', '.join((*GENERATORS, *varied.KINDS))}; or folders of studies.")
+    ],
     count: Annotated[int, typer.Option(help="Studies of each generator.")] = 40,
     seed: Annotated[int, typer.Option(help="Of the first; each next one has the next seed.")] = 0,
     nulls: Annotated[bool, typer.Option("--nulls", help="Only studies that hide nothing.")] = False,
@@ -47,14 +49,24 @@ def main(
     regression: Annotated[bool, typer.Option("--regression", help="The answers of a ten-line regression.")] = False,
     by_ten_lines: Annotated[bool, typer.Option("--ten-lines", help="Beside a ten-line fit of the motion.")] = False,
     limit: Annotated[float | None, typer.Option(min=0.0, help="Seconds that the search of a study may take.")] = None,
+    draws: Annotated[int, typer.Option(min=2, help="Of `starts`: starts of each study.")] = varied.DRAWS,
     onto_page: Annotated[bool, typer.Option("--page", help="Write the counts into docs/accuracy.md.")] = False,
 ) -> None:
     """Hide known causes in studies, and count what the answers make of them."""
     typer.echo(f"fes_pin of {Path(fp.__file__).parent}, code {code_hash()[:12]}")
-    if unknown := [name for name in generators if name not in GENERATORS and not Path(name, "answers").is_dir()]:
+    known_names = {*GENERATORS, *varied.KINDS}
+    if unknown := [name for name in generators if name not in known_names and not Path(name, "answers").is_dir()]:
         raise typer.BadParameter(f"{', '.join(unknown)}: neither a generator nor a folder of studies and `answers`")
     bad = False
     for name in generators:
+        if name in varied.KINDS:
+            plan, place = (
+                varied.planned(name, count, seed, only or [], draws),
+                store / f"{name}.jsonl" if store else None,
+            )
+            answers = varied.run(name, plan, place, workers, limit, stored)
+            typer.echo(f"\n{name}\n\n{varied.shown(name, plan, answers)}")
+            continue
         items = planned(name, count, seed, nulls, only or [])
         label = Path(name).name + page.BY_REGRESSION * regression
         file = store / f"{label}.jsonl" if store else None

@@ -41,12 +41,11 @@ class Large:
             turn, place = divmod(k, len(FAMILIES))
             family = FAMILIES[place]
             causes, null = CAUSES[family], (turn + place) % NULLS == NULLS - 1
-            trials = 1 if family != "twitches" and np.random.default_rng([k, 83]).random() < 0.5 else MANY
-            part = WORDS[family] + (
-                "" if family == "twitches" else f", {'one trial' if trials == 1 else 'three trials'}"
-            )
+            alone = family != "twitches" and (turn + turn // NULLS + place // 2) % 2 == 0
+            trials = 1 if alone else MANY
+            many = "" if family == "twitches" else f", {'one trial' if alone else 'three trials'}"
             hidden = () if null else causes[(turn + place // 4 * 5 + turn // NULLS) % len(causes)]
-            yield Item(f"{family}_{trials}-{k}", k, hidden, part)
+            yield Item(f"{family}_{trials}-{k}", k, hidden, WORDS[family] + many)
 
     def make(self, item: Item, folder: Path, faster: int = 1) -> tuple[fp.Study, Truth]:
         """Make a study.

@@ -22,7 +22,7 @@ import fes_pin as fp
 from fes_pin.data.sources import code_hash
 from harness import regression as regressions
 from harness import ten_lines
-from harness.generator import Item, Truth, generator_of
+from harness.generator import Generator, Item, Truth, generator_of
 from harness.row import Row, judged
 
 TRUTH = "truth.json"
@@ -44,11 +44,15 @@ def rows_of(file: Path | None, code: str | None) -> dict[str, Row]:
     code
         Hash of the code that made them; None for any.
     """
-    if file is None or not file.exists():
-        return {}
-    lines = file.read_text(encoding="utf-8").splitlines()
-    rows = [Row.of(json.loads(line)) for line in lines]
+    rows = [Row.of(line) for line in lines_of_store(file)]
     return {row.key: row for row in rows if code in (None, row.code)}
+
+
+def lines_of_store(file: Path | None) -> list[dict[str, Any]]:
+    """The lines of a store, read; none of a file that is not there."""
+    if file is None or not file.exists():
+        return []
+    return [json.loads(line) for line in file.read_text(encoding="utf-8").splitlines()]
 
 
 def run(
@@ -75,7 +79,7 @@ def run(
     limit
         Seconds that the search of an answer may take.
     """
-    done = rows_of(store, _code(by, limit))
+    done = rows_of(store, code_of(by, limit))
     todo = [item for item in items if item.key not in done]
     began = time.monotonic()
     one = partial(answered, name, studies=studies, by=by, limit=limit)
@@ -91,7 +95,7 @@ def run(
     return [done[item.key] for item in items]
 
 
-def _code(by: str, limit: float | None) -> str:
+def code_of(by: str, limit: float | None) -> str:
     """Hash of the code that answers, with the limit of time that it had."""
     made = hashlib.sha256(Path(ESTIMATORS[by][1].__file__).read_bytes()).hexdigest() if by else code_hash()
     return made if limit is None or by else f"{made} {limit:g} s"
@@ -134,12 +138,9 @@ def answered(name: str, item: Item, studies: Path | None = None, by: str = "", l
         scratch = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="accuracy")))
         folder = studies / name / item.key if studies else scratch / "study"
         if not (folder / TRUTH).exists():
-            (scratch / "made").mkdir()
-            study, truth = generator.make(item, scratch / "made")
-            fp.write_study(study, folder)
-            (folder / TRUTH).write_text(json.dumps(asdict(truth)), encoding="utf-8")
+            made(generator, item, folder)
         truth = Truth(**json.loads((folder / TRUTH).read_text(encoding="utf-8")))
-        known = {"study": _hashed(folder), "code": _code(by, limit)}
+        known = {"study": _hashed(folder), "code": code_of(by, limit)}
         study = fp.read_study(folder)
         began = time.process_time()
         try:
@@ -151,6 +152,14 @@ def answered(name: str, item: Item, studies: Path | None = None, by: str = "", l
         seconds = time.process_time() - began
         known["unseen"] = unseen_percent(found, truth)
     return judged(item, truth, json.loads(found.to_json()), cpu_s=round(seconds, 2), **known)
+
+
+def made(generator: Generator, item: Item, folder: Path, **more: Any) -> None:
+    """Make a study, and write it and what is true of it into a folder; `more` is what its generator makes it with."""
+    with tempfile.TemporaryDirectory(prefix="accuracy") as scratch:
+        study, truth = generator.make(item, Path(scratch), **more)
+        fp.write_study(study, folder)
+        (folder / TRUTH).write_text(json.dumps(asdict(truth)), encoding="utf-8")
 
 
 def limited(limit: float | None) -> dict[str, float]:
