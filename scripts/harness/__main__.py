@@ -11,12 +11,12 @@ import typer
 
 import fes_pin as fp
 from fes_pin.data.sources import code_hash
-from harness import page
+from harness import page, varied
 from harness.compare import compared
 from harness.generator import GENERATORS, Item, generator_of
 from harness.row import Row
-from harness.run import rows_of, run
-from harness.table import HEAD, counts, lines_of, notes, table, worse, wrong
+from harness.run import REGRESSION, TEN_LINES, rows_of, run
+from harness.table import HEAD, against, counts, families, lines_of, notes, table, totals, worse, wrong
 
 
 def planned(name: str, count: int, seed: int, nulls: bool, only: list[str]) -> list[Item]:
@@ -28,11 +28,14 @@ def planned(name: str, count: int, seed: int, nulls: bool, only: list[str]) -> l
 def shown(rows: list[Row]) -> str:
     """The table of some rows, with notes and every study that was not answered rightly."""
     found = counts(rows)
-    return "\n".join([table(HEAD, lines_of(found)), "", *notes(found), *wrong(rows)])
+    parts = ["", families(rows)] if len({row.part for row in rows}) > 1 else []
+    return "\n".join([table(HEAD, lines_of(found)), *parts, "", *totals(rows), *notes(found), *wrong(rows)])
 
 
 def main(
-    generators: Annotated[list[str], typer.Argument(help=f"{', '.join(GENERATORS)}; or folders of studies.")],
+    generators: Annotated[
+        list[str], typer.Argument(help=f"{', '.join((*GENERATORS, *varied.KINDS))}; or folders of studies.")
+    ],
     count: Annotated[int, typer.Option(help="Studies of each generator.")] = 40,
     seed: Annotated[int, typer.Option(help="Of the first; each next one has the next seed.")] = 0,
     nulls: Annotated[bool, typer.Option("--nulls", help="Only studies that hide nothing.")] = False,
@@ -44,14 +47,26 @@ def main(
     compare: Annotated[Path | None, typer.Option(help="Another store: both on the same studies.")] = None,
     check: Annotated[bool, typer.Option("--check", help="Exit code 1 if worse than the committed page.")] = False,
     regression: Annotated[bool, typer.Option("--regression", help="The answers of a ten-line regression.")] = False,
+    by_ten_lines: Annotated[bool, typer.Option("--ten-lines", help="Beside a ten-line fit of the motion.")] = False,
+    limit: Annotated[float | None, typer.Option(min=0.0, help="Seconds that the search of a study may take.")] = None,
+    draws: Annotated[int, typer.Option(min=2, help="Of `starts`: starts of each study.")] = varied.DRAWS,
     onto_page: Annotated[bool, typer.Option("--page", help="Write the counts into docs/accuracy.md.")] = False,
 ) -> None:
     """Hide known causes in studies, and count what the answers make of them."""
     typer.echo(f"fes_pin of {Path(fp.__file__).parent}, code {code_hash()[:12]}")
-    if unknown := [name for name in generators if name not in GENERATORS and not Path(name, "answers").is_dir()]:
+    known_names = {*GENERATORS, *varied.KINDS}
+    if unknown := [name for name in generators if name not in known_names and not Path(name, "answers").is_dir()]:
         raise typer.BadParameter(f"{', '.join(unknown)}: neither a generator nor a folder of studies and `answers`")
     bad = False
     for name in generators:
+        if name in varied.KINDS:
+            plan, place = (
+                varied.planned(name, count, seed, only or [], draws),
+                store / f"{name}.jsonl" if store else None,
+            )
+            answers = varied.run(name, plan, place, workers, limit, stored)
+            typer.echo(f"\n{name}\n\n{varied.shown(name, plan, answers)}")
+            continue
         items = planned(name, count, seed, nulls, only or [])
         label = Path(name).name + page.BY_REGRESSION * regression
         file = store / f"{label}.jsonl" if store else None
@@ -59,9 +74,15 @@ def main(
         rows = (
             [known[i.key] for i in items if i.key in known]
             if stored
-            else run(name, items, file, studies, workers, regression)
+            else run(name, items, file, studies, workers, REGRESSION * regression, limit)
         )
         typer.echo(f"\n{label}\n\n{shown(rows)}")
+        if by_ten_lines:
+            place = store / f"{label}, {TEN_LINES}.jsonl" if store else None
+            others = (
+                list(rows_of(place, None).values()) if stored else run(name, items, place, studies, workers, TEN_LINES)
+            )
+            typer.echo("\n".join([f"\n{label}, {TEN_LINES}\n", *totals(others), "", *against(rows, others)]))
         if compare:
             typer.echo("\n".join(["", *compared(rows, rows_of(compare / f"{label}.jsonl", None))]))
         if check:

@@ -52,11 +52,15 @@ class Truth:
         Causes that act a little and may be named as well.
     part
         Row of the table, where it is known only after the study was made.
+    unseen
+        A trial that is not in the study, on which the answer's model is judged: `kind`, `dt`, `output`, `columns` and
+        `conditions`, as a `Trial` has them; {} where there is none.
     """
 
     parameters: Mapping[str, float] = field(default_factory=dict)
     beside: tuple[str, ...] = ()
     part: str | None = None
+    unseen: Mapping[str, Any] = field(default_factory=dict)
 
 
 class Generator(Protocol):
@@ -70,8 +74,8 @@ class Generator(Protocol):
         """Make a study and say what is true of it; `folder` is for its files."""
         ...
 
-    def ask(self, study: fp.Study) -> Any:
-        """The answer of the package."""
+    def ask(self, study: fp.Study, **options: Any) -> Any:
+        """The answer of the package; options are those of `fp.diagnose`."""
         ...
 
 
@@ -90,6 +94,7 @@ GENERATORS = {
     "contrast": ("contrast", "Pairs"),
     "halved": ("contrast", "Halved"),
     "misread": ("misread", "Misread"),
+    "large": ("large", "Large"),
     "walking": ("walking", "Walks"),
 }
 """By name: module of this package, class, and what it is made with."""

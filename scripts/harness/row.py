@@ -34,6 +34,8 @@ class Row:
         Hash of the code that answered.
     error
         Of a study without an answer.
+    unseen
+        Error E of the answer's model on the trial that nobody was shown, percent; None where there is none.
     """
 
     key: str
@@ -49,11 +51,12 @@ class Row:
     errors: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     cpu_s: float = 0.0
     error: str | None = None
+    unseen: float | None = None
 
     @classmethod
     def of(cls, stored: Mapping[str, Any]) -> Row:
         """The row that a line of a store holds."""
-        return cls(**{name: _read_only(value) for name, value in stored.items()})
+        return cls(**{name: read_only(value) for name, value in stored.items()})
 
     @property
     def kind(self) -> str:
@@ -94,24 +97,29 @@ class Row:
         return sorted(names[0] for names in self.sets) == sorted(self.hidden)
 
 
-def _read_only(value: Any) -> Any:
+def read_only(value: Any) -> Any:
+    """A value of JSON, its lists as tuples."""
     if isinstance(value, dict):
-        return {name: _read_only(one) for name, one in value.items()}
-    return tuple(_read_only(one) for one in value) if isinstance(value, list) else value
+        return {name: read_only(one) for name, one in value.items()}
+    return tuple(read_only(one) for one in value) if isinstance(value, list) else value
+
+
+def sets_of(record: Mapping[str, Any]) -> tuple[tuple[str, ...], ...]:
+    """Each cause or change that an answer names, with what cannot be told from it."""
+    causes = record["causes"] if "causes" in record else record["changes"]
+    return tuple((c["name"], *c["equivalents"]) for c in causes)
 
 
 def judged(item: Item, truth: Truth, record: Mapping[str, Any], **known: Any) -> Row:
     """An answer, as JSON has it, beside the truth."""
     beside = set(truth.beside) - set(item.hidden)
-    causes = record["causes"] if "causes" in record else record["changes"]
-    sets = [(c["name"], *c["equivalents"]) for c in causes]
     return Row(
         item.key,
         item.hidden,
         truth.part or item.part,
         item.outside,
         verdict=record["verdict"],
-        sets=tuple(names for names in sets if not beside & set(names)),
+        sets=tuple(names for names in sets_of(record) if not beside & set(names)),
         left=bool(record["verdict"] == "unexplained" or record["remainder"]["unexplained"]),
         estimates=tuple(_estimates(truth.parameters, record)),
         errors=dict(_errors(record)),

@@ -4,22 +4,36 @@ from __future__ import annotations
 
 import hashlib
 import json
+import signal
 import sys
 import tempfile
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 import fes_pin as fp
 from fes_pin.data.sources import code_hash
 from harness import regression as regressions
-from harness.generator import Item, Truth, generator_of
+from harness import ten_lines
+from harness.generator import Generator, Item, Truth, generator_of
 from harness.row import Row, judged
 
 TRUTH = "truth.json"
+REGRESSION, TEN_LINES = "regression", "ten lines"
+ESTIMATORS: dict[str, tuple[Callable[[fp.Study], Any], Any]] = {
+    REGRESSION: (regressions.regressed, regressions),
+    TEN_LINES: (ten_lines.solved, ten_lines),
+}
+"""What answers instead of the package, and the module that holds it."""
+GRACE = 3.0
+"""An answer that has not come after so many times its limit, and as many tens of seconds, is an error."""
 
 
 def rows_of(file: Path | None, code: str | None) -> dict[str, Row]:
@@ -30,15 +44,25 @@ def rows_of(file: Path | None, code: str | None) -> dict[str, Row]:
     code
         Hash of the code that made them; None for any.
     """
-    if file is None or not file.exists():
-        return {}
-    lines = file.read_text(encoding="utf-8").splitlines()
-    rows = [Row.of(json.loads(line)) for line in lines]
+    rows = [Row.of(line) for line in lines_of_store(file)]
     return {row.key: row for row in rows if code in (None, row.code)}
 
 
+def lines_of_store(file: Path | None) -> list[dict[str, Any]]:
+    """The lines of a store, read; none of a file that is not there."""
+    if file is None or not file.exists():
+        return []
+    return [json.loads(line) for line in file.read_text(encoding="utf-8").splitlines()]
+
+
 def run(
-    name: str, items: Sequence[Item], store: Path | None, studies: Path | None, workers: int, regression: bool = False
+    name: str,
+    items: Sequence[Item],
+    store: Path | None,
+    studies: Path | None,
+    workers: int,
+    by: str = "",
+    limit: float | None = None,
 ) -> list[Row]:
     """Answers to the studies of a generator, in their order; those that the store has of this code are not made again.
 
@@ -50,13 +74,16 @@ def run(
         File of one line an answer; nothing is stored without.
     studies
         Folder where the studies are kept, and taken from where they are there; by default none is kept.
-    regression
-        The answers are those of `harness.regression` instead of the package's.
+    by
+        One of `ESTIMATORS`, which answers instead of the package.
+    limit
+        Seconds that the search of an answer may take.
     """
-    done = rows_of(store, _code(regression))
+    done = rows_of(store, code_of(by, limit))
     todo = [item for item in items if item.key not in done]
     began = time.monotonic()
-    for count, row in enumerate(_answers(name, todo, studies, workers, regression), 1):
+    one = partial(answered, name, studies=studies, by=by, limit=limit)
+    for count, row in enumerate(each_of(one, todo, workers), 1):
         done[row.key] = row
         if store:
             store.parent.mkdir(parents=True, exist_ok=True)
@@ -68,44 +95,92 @@ def run(
     return [done[item.key] for item in items]
 
 
-def _code(regression: bool) -> str:
-    """Hash of the code that answers."""
-    if not regression:
-        return code_hash()
-    return hashlib.sha256(Path(regressions.__file__).read_bytes()).hexdigest()
+def code_of(by: str, limit: float | None) -> str:
+    """Hash of the code that answers, with the limit of time that it had."""
+    made = hashlib.sha256(Path(ESTIMATORS[by][1].__file__).read_bytes()).hexdigest() if by else code_hash()
+    return made if limit is None or by else f"{made} {limit:g} s"
 
 
-def _answers(name: str, todo: Sequence[Item], studies: Path | None, workers: int, regression: bool) -> Iterable[Row]:
+def each_of(ask: Callable[[Any], Any], items: Sequence[Any], workers: int) -> Iterable[Any]:
+    """What a function makes of each, as they come, in so many processes."""
     if workers < 2:
-        yield from (answered(name, item, studies, regression) for item in todo)
+        yield from map(ask, items)
         return
     with ProcessPoolExecutor(workers) as pool:
-        for one in as_completed([pool.submit(answered, name, item, studies, regression) for item in todo]):
+        for one in as_completed([pool.submit(ask, item) for item in items]):
             yield one.result()
 
 
-def answered(name: str, item: Item, studies: Path | None = None, regression: bool = False) -> Row:
+@contextmanager
+def ended_after(limit: float | None) -> Iterator[None]:
+    """Raise `TimeoutError` where work does not end by itself; see `GRACE`. Nothing is limited without a limit."""
+    if limit is None:
+        yield
+        return
+    seconds = GRACE * (limit + 10.0)
+
+    def end(*_: Any) -> None:
+        raise TimeoutError(f"no answer after {seconds:g} s")
+
+    before = signal.signal(signal.SIGALRM, end)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def answered(name: str, item: Item, studies: Path | None = None, by: str = "", limit: float | None = None) -> Row:
     """Make a study, or read it where it was made before, ask for its answer, and judge that."""
     generator = generator_of(name)
     with ExitStack() as stack:
         scratch = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="accuracy")))
         folder = studies / name / item.key if studies else scratch / "study"
         if not (folder / TRUTH).exists():
-            (scratch / "made").mkdir()
-            study, truth = generator.make(item, scratch / "made")
-            fp.write_study(study, folder)
-            (folder / TRUTH).write_text(json.dumps(asdict(truth)), encoding="utf-8")
+            made(generator, item, folder)
         truth = Truth(**json.loads((folder / TRUTH).read_text(encoding="utf-8")))
-        known = {"study": _hashed(folder), "code": _code(regression)}
+        known = {"study": _hashed(folder), "code": code_of(by, limit)}
         study = fp.read_study(folder)
         began = time.process_time()
         try:
-            found = regressions.regressed(study) if regression else generator.ask(study)
+            with ended_after(limit):
+                found = ESTIMATORS[by][0](study) if by else generator.ask(study, **limited(limit))
         except Exception as error:
             said = f"{type(error).__name__}: {error}"
             return Row(item.key, item.hidden, truth.part or item.part, item.outside, error=said, **known)
         seconds = time.process_time() - began
+        known["unseen"] = unseen_percent(found, truth)
     return judged(item, truth, json.loads(found.to_json()), cpu_s=round(seconds, 2), **known)
+
+
+def made(generator: Generator, item: Item, folder: Path, **more: Any) -> None:
+    """Make a study, and write it and what is true of it into a folder; `more` is what its generator makes it with."""
+    with tempfile.TemporaryDirectory(prefix="accuracy") as scratch:
+        study, truth = generator.make(item, Path(scratch), **more)
+        fp.write_study(study, folder)
+        (folder / TRUTH).write_text(json.dumps(asdict(truth)), encoding="utf-8")
+
+
+def limited(limit: float | None) -> dict[str, float]:
+    """The option of an answer that may take so long."""
+    return {} if limit is None else {"limit": limit}
+
+
+def unseen_percent(found: Any, truth: Truth) -> float | None:
+    """E of an answer's model on the trial that nobody was shown, percent; infinite where it predicts no number."""
+    if not (one := truth.unseen) or not (hasattr(found, "model") or hasattr(found, "predicted")):
+        return None
+    columns = {n: np.array(v) for n, v in one["columns"].items()}
+    measured = columns[one["output"]]
+    trial = fp.Trial("unseen", one["kind"], columns, np.arange(len(measured)) * one["dt"], one["conditions"])
+    try:
+        own = hasattr(found, "predicted")
+        predicted = found.predicted(trial) if own else fp.predict(found.model, trial)[one["output"]]
+    except (ValueError, ArithmeticError):
+        return float("inf")
+    squares = np.sum((measured - predicted) ** 2) / np.sum((measured - measured.mean()) ** 2)
+    return float(100.0 * squares) if np.isfinite(squares) else float("inf")
 
 
 def _hashed(folder: Path) -> str:

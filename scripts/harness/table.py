@@ -15,6 +15,10 @@ HEAD = ("hidden", "right", "named first", "alone", "further names", "something l
 CONFIDENCE_95 = norm.ppf(0.975)
 WORSE = 0.01
 """Level at which counts are worse than those of another run."""
+WORSE_ERROR = 1.02
+"""An error of prediction is worse than another that is so many times smaller."""
+LEAST_PERCENT = 1e-3
+"""Errors E below that are alike, percent: what remains is rounding."""
 
 Counts = Mapping[str, Any]
 """What a run of a generator amounts to, as plain values for JSON; see `counts`."""
@@ -128,3 +132,61 @@ def worse(now: Counts, before: Counts) -> list[str]:
         if fisher_exact([[right, count - right], [good, many - good]], "less").pvalue < WORSE:
             out.append(f"{name}: {interval(right, count)}, before {interval(good, many)}")
     return sorted(out)
+
+
+def totals(rows: Sequence[Row]) -> list[str]:
+    """What a run amounts to in a few lines: see `family`."""
+    words = ("first set right", "exactly right", "nulls named", "ended in an error", "stopped by a limit")
+    return [f"{word}: {share}" for word, share in zip(words, family(rows)[1:], strict=True) if share]
+
+
+def families(rows: Sequence[Row]) -> str:
+    """Table of `totals` of each part of the rows."""
+    parts = sorted({row.part for row in rows})
+    head = ("family", "studies", "first set right", "exactly right", "nulls named", "error", "stopped")
+    return table(head, [[part, *family([row for row in rows if row.part == part])] for part in parts])
+
+
+def family(rows: Sequence[Row]) -> list[str | int]:
+    """Counts of some rows, as text.
+
+    Returns
+    -------
+    list
+        Studies; of those that hide something, in how many the first set is right, and in how many the hidden causes
+        are named and no other; of those that hide nothing, in how many something is named; of all, how many ended in an
+        error or at a limit. An answer that is missing is not right.
+    """
+    hides, nulls = [r for r in rows if r.hidden], [r for r in rows if not r.hidden]
+    good = [r for r in hides if r.error is None and r.right]
+    counted = (
+        (len(good), len(hides)),
+        (sum(r.exact for r in good), len(hides)),
+        (sum(bool(r.sets) for r in nulls if r.error is None), len(nulls)),
+        (sum(r.error is not None for r in rows), len(rows)),
+        (sum(r.verdict == "stopped" for r in rows), len(rows)),
+    )
+    return [len(rows), *(f"{k} of {n}: {100 * k / n:.0f} %" if n else "" for k, n in counted)]
+
+
+def against(ours: Sequence[Row], others: Sequence[Row]) -> list[str]:
+    """Errors of our models on the trials that nobody was shown beside those of others, lines of text.
+
+    Errors below `LEAST_PERCENT` are taken for it. A study without our answer counts as worse.
+    """
+    theirs = {row.key: row.unseen for row in others if row.unseen is not None}
+    pairs = [(row, _percent(row.unseen), max(theirs[row.key], LEAST_PERCENT)) for row in ours if row.key in theirs]
+    if not pairs:
+        return ["no trial that nobody was shown"]
+    odd = [(row, a, b) for row, a, b in pairs if a > WORSE_ERROR * b]
+    lines = [
+        f"E on a trial that nobody was shown, ours over that of ten lines, of {len(pairs)} studies: median "
+        f"{median(a / b for _, a, b in pairs):.3g}, smallest {min(a / b for _, a, b in pairs):.2g}, largest "
+        f"{max(a / b for _, a, b in pairs):.2g}",
+        f"ours is worse by more than 2 %: {interval(len(odd), len(pairs))}",
+    ]
+    return [*lines, *(f"  {one_line(row)}: E {a:.3g} %, ten lines {b:.3g} %" for row, a, b in odd)]
+
+
+def _percent(unseen: float | None) -> float:
+    return float("inf") if unseen is None else max(unseen, LEAST_PERCENT)

@@ -1,0 +1,1 @@
+"""Rigs whose hidden causes are large and whose start values are far off, by scipy's integrators."""
