@@ -18,7 +18,6 @@ from fes_pin.diagnosis.search.starts import STARTED, STARTS, at_null, from_afar,
 from fes_pin.identify.afar import followed, following, freed, is_far, misfit_percent, with_beliefs
 from fes_pin.identify.ahead import default_horizon
 from fes_pin.identify.correlation_time import with_new_noise
-from fes_pin.identify.fit import GROSS
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit, at_noise, fit_of, maximise, maximum_from
 from fes_pin.identify.process_noise import first_guess, stilled, without_memory
@@ -347,29 +346,6 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
     def under_noise_of(self, other: LikelihoodFit, fits: Sequence[LikelihoodFit]) -> list[LikelihoodFit]:
         """Return fits, with their parameters, under the noise of another fit of the same trials."""
         return in_parallel(lambda f: at_noise(f, other.noise), fits)
-
-    def converge_rivals(self, names: Names, name: str) -> None:
-        """See `Sets`; where the set without the cause is a gross misfit, further rivals begin at the set.
-
-        Their first fits began at that misfit, from which a descent may not lead to their optimum. They begin again if
-        they would explain half of what the cause does there.
-        """
-        super().converge_rivals(names, name)
-        rest, whole = tuple(n for n in names if n != name), self.fits[names]
-        if at_noise(self.fits[rest], whole.noise).reduced < GROSS:
-            return
-        half, bare = 0.5 * (self.fits[rest].criterion + whole.criterion), whole.model - name
-        base = at_noise(replace(whole, model=bare, parameters=bare.parameters()), whole.noise)
-        known = {tuple(sorted((*rest, n))): one for n, one in self.candidates(base).items()}
-        enough = STARTED * known[names].gain if names in known else math.inf
-        far = {
-            k: one.start for k, one in known.items() if one.gain > enough and self.fits.get(k, base).criterion > half
-        }
-        begun = self.begin(base, far)
-        for k, fitted in zip(begun, self.converged(list(begun.values())), strict=True):
-            if fitted.criterion < self.fits.get(k, base).criterion:
-                self.fits[k] = fitted
-                self._converged.add(k)
 
     def step_gain(self, fitted: LikelihoodFit) -> float:
         """Return the gain of a further step of a fit by its slope and curvature; 0 where it has converged."""

@@ -27,10 +27,10 @@ SCREEN_ITERATIONS = 4
 
 
 def maximum_from_afar(model: Model, trials: Sequence[Trial], noise: StateSpaceNoise) -> LikelihoodFit:
-    """Return the maximum from the values of a model; after a gross misfit, also from afar.
+    """Return the maximum from the values of a model; after a gross misfit, also from those of a filter.
 
-    Further starts are a filter that follows the trials, and fits to ever longer beginnings of every trial. With process
-    noise no misfit is gross: a filter follows the state even of a wrong model.
+    Where no filter follows the trials, the other start is that of fits to ever longer beginnings of every trial. With
+    process noise no misfit is gross: a filter follows the state even of a wrong model.
     """
     rough = LikelihoodProblem(model, trials, noise)
     plain = maximise(LikelihoodProblem(model, trials, noise))
@@ -41,11 +41,10 @@ def maximum_from_afar(model: Model, trials: Sequence[Trial], noise: StateSpaceNo
         problem = LikelihoodProblem(model.with_parameters(values), trials, noise)
         return maximise(problem, completed(problem.start_unknowns(), unknowns))
 
-    grown = from_beginnings(rough, plain, again)
     if (driven := following(model, trials)) is None:
-        return grown
+        return from_beginnings(rough, plain, again)
     near = followed([model], trials, driven)
-    return min(grown, again(near.values, near.unknowns), key=lambda f: f.sse)
+    return min(plain, again(near.values, near.unknowns), key=lambda f: f.sse)
 
 
 def process_noises(calm: LikelihoodFit, scales: Sequence[float]) -> list[StateSpaceNoise]:
