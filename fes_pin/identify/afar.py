@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood import LikelihoodProblem
@@ -19,7 +20,7 @@ from fes_pin.identify.likelihood_fit import LikelihoodFit, maximise
 from fes_pin.identify.problem import Problem
 from fes_pin.identify.process_noise import first_guess
 from fes_pin.infer.held_out import percent_of_spread
-from fes_pin.infer.levels import CONFIDENCE_95, RUNAWAY, SMALL_PERCENT
+from fes_pin.infer.levels import CONFIDENCE_95, FAR_PERCENT, RUNAWAY
 from fes_pin.infer.noise import Noise
 from fes_pin.infer.problem import completed
 from fes_pin.models.model import Model
@@ -48,17 +49,17 @@ def misfit_percent(fitted: Fit) -> float:
 
 
 def is_far(fitted: Fit) -> bool:
-    """Return whether a fit is far from the data: E of its free simulations is more than small."""
-    return misfit_percent(fitted) > SMALL_PERCENT
+    """Return whether a fit is far from the data: E of its free simulations is above `FAR_PERCENT`."""
+    return misfit_percent(fitted) > FAR_PERCENT
 
 
 def following(model: Model, trials: Sequence[Trial]) -> StateSpaceNoise | None:
-    """Return noise with which a filter of the model follows the trials; None where no process noise drives the rig.
+    """Return noise with which a filter of the model follows the trials; None where none can, or none is needed.
 
-    No filter includes a low pass of trials.
+    Process noise must drive the rig. No filter includes a low pass of trials, and an imposed motion is followed anyway.
     """
     guess = first_guess(model, trials)
-    if not guess.std or any(t.low_pass_hz for t in trials):
+    if not guess.std or any(t.low_pass_hz or t.kind == IMPOSED for t in trials):
         return None
     return replace(guess, std={n: FOLLOWING * v for n, v in guess.std.items()})
 

@@ -23,7 +23,7 @@ from fes_pin.identify.likelihood_fit import LikelihoodFit, at_noise, fit_of, max
 from fes_pin.identify.process_noise import first_guess, stilled, without_memory
 from fes_pin.infer.covariance import step_gain
 from fes_pin.infer.fits import Candidate, FittedSets, Names
-from fes_pin.infer.levels import MOST_CAUSES, SMALL_SHARE
+from fes_pin.infer.levels import MOST_CAUSES, SMALL_PERCENT, SMALL_SHARE
 from fes_pin.infer.maximise import ROUNDS
 from fes_pin.infer.optimize import WORTH
 from fes_pin.infer.optimum import minimise
@@ -138,7 +138,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         if () in self.fits:
             return self.fits[()]
         from_rest = all(t.kind != IMPOSED and not self.model.rig.unknowns(t.kind) for t in self.trials)
-        if from_rest or self.judged_s is None:
+        if from_rest or self.judged_s is None or self.noise == WHITE:
             self.fits[()] = self._without_process_noise_first()
         else:
             self.fits[()] = with_new_noise(self.trials, self._nominal)
@@ -147,7 +147,8 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
     def _without_process_noise_first(self) -> LikelihoodFit:
         """Return the nominal fit without process noise, or with it if that improves the penalised likelihood."""
         guess = first_guess(self.model, self.trials)
-        none = stilled(self.model, self.trials, guess) if self.answered else replace(guess, std={}, time={})
+        filtered = self.judged_s is not None
+        none = stilled(self.model, self.trials, guess) if filtered else replace(guess, std={}, time={})
         calm = self.calm.get(()) or maximum_from_afar(self.model, self.trials, none)
         calm = calm if self.noise == WHITE or () in self.calm else self._coloured(calm)
         self._calm = calm.noise
@@ -169,7 +170,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         noise = problem.with_orders(fitted.values, fitted.unknowns)
         return self._maximum(fitted.model, noise, fitted.unknowns)
 
-    def _coloured(self, fitted: LikelihoodFit) -> LikelihoodFit:
+    def _coloured(self, fitted: LikelihoodFit, rounds: int = ROUNDS) -> LikelihoodFit:
         """Return a fit by least squares again with autoregressive noise; where that leads away, with its values kept.
 
         Autoregressive noise takes up any slow error: far from the data its likelihood may be larger where a simulation
@@ -178,7 +179,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         problem = LikelihoodProblem(fitted.model, self.trials, fitted.noise)
         problem.noise = problem.with_orders(fitted.values, fitted.unknowns)
         problem.renew(fitted.values, fitted.unknowns)
-        found = self._maximum(fitted.model, problem.noise, fitted.unknowns)
+        found = self._maximum(fitted.model, problem.noise, fitted.unknowns, rounds)
         if self.is_far(found) and misfit_percent(found) > MORE * misfit_percent(fitted):
             return fit_of(problem, minimise(problem, fitted.values, fitted.unknowns, 0))
         return found
@@ -222,7 +223,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
 
     def is_far(self, fitted: LikelihoodFit) -> bool:
         """Return whether a fit is far from the data (`identify.afar`); never in closed loop, where a filter is used."""
-        if self._following is None:
+        if self.answered:
             return False
         if fitted not in self._far:
             self._far[fitted] = is_far(fitted)
@@ -230,7 +231,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
 
     def scored_in(self, base: LikelihoodFit) -> LikelihoodFit:
         """Return the fit in which causes are scored: the fit itself, or far from the data a filter that follows it."""
-        return self._follow(base) if self.is_far(base) else base
+        return self._follow(base) if self._following is not None and self.is_far(base) else base
 
     def _follow(self, base: LikelihoodFit) -> LikelihoodFit:
         """Return the fit of the same causes by a filter that follows the data."""
@@ -269,7 +270,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         best: Names = ()
         fits = self.fits
         self.nominal()
-        while self.is_far(fits[best]) and len(best) < MOST_CAUSES:
+        while misfit_percent(fits[best]) > SMALL_PERCENT and len(best) < MOST_CAUSES:
             for names in self.near(len(best))[:NEAREST]:
                 self.extend(names, FITTED if names else None)
             larger = [n for n in self.ranked(len(best) + 1) if self.is_possible(fits[n])]
@@ -285,19 +286,21 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         """Return first fits of sets that extend one far from the data: by least squares, begun by a filter."""
         if self.noise != WHITE:
             rough = self.least_squares
+            rough.nominal()
             if base.names not in rough.fits:
                 rough.fits[base.names] = rough._maximum(base.model, rough.fits[()].noise, base.unknowns)
             made = rough.begin(rough.fits[base.names], {k: s for k, s in starts.items() if k not in rough.fits})
             found = {k: rough.fits[k] if k in rough.fits else made[k] for k in starts}
             return dict(zip(found, in_parallel(self._from_least_squares, list(found.values())), strict=True))
-        near = self._follow(base)
 
         def begun(names: Names) -> LikelihoodFit:
             effects = [started(s.effect, s.amplitudes) for s in starts[names]]
             effects += from_afar(effects[0], self.library.measured) if not base.names else []
-            self._followed[names] = first = self._first_followed([near.model + e for e in effects])
-            looks = [self._maximum(first.model, base.noise, first.unknowns)]
-            looks += [look(base.model + e, base) for e in effects]
+            looks = [look(base.model + e, base) for e in effects]
+            if self._following is not None:
+                near = self._follow(base).model
+                self._followed[names] = first = self._first_followed([near + e for e in effects])
+                looks.append(self._maximum(first.model, base.noise, first.unknowns, RESTART_ROUNDS))
             return min(looks, key=lambda f: f.criterion)
 
         return dict(zip(starts, in_parallel(begun, list(starts)), strict=True))
@@ -305,7 +308,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
     def _from_least_squares(self, fitted: LikelihoodFit) -> LikelihoodFit:
         """Return a fit by least squares again with the noise of these fits."""
         if self.noise == MEASUREMENT or not self.fits[()].noise.acting:
-            return self._coloured(fitted)
+            return self._coloured(fitted, RESTART_ROUNDS)
         return self._maximum(fitted.model, self._guess(), fitted.unknowns, RESTART_ROUNDS)
 
     def _first_fits(self, base: LikelihoodFit, starts: Starts, models: Sequence[Model]) -> list[LikelihoodFit]:
