@@ -27,6 +27,8 @@ from fes_pin.diagnosis.held_out import (
 from fes_pin.diagnosis.rejected import is_moved_by_what_is_recorded, no_noise, with_rejected_causes
 from fes_pin.diagnosis.remainder.lack_of_fit import lack_of_fit
 from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodModels, LikelihoodSearch
+from fes_pin.diagnosis.search.possible import is_certain
+from fes_pin.identify.afar import at_a_bound, misfit_percent
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.per_trial import falls
 from fes_pin.infer.levels import FORM_SHARE
@@ -128,6 +130,14 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
     def is_rarely_chosen(self, state: RigState, name: str) -> bool:
         """Return whether most folds choose neither a cause nor one of its equivalents."""
         return not is_chosen(share_of(self.chosen(state), alike_in(state.found, name)))
+
+    def impossible(self, state: RigState) -> list[str]:
+        """Return all causes of a model that is worse than a constant or at a bound, else those of no certain size."""
+        best = state.found.best
+        worse = self.models.judged_s is None and misfit_percent(best) > WHOLE
+        if worse or at_a_bound(best, self.models.model) or not self.models.is_possible(best):
+            return list(state.names)
+        return [e.name for e in best.model.effects if not is_certain(best, e)]
 
     def by_another_estimator(self, state: RigState) -> RigState | None:
         """Return the verdict with white process noise, or by least squares where there is a lack of fit; else None."""

@@ -20,7 +20,7 @@ from fes_pin.identify.likelihood_fit import LikelihoodFit, maximise
 from fes_pin.identify.problem import Problem
 from fes_pin.identify.process_noise import first_guess
 from fes_pin.infer.held_out import percent_of_spread
-from fes_pin.infer.levels import CONFIDENCE_95, FAR_PERCENT, RUNAWAY
+from fes_pin.infer.levels import CONFIDENCE_95, FAR_PERCENT, NOTHING_PERCENT, RUNAWAY
 from fes_pin.infer.noise import Noise
 from fes_pin.infer.problem import completed
 from fes_pin.models.model import Model
@@ -73,18 +73,28 @@ def with_beliefs(fitted: LikelihoodFit, believed: Model) -> LikelihoodFit:
     """Return a fit again with the nominal parameters that the data do not identify held at their believed values.
 
     A parameter is not identified if half its interval is above twice its value and twice its believed value, and the
-    interval holds the latter. Its estimate would depend on where the fit began.
+    interval holds the latter; or if it ended at a bound and E is the same without. Its estimate would depend on where
+    the fit began.
     """
-    known, held = believed.parameters(), {}
+    known, vague, ended = believed.parameters(), set[str](), at_a_bound(fitted, believed)
     for n in set(fitted.free) & set(known):
         value, reach = fitted.values[n], fitted.reach(n)
         if reach > CONFIDENCE_95 * max(abs(value), abs(known[n])) and abs(value - known[n]) < reach:
-            held[n] = known[n]
+            vague.add(n)
+    held = {n: known[n] for n in vague | ended}
     if not held:
         return fitted
     rig = replace(fitted.model.rig, fitted=tuple(n for n in fitted.model.rig.fitted_parameters() if n not in held))
     model = Model(rig, fitted.model.effects).with_parameters(held)
-    return maximise(LikelihoodProblem(model, fitted.trials, fitted.noise), fitted.unknowns)
+    again = maximise(LikelihoodProblem(model, fitted.trials, fitted.noise), fitted.unknowns)
+    if ended and misfit_percent(again) > misfit_percent(fitted) + NOTHING_PERCENT:
+        return fitted
+    return again
+
+
+def at_a_bound(fitted: Fit, believed: Model) -> set[str]:
+    """Return the nominal parameters of a fit that ended at a bound other than 0."""
+    return {n for n in fitted.at_bound if n in believed.parameters() and fitted.values[n] != 0.0}
 
 
 def freed(model: Model, believed: Model) -> Model:

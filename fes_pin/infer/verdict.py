@@ -114,7 +114,7 @@ class Verdict(ABC, Generic[F, M, W]):
     @property
     def claims(self) -> Sequence[Claim[F, M, W]]:
         """The claims in their order."""
-        return self.drop_unsupported, self.settle, self.drop_rarely_chosen, self.switch_estimator
+        return self.drop_unsupported, self.settle, self.drop_rarely_chosen, self.drop_impossible, self.switch_estimator
 
     @abstractmethod
     def weigh(self, found: SearchResult[F]) -> W:
@@ -141,6 +141,10 @@ class Verdict(ABC, Generic[F, M, W]):
     def is_rarely_chosen(self, state: State[F, M, W], name: str) -> bool:
         """Return whether most folds of the data choose a set without a candidate."""
         return False
+
+    def impossible(self, state: State[F, M, W]) -> list[str]:
+        """Return the candidates that no answer may contain: at a bound, or of no more than twice their deviation."""
+        return []
 
     def by_another_estimator(self, state: State[F, M, W]) -> State[F, M, W] | None:
         """Return the verdict of another estimator of the same data; None where there is none."""
@@ -188,6 +192,10 @@ class Verdict(ABC, Generic[F, M, W]):
     def drop_rarely_chosen(self, state: State[F, M, W]) -> State[F, M, W] | None:
         """Reject the weakest of the candidates that most folds of the data do not choose."""
         return self._without_weakest(state, [n for n in state.names if self.is_rarely_chosen(state, n)])
+
+    def drop_impossible(self, state: State[F, M, W]) -> State[F, M, W] | None:
+        """Reject the weakest of the candidates that no answer may contain."""
+        return self._without_weakest(state, self.impossible(state))
 
     def switch_estimator(self, state: State[F, M, W]) -> State[F, M, W] | None:
         """Take the verdict of another estimator of the same data if it predicts materially better; tried once.

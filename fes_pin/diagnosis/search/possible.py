@@ -5,6 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from fes_pin.identify.fit import Fit
+from fes_pin.infer.levels import CONFIDENCE_95
+from fes_pin.models.stage import Effect
 
 
 def is_possible(fitted: Fit, measured: Mapping[str, np.ndarray]) -> bool:
@@ -27,3 +29,10 @@ def is_possible(fitted: Fit, measured: Mapping[str, np.ndarray]) -> bool:
             if 0.0 < abs(size) < smallest.get(n, 0.0):
                 return False
     return True
+
+
+def is_certain(fitted: Fit, effect: Effect) -> bool:
+    """Return whether a size of a cause is twice its deviation from its null; True of one of each trial's own."""
+    names = {n: f"{effect.name}.{n}" for n in effect.amplitudes() if f"{effect.name}.{n}" in fitted.free}
+    away = (abs(getattr(effect, n) - effect.nulls()[n]) / max(fitted.std(path), 1e-300) for n, path in names.items())
+    return not names or any(ratio > CONFIDENCE_95 for ratio in away)
