@@ -207,12 +207,17 @@ def started(study: fp.Study, truth: Truth, rng: np.random.Generator) -> fp.Study
 
 
 def decimated(trial: fp.Trial, every: int) -> fp.Trial:
-    """Every so many samples of a trial; a pulse is in the sample that is kept before it."""
-    columns = {}
+    """Every so many samples of a trial.
+
+    A pulse is in the sample that is kept before it; an effort that moves a joint is the mean of those it was held for.
+    """
+    columns, kept = {}, np.arange(0, len(trial), every)
     for name, values in trial.columns.items():
-        columns[name] = values[::every]
+        columns[name] = values[kept]
         if name == "stim":
-            columns[name] = np.maximum.reduceat(values, np.arange(0, len(values), every))
+            columns[name] = np.maximum.reduceat(values, kept)
+        elif name == "effort" and trial.kind == "motion":
+            columns[name] = np.add.reduceat(values, kept) / np.diff(np.append(kept, len(trial)))
     return replace(trial, columns=columns, time=trial.time[::every])
 
 
