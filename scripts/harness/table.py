@@ -154,15 +154,15 @@ def family(rows: Sequence[Row]) -> list[str | int]:
     -------
     list
         Studies; of those that hide something, in how many the first set is right, and in how many the hidden causes
-        are named and no other; of those that hide nothing, in how many something is named; of all, how many ended in an
-        error or at a limit. An answer that is missing is not right.
+        are named and no other; of answered ones that hide nothing, in how many something is named; of all, how many
+        ended in an error or at a limit. An answer that is missing is not right.
     """
-    hides, nulls = [r for r in rows if r.hidden], [r for r in rows if not r.hidden]
+    hides, nulls = [r for r in rows if r.hidden], [r for r in rows if not r.hidden and r.error is None]
     good = [r for r in hides if r.error is None and r.right]
     counted = (
         (len(good), len(hides)),
         (sum(r.exact for r in good), len(hides)),
-        (sum(bool(r.sets) for r in nulls if r.error is None), len(nulls)),
+        (sum(bool(r.sets) for r in nulls), len(nulls)),
         (sum(r.error is not None for r in rows), len(rows)),
         (sum(r.verdict == "stopped" for r in rows), len(rows)),
     )
