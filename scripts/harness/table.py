@@ -183,7 +183,8 @@ def against(ours: Sequence[Row], others: Sequence[Row]) -> list[str]:
         f"E on a trial that nobody was shown, ours over that of ten lines, of {len(pairs)} studies: median "
         f"{median(a / b for _, a, b in pairs):.3g}, smallest {min(a / b for _, a, b in pairs):.2g}, largest "
         f"{max(a / b for _, a, b in pairs):.2g}",
-        f"ours is worse by more than 2 %: {interval(len(odd), len(pairs))}",
+        f"ours is worse by more than 2 %: {interval(len(odd), len(pairs))}; without our answer: "
+        f"{sum(row.error is not None for row, _, _ in odd)} of these",
     ]
     return [*lines, *(f"  {one_line(row)}: E {a:.3g} %, ten lines {b:.3g} %" for row, a, b in odd)]
 
