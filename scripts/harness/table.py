@@ -8,7 +8,7 @@ from typing import Any
 
 from scipy.stats import binomtest, fisher_exact, norm
 
-from harness.row import KINDS, Row
+from harness.row import KINDS, STOPPED, Row
 
 COLUMNS = ("studies", "right", "first", "alone", "further", "left")
 HEAD = ("hidden", "right", "named first", "alone", "further names", "something left")
@@ -136,7 +136,7 @@ def worse(now: Counts, before: Counts) -> list[str]:
 
 def totals(rows: Sequence[Row]) -> list[str]:
     """What a run amounts to in a few lines: see `family`."""
-    words = ("first set right", "exactly right", "nulls named", "ended in an error", "stopped by a limit")
+    words = ("first set right", "exactly right", "nulls named", "ended in an error", "stopped")
     return [f"{word}: {share}" for word, share in zip(words, family(rows)[1:], strict=True) if share]
 
 
@@ -155,7 +155,7 @@ def family(rows: Sequence[Row]) -> list[str | int]:
     list
         Studies; of those that hide something, in how many the first set is right, and in how many the hidden causes
         are named and no other; of answered ones that hide nothing, in how many something is named; of all, how many
-        ended in an error or at a limit. An answer that is missing is not right.
+        ended in an error or were stopped. An answer that is missing is not right.
     """
     hides, nulls = [r for r in rows if r.hidden], [r for r in rows if not r.hidden and r.error is None]
     good = [r for r in hides if r.error is None and r.right]
@@ -164,7 +164,7 @@ def family(rows: Sequence[Row]) -> list[str | int]:
         (sum(r.exact for r in good), len(hides)),
         (sum(bool(r.sets) for r in nulls), len(nulls)),
         (sum(r.error is not None for r in rows), len(rows)),
-        (sum(r.verdict == "stopped" for r in rows), len(rows)),
+        (sum(r.verdict == STOPPED for r in rows), len(rows)),
     )
     return [len(rows), *(f"{k} of {n}: {100 * k / n:.0f} %" if n else "" for k, n in counted)]
 

@@ -266,7 +266,7 @@ def test_totals_count_what_has_no_answer():
         "exactly right: 1 of 3: 33 %",
         "nulls named: 1 of 2: 50 %",
         "ended in an error: 2 of 6: 33 %",
-        "stopped by a limit: 1 of 6: 17 %",
+        "stopped: 1 of 6: 17 %",
     ]
     assert "| y | 1 | 1 of 1: 100 % | 0 of 1: 0 % |  | 0 of 1: 0 % | 0 of 1: 0 % |" in families(ROWS)
 
