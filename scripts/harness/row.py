@@ -10,6 +10,8 @@ from typing import Any
 from harness.generator import Item, Truth
 
 KINDS = ("nothing", "one", "two", "outside")
+STOPPED = "stopped"
+"""The verdict of a search that a limit ended, or whose fits did not converge."""
 
 
 @dataclass(frozen=True)

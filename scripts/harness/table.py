@@ -8,7 +8,7 @@ from typing import Any
 
 from scipy.stats import binomtest, fisher_exact, norm
 
-from harness.row import KINDS, Row
+from harness.row import KINDS, STOPPED, Row
 
 COLUMNS = ("studies", "right", "first", "alone", "further", "left")
 HEAD = ("hidden", "right", "named first", "alone", "further names", "something left")
@@ -136,7 +136,7 @@ def worse(now: Counts, before: Counts) -> list[str]:
 
 def totals(rows: Sequence[Row]) -> list[str]:
     """What a run amounts to in a few lines: see `family`."""
-    words = ("first set right", "exactly right", "nulls named", "ended in an error", "stopped by a limit")
+    words = ("first set right", "exactly right", "nulls named", "ended in an error", "stopped")
     return [f"{word}: {share}" for word, share in zip(words, family(rows)[1:], strict=True) if share]
 
 
@@ -154,17 +154,17 @@ def family(rows: Sequence[Row]) -> list[str | int]:
     -------
     list
         Studies; of those that hide something, in how many the first set is right, and in how many the hidden causes
-        are named and no other; of those that hide nothing, in how many something is named; of all, how many ended in an
-        error or at a limit. An answer that is missing is not right.
+        are named and no other; of answered ones that hide nothing, in how many something is named; of all, how many
+        ended in an error or were stopped. An answer that is missing is not right.
     """
-    hides, nulls = [r for r in rows if r.hidden], [r for r in rows if not r.hidden]
+    hides, nulls = [r for r in rows if r.hidden], [r for r in rows if not r.hidden and r.error is None]
     good = [r for r in hides if r.error is None and r.right]
     counted = (
         (len(good), len(hides)),
         (sum(r.exact for r in good), len(hides)),
-        (sum(bool(r.sets) for r in nulls if r.error is None), len(nulls)),
+        (sum(bool(r.sets) for r in nulls), len(nulls)),
         (sum(r.error is not None for r in rows), len(rows)),
-        (sum(r.verdict == "stopped" for r in rows), len(rows)),
+        (sum(r.verdict == STOPPED for r in rows), len(rows)),
     )
     return [len(rows), *(f"{k} of {n}: {100 * k / n:.0f} %" if n else "" for k, n in counted)]
 
@@ -183,7 +183,8 @@ def against(ours: Sequence[Row], others: Sequence[Row]) -> list[str]:
         f"E on a trial that nobody was shown, ours over that of ten lines, of {len(pairs)} studies: median "
         f"{median(a / b for _, a, b in pairs):.3g}, smallest {min(a / b for _, a, b in pairs):.2g}, largest "
         f"{max(a / b for _, a, b in pairs):.2g}",
-        f"ours is worse by more than 2 %: {interval(len(odd), len(pairs))}",
+        f"ours is worse by more than 2 %: {interval(len(odd), len(pairs))}; without our answer: "
+        f"{sum(row.error is not None for row, _, _ in odd)} of these",
     ]
     return [*lines, *(f"  {one_line(row)}: E {a:.3g} %, ten lines {b:.3g} %" for row, a, b in odd)]
 

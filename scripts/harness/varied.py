@@ -22,7 +22,7 @@ import numpy as np
 import fes_pin as fp
 from fes_pin.models.rigs import pulse_period
 from harness.generator import Item, Truth, generator_of, shared
-from harness.row import read_only, sets_of
+from harness.row import STOPPED, read_only, sets_of
 from harness.run import TRUTH, code_of, each_of, ended_after, limited, lines_of_store, made
 from harness.table import CONFIDENCE_95, interval
 
@@ -207,12 +207,17 @@ def started(study: fp.Study, truth: Truth, rng: np.random.Generator) -> fp.Study
 
 
 def decimated(trial: fp.Trial, every: int) -> fp.Trial:
-    """Every so many samples of a trial; a pulse is in the sample that is kept before it."""
-    columns = {}
+    """Every so many samples of a trial.
+
+    A pulse is in the sample that is kept before it; an effort that moves a joint is the mean of those it was held for.
+    """
+    columns, kept = {}, np.arange(0, len(trial), every)
     for name, values in trial.columns.items():
-        columns[name] = values[::every]
+        columns[name] = values[kept]
         if name == "stim":
-            columns[name] = np.maximum.reduceat(values, np.arange(0, len(values), every))
+            columns[name] = np.maximum.reduceat(values, kept)
+        elif name == "effort" and trial.kind == "motion":
+            columns[name] = np.add.reduceat(values, kept) / np.diff(np.append(kept, len(trial)))
     return replace(trial, columns=columns, time=trial.time[::every])
 
 
@@ -240,8 +245,8 @@ def _leaves(tree: Mapping[str, Any], name: str) -> Iterator[tuple[str, tuple[flo
 
 
 def is_same(one: Answer, other: Answer) -> bool:
-    """Whether two answers have the same verdict, and sets of which each is named by a cause of the other's."""
-    if (one.verdict, one.error is None, len(one.sets)) != (other.verdict, other.error is None, len(other.sets)):
+    """Whether there are two answers, of the same verdict, and each set is named by a cause of one of the other's."""
+    if one.error or other.error or (one.verdict, len(one.sets)) != (other.verdict, len(other.sets)):
         return False
     left = list(other.sets)
     for names in one.sets:
@@ -288,8 +293,9 @@ def shown(kind: str, plan: Sequence[Sequence[Asked]], answers: Mapping[str, Answ
             f"{words} the verdict is the same: {interval(len(same), len(pairs))}",
             f"  with the same equivalents: {len(alike)}; with values {near}: {len(values)}",
         ]
-    failed = sum(answers[one.key].error is not None for w in whole for one in w)
-    lines.append(f"ended in an error: {failed}")
+    every = [answers[one.key] for ways in whole for one in ways]
+    lines.append(f"answers that ended in an error: {sum(one.error is not None for one in every)}")
+    lines.append(f"answers that were stopped: {sum(one.verdict == STOPPED for one in every)}")
     return "\n".join([*lines, *(line for one in whole for line in _different(kind, one, answers))])
 
 
