@@ -54,7 +54,8 @@ def with_rejected_causes(
     if left.unexplained:
         return left
     if are_large(random):
-        return replace(left, unexplained=True, where="effort")
+        share = max(WHOLE * r.share for r in random)
+        return replace(left, unexplained=True, where="effort", reason=f"a random effort of {share:.2g} % is needed")
     certain = [n for n, r in rejected.items() if r.p_value < CERTAIN_LEVEL and r.share >= FORM_SHARE]
     certain = [n for n in certain if rejected[n].gain.percent > NOTHING_PERCENT]
     if certain:

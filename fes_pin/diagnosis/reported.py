@@ -16,12 +16,14 @@ from fes_pin.diagnosis.rejected import UNMOVED, is_moved_by_what_is_recorded
 from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodSearch
 from fes_pin.diagnosis.verdict import RigState, RigVerdict
+from fes_pin.identify.afar import misfit_percent
 from fes_pin.identify.correlation_time import words_of_reading
 from fes_pin.identify.fit import rough_noise
 from fes_pin.identify.likelihood import is_simulated
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.result import CROSS_VALIDATED, FITTED, HELD_OUT, STOPPED, Cause, Remainder
 from fes_pin.infer.scatter import as_wide_as_estimates_differ, as_wide_as_trials_differ, with_honest_intervals
+from fes_pin.infer.text import percent
 from fes_pin.infer.verdict import share_in, word_of
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
@@ -54,6 +56,10 @@ def diagnosis_of(
     causes = [_cause(verdict, state, one, best, on) for one in best.model.effects]
     causes.sort(key=lambda c: -c.gain_held_out.percent)
     said = words_of_reading(best.noise, best.model.rig, trials[0])
+    if search.models.is_far(found.nominal):
+        far = f"E {percent(misfit_percent(found.nominal))}"
+        said = (*said, f"the nominal model does not follow the data ({far}): causes were fitted from least squares")
+    reached = [e for e in (fitted[1].free, held and held[1].free) if e is not None]
     return Diagnosis(
         study=study,
         verdict=word_of(bool(causes), left),
@@ -64,7 +70,7 @@ def diagnosis_of(
         extended=best,
         nominal_error=(fitted[0].free, held[0].free if held else None),
         extended_error=(fitted[1].free, held[1].free if held else None),
-        ceiling_percent=_ceiling(found.best),
+        ceiling_percent=min([_ceiling(found.best), *reached]),
         next_experiment=experiment(best, found.rivals, causes, study),
         ranking=ranking(best, found.rivals),
         held_out_by=on,

@@ -105,10 +105,12 @@ def _share(
 ) -> np.ndarray:
     """Return the gain in percent of the error above the noise.
 
-    That error is taken as no less than the part which the extension removes, and no less than its own standard
-    deviation, the root of `scatter`: units with hardly any error would otherwise have gains of any size.
+    That error is taken as no less than that of the set which is extended, or the part which the extension removes, and
+    no less than its own standard deviation, the root of `scatter`: units with hardly any error would otherwise have
+    gains of any size.
     """
-    excess = np.maximum(np.maximum(nominal - noise, nominal - extended), np.sqrt(scatter))
+    most = np.maximum(nominal, without)
+    excess = np.maximum(np.maximum(most - noise, most - extended), np.sqrt(scatter))
     return np.asarray(100.0 * (without - extended) / excess)
 
 

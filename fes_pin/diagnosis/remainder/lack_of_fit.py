@@ -56,7 +56,7 @@ def _features_left(fitted: LikelihoodFit) -> tuple[float, str | None]:
     projection = Projection(fitted.parts)
     left = projection(featured.columns)
     before, after = np.linalg.norm(featured.columns, axis=0), np.linalg.norm(left, axis=0)
-    good = np.flatnonzero(after > KEPT * np.where(before > 0, before, 1.0))
+    good = np.flatnonzero((after > KEPT * np.where(before > 0, before, 1.0)) & featured.varies)
     if not len(good):
         return 1.0, None
     left = left[:, good] / after[good]
@@ -93,6 +93,8 @@ class _Featured:
         Whitened sensitivities of the innovations to them, all trials end to end, shape (m, features).
     can_keep
         False where the fit took filter gains as constant to its end.
+    varies
+        False of functions of the motion where nothing moves: these are constants.
     """
 
     def __init__(self, fitted: LikelihoodFit) -> None:
@@ -103,6 +105,9 @@ class _Featured:
         for kind in kinds:
             self._model = self._model + scaled_to(kind(), fitted.model.rig, fitted.trials)
         self.names = [n for kind in kinds for n in kind.functions]
+        rig = fitted.model.rig
+        moves = any("q" in rig.states(t.kind) or rig.schema.motion(t.kind) for t in fitted.trials)
+        self.varies = np.array([moves or n.split(":")[0] not in ("angle", "rate") for n in self.names])
         free = tuple(f"{kind.name}.a{k:02d}" for kind in kinds for k in range(len(kind.functions)))
         self._problem = LikelihoodProblem(self._model, fitted.trials, fitted.noise, free)
         self.can_keep = not self._problem.is_final
