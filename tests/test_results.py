@@ -109,6 +109,20 @@ def test_a_copy_says_the_same(made, kind, copied):
     assert json.loads(other.to_json()) == json.loads(found.to_json())
 
 
+@pytest.mark.parametrize("kind", ["Diagnosis", "Contrast"])
+def test_no_search_pays_for_the_equality_of_fits(kind, tmp_path, request, monkeypatch):
+    """Which asks for their tables, and of a fit at a bound for its profile."""
+
+    def asked(*fits):
+        raise AssertionError("a fit was hashed, or compared with another")
+
+    monkeypatch.setattr(fp.Fit, "__eq__", asked)
+    monkeypatch.setattr(fp.Fit, "__hash__", asked)
+    study = measured(ankle_study(), ("coulomb_friction",))
+    found = fp.diagnose(study) if kind == "Diagnosis" else _contrast(tmp_path, request)
+    assert found.verdict != "stopped"
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_result_that_says_something_else_is_another(made, kind):
     found = made(kind)

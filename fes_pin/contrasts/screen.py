@@ -127,13 +127,13 @@ class Screen:
         self._nominal, self._trials, self._library = nominal, trials, library
         self._effects = [e for e in library.effects if library.felt(e)]
         self._by_group = {g: Library(nominal, own, library.effects) for g, own in trials.items()}
-        self._scores: dict[Grouped, ItemScores] = {}
+        self._scores: dict[int, tuple[Grouped, ItemScores]] = {}
 
     def scores(self, base: Grouped) -> ItemScores:
         """Return the scores of every item that a set does not have."""
-        if base not in self._scores:
-            self._scores[base] = self._scored(base)
-        return self._scores[base]
+        if id(base) not in self._scores:
+            self._scores[id(base)] = base, self._scored(base)
+        return self._scores[id(base)][1]
 
     def _scored(self, base: Grouped) -> ItemScores:
         projection, made = Projection(base.parts), list(self._columns(base))

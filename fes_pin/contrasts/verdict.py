@@ -44,7 +44,7 @@ class ContrastVerdict(Verdict[Grouped, ContrastModels, ContrastWeighed]):
 
     def __init__(self, search: ContrastSearch) -> None:
         super().__init__(search)
-        self._costs: dict[Grouped, float] = {}
+        self._costs: dict[int, tuple[Grouped, float]] = {}
 
     @property
     def claims(self) -> Sequence[Claim[Grouped, ContrastModels, ContrastWeighed]]:
@@ -75,10 +75,10 @@ class ContrastVerdict(Verdict[Grouped, ContrastModels, ContrastWeighed]):
 
     def _cost_of_held(self, one: Grouped, folds: Sequence[Sequence[int]]) -> float:
         """Return twice the negative log-likelihood of folds by fits to the others, with the noise of all trials."""
-        if one not in self._costs:
+        if id(one) not in self._costs:
             parts = [self.search.models.maxima.refitted(one, held) for held in folds]
-            self._costs[one] = sum(_cost(one) - _cost(part) for part in parts)
-        return self._costs[one]
+            self._costs[id(one)] = one, sum(_cost(one) - _cost(part) for part in parts)
+        return self._costs[id(one)][1]
 
 
 def folds_of_groups(trials: Mapping[str, Sequence[Trial]]) -> list[list[int]]:

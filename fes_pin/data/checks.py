@@ -5,6 +5,7 @@ the trial and the sample.
 """
 
 import math
+from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
 from typing import Any
@@ -31,11 +32,14 @@ def checked_mapping(value: Any, error: KeyFault, key: str) -> dict[Any, Any]:
     Raises
     ------
     InputError
-        Made by `error`, for anything else.
+        Made by `error`, for anything else; for a name that is there twice, as of two columns of a frame.
     """
     if not callable(getattr(value, "items", None)):
         raise error(key, f"expected a mapping of names to values, found a {type(value).__name__}")
-    return dict(value.items())
+    pairs = list(value.items())
+    if twice := [name for name, count in Counter(name for name, _ in pairs).items() if count > 1]:
+        raise error(str(twice[0]), "this name is there twice; expected it once")
+    return dict(pairs)
 
 
 def checked_kind(schema: RigSchema, kind: object, error: KeyFault) -> str:

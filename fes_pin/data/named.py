@@ -10,13 +10,22 @@ import numpy as np
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import numbers, shortened
 
+ELEMENTWISE = (np.clip, np.round, np.around)
+"""Functions of numpy that are no ufuncs and whose results keep the names: they compute by ufuncs."""
+
 
 class NamedArray(np.ndarray):
     """Numbers with names along the last axis: an array that also answers by name.
 
     `q["right_knee_flexion"]`, `q[["left_hip_flexion", "right_hip_flexion"]]`, `q.items()`, `dict(q)`. Otherwise it is
-    an array of numpy: it iterates over its numbers and computes as one. Elementwise results keep the names, and so do
-    rows. All else that numpy makes of it (a slice, a matrix product) has none.
+    an array of numpy: it iterates over its numbers and computes as one. Elementwise results keep the names: those of
+    operators and ufuncs, of `np.clip` and `np.round`; so do rows and copies. All else that numpy makes of it (a slice,
+    a sorted array, a matrix product) has none.
+
+    What is taken by name stays as it is when the array changes: a float of an array (n,), of others a copy of the
+    column. `q[name] = ...` writes by name, `q[3:][name] = ...` a part of a column, and `q[name][3:] = ...` writes to
+    the copy alone. What is written by position (`q[0] = ...`, `np.put`, `np.random.shuffle`) stands under the name of
+    that position.
 
     Parameters
     ----------
@@ -84,26 +93,35 @@ class NamedArray(np.ndarray):
 
     def __getitem__(self, key: Any) -> Any:
         found = np.asarray(self)[self._place(key)]
+        if isinstance(key, str):
+            return found.copy() if found.ndim else np.float64(found)
         if isinstance(key, list | tuple) and key and isinstance(key[0], str):
             return NamedArray(found, key)
-        rows = self.ndim > 1 and not isinstance(key, str | tuple)
+        rows = self.ndim > 1 and not isinstance(key, tuple)
         return _named(found, self.names) if rows else found
 
     def __setitem__(self, key: Any, value: Any) -> None:
         super().__setitem__(self._place(key), value)
 
-    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *given: Any, out: Any = None, **options: Any) -> Any:
+    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *given: Any, out: Any = (), **options: Any) -> Any:
         each = ufunc.signature is None and method == "__call__"
-        names = {x.names for x in given if isinstance(x, NamedArray) and x.names is not None}
+        names = {x.names for x in (*given, *out) if isinstance(x, NamedArray) and x.names is not None}
         if each and len(names) > 1:
             one, other = sorted(names)[:2]
             raise InputError(f"arrays of {one[0]}, ... and of {other[0]}, ... do not have the same names in one order")
-        if out is not None:
-            options["out"] = tuple(np.asarray(x) if isinstance(x, NamedArray) else x for x in out)
-        found = getattr(ufunc, method)(*(np.asarray(x) if isinstance(x, NamedArray) else x for x in given), **options)
-        if out is not None:
+        if out:
+            options["out"] = _plain(out)
+        found = getattr(ufunc, method)(*_plain(given), **options)
+        if out:
+            _without_names(() if each else out)
             return out[0] if len(out) == 1 else out
         return _named(found, names.pop()) if each and names else found
+
+    def __array_function__(self, func: Callable[..., Any], types: Any, args: Any, options: Any) -> Any:
+        if func in ELEMENTWISE:
+            return super().__array_function__(func, types, args, options)
+        _without_names([options.get("out")])
+        return func(*_plain(args), **{key: _plain(each) for key, each in options.items()})
 
     def __array_wrap__(self, array: Any, context: Any = None, return_scalar: bool = False) -> Any:
         return np.asarray(array)[()] if return_scalar else np.asarray(array)
@@ -115,6 +133,11 @@ class NamedArray(np.ndarray):
     def sort(self, *given: Any, **options: Any) -> None:
         """Sort in place, which parts numbers from their names: it then has none."""
         super().sort(*given, **options)
+        self.names = None
+
+    def partition(self, *given: Any, **options: Any) -> None:
+        """Partition in place, which parts numbers from their names as well."""
+        super().partition(*given, **options)
         self.names = None
 
     def __copy__(self) -> NamedArray:
@@ -132,6 +155,19 @@ class NamedArray(np.ndarray):
         return f"NamedArray({', '.join(f'{name}={value:.6g}' for name, value in self.items())})"
 
     __str__ = __repr__
+
+
+def _plain(given: Any) -> Any:
+    """What numpy was given, without names: arrays share their numbers."""
+    if type(given) in (list, tuple):
+        return type(given)(map(_plain, given))
+    return np.asarray(given) if isinstance(given, NamedArray) else given
+
+
+def _without_names(written: Iterable[Any]) -> None:
+    for array in written:
+        if isinstance(array, NamedArray):
+            array.names = None
 
 
 def _named(found: Any, names: tuple[str, ...] | None) -> Any:

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 RESULT, TEXT, TABLE = "result", "text", "table"
 """Keys that every saved result has in addition to those of its kind: its kind, its text by lines, its table by
 columns."""
+INDEX = {"Fit": "parameter"}
+"""Column that is the index of the frame, by kind; other results are numbered by row."""
 NEXT_FILE = "next_trial.csv"
 """File of the trial that is proposed."""
 UNCOMPARED = ("wall_s", "provenance")
@@ -48,7 +50,7 @@ class Recorded(ReadOnly):
         return json.dumps([self._kind(), known], sort_keys=True)
 
     def __eq__(self, other: object) -> bool:
-        return self._said() == other._said() if isinstance(other, Recorded) else NotImplemented
+        return self is other or (self._said() == other._said() if isinstance(other, Recorded) else NotImplemented)
 
     def __hash__(self) -> int:
         return hash(self._said())
@@ -68,12 +70,14 @@ class Saveable(Recorded):
     def to_frame(self) -> pandas.DataFrame:
         """The result as a frame of pandas: a row a parameter of each cause or change, a model, or a study.
 
+        The parameters of a fit are its index.
+
         Raises
         ------
         InputError
             pandas is not installed.
         """
-        return frame(self.columns())
+        return frame(self.columns(), INDEX.get(self._kind()))
 
     def to_json(self) -> str:
         """The text of the JSON file that `save_result` writes."""

@@ -170,7 +170,8 @@ class Study(ReadOnly):
         Raises
         ------
         InputError
-            Something is said about a trial that is not there; or as `Trial` and `Study`.
+            Something is said about a trial that is not there, or twice; two columns have one name; or as `Trial` and
+            `Study`.
         """
         fields = {"constants": {}, **fields}
         schema = fields.get("described") or schema_of(rig, partial(InputError, column="rig"))
@@ -288,8 +289,10 @@ class Study(ReadOnly):
 
 def _rows(table: Any, schema: RigSchema) -> dict[str, dict[str, Any]]:
     """What a frame says about trials, by their name."""
-    known = table[[n for n in table.columns if n in ("kind", "role", "group", *schema.conditions)]]
-    return {str(name): dict(row.dropna()) for name, row in known.iterrows()}
+    columns = checked_mapping(table, fault_at("about.{}"), "about")
+    known = table[[n for n in columns if n in ("kind", "role", "group", *schema.conditions)]]
+    rows = checked_mapping(known.T, fault_at("about.{}"), "about")
+    return {str(name): dict(row.dropna()) for name, row in rows.items()}
 
 
 def _fault_of(trials: Sequence[Trial]) -> Callable[[int | None, str, str], InputError]:

@@ -257,13 +257,17 @@ class Trial(ReadOnly):
         Raises
         ------
         InputError
-            There are no times; or as `Trial`.
+            There are no times, or two columns of one name; or as `Trial`.
         """
-        columns = {str(key): values for key, values in frame.items()}
+
+        def error(key: str, message: str) -> InputError:
+            return InputError(f"{message} (trial {name})", column=key)
+
+        columns = {str(key): values for key, values in checked_mapping(frame, error, "frame").items()}
         index = getattr(frame, "index", None)
         time = columns.pop("time_s", index if getattr(getattr(index, "dtype", None), "kind", "") == "f" else None)
         if time is None:
-            raise InputError(f"missing; expected a column of times or an index of them (trial {name})", column="time_s")
+            raise error("time_s", "missing; expected a column of times or an index of them")
         return cls(name, kind, columns, time, **labels)
 
     def to_frame(self) -> pandas.DataFrame:

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from weakref import WeakKeyDictionary
+from weakref import finalize
 
 import numpy as np
 
@@ -176,7 +176,7 @@ def _lines(measured: np.ndarray, missed: np.ndarray, unit: float, noise: np.ndar
     return np.where(found, squares, 0.0) / unit
 
 
-_PREDICTED: WeakKeyDictionary[LikelihoodFit, dict[tuple[int, float], tuple[Trial, _Predicted]]] = WeakKeyDictionary()
+_PREDICTED: dict[int, dict[tuple[int, float], tuple[Trial, _Predicted]]] = {}
 
 
 def _predicted(fitted: LikelihoodFit, trial: Trial, horizon_s: float) -> _Predicted:
@@ -184,7 +184,9 @@ def _predicted(fitted: LikelihoodFit, trial: Trial, horizon_s: float) -> _Predic
 
     Judging causes and reporting errors need the same predictions: these are cached as long as the fit exists.
     """
-    known, key = _PREDICTED.setdefault(fitted, {}), (id(trial), horizon_s)
+    if id(fitted) not in _PREDICTED:
+        finalize(fitted, _PREDICTED.pop, id(fitted), None)
+    known, key = _PREDICTED.setdefault(id(fitted), {}), (id(trial), horizon_s)
     if key not in known:
         known[key] = (trial, _predict(fitted, trial, horizon_s))  # as long as the trial is here no other has its id
     return known[key][1]

@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import as_number, instance, number, whole
 from fes_pin.data.results import Saveable
 from fes_pin.data.schema import IMPOSED, unknown
-from fes_pin.data.show import by_columns, frame
+from fes_pin.data.show import by_columns
 from fes_pin.data.trial import Trial
 from fes_pin.identify.problem import Problem
 from fes_pin.infer.noise import ORDERS, Noise, NoiseModel, estimate_noise, noise_step, thin, thinning
@@ -30,9 +30,6 @@ from fes_pin.models.model import Model
 from fes_pin.models.predictor import StateSpaceNoise
 from fes_pin.workers import one_thread_each
 
-if TYPE_CHECKING:
-    import pandas
-
 GROWTH = (1 / 8, 1 / 4, 1 / 2)
 """Shares of every trial to which a fit from afar is made, one after another."""
 SHORTEST = 50
@@ -44,6 +41,9 @@ GROSS = 10.0
 @dataclass(frozen=True, kw_only=True, repr=False, eq=False)
 class Fit(Optimum, Saveable):
     """A model with fitted parameters, their covariance, and tests of its optimality.
+
+    Two are equal if their tables are, to the printed digits. Equality and hash take as long as the table: of a fit at
+    a bound as long as the profile of its parameter. A search keys its fits by `id`.
 
     Attributes
     ----------
@@ -180,12 +180,6 @@ class Fit(Optimum, Saveable):
             "reduced_chi2": shown(self.reduced),
             "converged": self.converged,
         }
-
-    def to_frame(self) -> pandas.DataFrame:
-        """Return the fitted parameters with standard deviations and 95 % intervals as a pandas frame: see `columns`."""
-        return frame(self.columns(), index="parameter")
-
-    __eq__, __hash__ = object.__eq__, object.__hash__  # two fits are not compared by what they print while one searches
 
     def to_numpy(self) -> NDArray[np.float64]:
         """Return the fitted values, shape (free,), in the order of `free` and of `covariance`."""

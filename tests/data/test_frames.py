@@ -45,10 +45,33 @@ def test_frames_of_a_study_make_it_again(tmp_path, rig):
         assert fp.Trial.from_frame(trial.to_frame(), **labels) == trial
 
 
+def doubled(frame, name):
+    """A frame with a column twice, the second of other numbers."""
+    return pandas.concat([frame, 2.0 * frame[[name]]], axis=1)
+
+
 BAD = {
     "no times": (lambda f: {n: one.drop(columns="time_s") for n, one in f.items()}, {}, "time_s: missing"),
     "rows lost": (lambda f: {n: one.drop(index=[5, 9]) for n, one in f.items()}, {}, "fixed step"),
     "rows that were chosen": (lambda f: {n: one[one["angle_rad"] < 1.899] for n, one in f.items()}, {}, "fixed step"),
+    "a column twice": (
+        lambda f: {**f, "t1": doubled(f["t1"], "angle_rad")}, {},
+        "angle_rad: this name is there twice; expected it once (trial t1)",
+    ),
+    "times twice": (
+        lambda f: {n: doubled(one, "time_s") for n, one in f.items()}, {}, "time_s: this name is there twice"
+    ),
+    "a trial twice": (
+        lambda f: f, pandas.DataFrame({"load_kg": [1.0, 2.0, 3.0, 4.0]}, index=["t0", "t1", "t2", "t1"]),
+        "about.t1: this name is there twice",
+    ),
+    "a condition twice": (
+        lambda f: f, doubled(pandas.DataFrame({"load_kg": [1.0, 2.0, 3.0]}, index=["t0", "t1", "t2"]), "load_kg"),
+        "about.load_kg: this name is there twice",
+    ),
+    "no frame": (
+        lambda f: {"t0": [1.0, 2.0]}, {}, "frame: expected a mapping of names to values, found a list (trial t0)"
+    ),
     "an unknown trial": (lambda f: f, {"t9": {"load_kg": 1.0}}, "expected names of frames, found 't9'"),
     "an unknown condition": (lambda f: f, {"t0": {"load": 1.0}}, "load"),
     "no condition": (lambda f: f, {}, "load_kg: missing"),
@@ -59,7 +82,7 @@ BAD = {
 @pytest.mark.parametrize("case", BAD)
 def test_frames_that_make_no_study_are_refused(tmp_path, case):
     change, about, words = BAD[case]
-    about = about or ({} if case == "no condition" else {n: {"load_kg": 1.0} for n in change(frames())})
+    about = about if len(about) else ({} if case == "no condition" else {n: {"load_kg": 1.0} for n in change(frames())})
     with pytest.raises(fp.InputError) as caught:
         fp.Study.from_frames(change(frames()), about, name="s", rig="ankle", start=START, constants=constants(tmp_path))
     assert words in str(caught.value)

@@ -5,6 +5,7 @@ import math
 import pickle
 
 import numpy as np
+import pandas
 import pytest
 from identify.rigs import WHITE, as_likely, measured, off, trials_of
 from models.cases import RIGS, trial
@@ -180,10 +181,19 @@ def test_nothing_that_a_fit_holds_can_be_written_to(plain, copied):
 @pytest.mark.parametrize("copied", COPIES)
 def test_a_copy_of_a_fit_says_the_same(plain, copied):
     fitted = copied(plain)
+    assert fitted == plain and hash(fitted) == hash(plain)
     assert str(fitted) == str(plain)
     assert fitted.model == plain.model and fitted.noise == plain.noise
     np.testing.assert_array_equal(fitted.covariance, plain.covariance)
     assert fitted.interval("gain", method="profile") == plain.interval("gain", method="profile")
+
+
+def test_fits_are_equal_by_what_they_say(plain, at_its_bound):
+    model, trials = trials_of("muscle", np.random.default_rng(0))
+    assert fit(off(model), trials) == plain != fit(off(model), trials[:1])
+    assert plain != at_its_bound and plain != str(plain)
+    likely = as_likely(at_its_bound, StateSpaceNoise({"position": 0.2}, {}, {}))
+    assert copy.deepcopy(likely) == likely
 
 
 def test_trials_may_be_one_or_come_one_after_another():
@@ -206,7 +216,8 @@ def test_a_fit_is_saved_and_loaded(at_its_bound, plain, tmp_path):
     for fitted in (at_its_bound, plain):
         fp.save_result(fitted, tmp_path / "fit.json")
         again = fp.load_result(tmp_path / "fit.json")
-        assert again == fitted
+        assert again == fitted and fitted == again and hash(again) == hash(fitted)
+        pandas.testing.assert_frame_equal(again.to_frame(), fitted.to_frame(), rtol=1e-5)
         assert str(again) == str(fitted)
         assert list(again.table["parameter"]) == list(fitted.free)
         assert again.found["parameters"]["damping" if "damping" in fitted.free else "gain"]["note"] == ""

@@ -42,7 +42,7 @@ class Library:
         self.effects = tuple(installed().effects_for(model.rig) if effects is None else effects)
         self.model, self.trials = Model(model.rig), tuple(trials)
         self.measured = (answered_columns if answered else measured_columns)(model, trials)
-        self._scores: dict[LikelihoodFit, Scores] = {}
+        self._scores: dict[int, tuple[LikelihoodFit, Scores]] = {}
         self._probing: dict[tuple, LikelihoodProblem] = {}
 
     def grid(self, effect: type[Effect]) -> list[Effect]:
@@ -67,12 +67,12 @@ class Library:
 
     def scores(self, base: LikelihoodFit) -> Scores:
         """Return score tests of every effect that a fit does not have, at its noise; none in a fit that diverges."""
-        if base not in self._scores:
+        if id(base) not in self._scores:
             finite = math.isfinite(base.sse)
             wanted = [e for e in self.effects if finite and e.name not in base.names and self.felt(e)]
             groups = in_parallel(lambda e: self._probes(e, base), wanted)
-            self._scores[base] = score_test(base.parts, [p for g in groups for p in g])
-        return self._scores[base]
+            self._scores[id(base)] = base, score_test(base.parts, [p for g in groups for p in g])
+        return self._scores[id(base)][1]
 
     def _probes(self, effect: type[Effect], base: LikelihoodFit) -> list[tuple[Effect, np.ndarray]]:
         """Return the effect with every choice of its shapes, linearized at the nominal parameters of a fit."""
