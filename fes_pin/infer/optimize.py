@@ -167,7 +167,7 @@ class Descent:
             if out[k] != 0.0:
                 bent = self.x[shape] + move[shape] * self.x[k] / out[k]
                 out[shape] = np.clip(bent, self.lower[shape], self.upper[shape])
-        return np.asarray(out)
+        return np.asarray(np.clip(out, self.lower, self.upper))
 
     def _moved(self, steps: list[np.ndarray]) -> Unknowns:
         if not steps:

@@ -124,7 +124,7 @@ def least_apart(likelier: Optimum, other: Optimum) -> float:
 
 def _information_and_scores(fitted: Optimum) -> tuple[np.ndarray, np.ndarray]:
     """Return the inverse information of a fit, and the slopes of the log-likelihood of its pieces."""
-    parts, free = at_rest(fitted.parts), np.array([n not in fitted.at_bound for n in fitted.free])
+    parts, free = at_rest(fitted.parts), np.isin(fitted.free, fitted.at_bound, invert=True)
     return covariance_of(normal_equations(parts).hessian, free), scores_of(parts)
 
 

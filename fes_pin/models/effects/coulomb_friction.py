@@ -82,7 +82,9 @@ class CoulombFriction(Effect):
 
     torque_nm: float = parameter(0.01, unit="{effort}", null=0.0, lower=0.0, upper=1e6, scale=0.01)
     stiction: float = refinement(0.0, lower=0.0, upper=10.0, scale=0.1, grid=(0.3, 1.0))
-    stribeck_speed: float = parameter(1.0, unit="{q}/s", lower=1e-4, scale=0.5, optional=True, grid=(1.0, 0.2, 4.0))
+    stribeck_speed: float = parameter(
+        1.0, unit="{q}/s", lower=1e-4, upper=1e4, scale=0.5, optional=True, grid=(1.0, 0.2, 4.0)
+    )
     creep_speed: float = refinement(CREEP, unit="{q}/s", lower=1e-5, upper=0.5, scale=0.002, grid=(0.02,))
     softness: float = refinement(CORNER, lower=1e-3, upper=50.0, scale=0.1, grid=(0.5,))
     load_exponent: float = refinement(0.0, lower=0.0, upper=2.0, scale=1.0, fitted=False, grid=(1.0, 4.0 / 3.0, 1.5))
