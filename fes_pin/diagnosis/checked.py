@@ -92,7 +92,7 @@ class Checked(ReadOnly):
         return "\n".join([*lines, *self.limits])
 
 
-def check(study: Study, *, library: Source | Sequence[Source] | None = None) -> Checked:
+def check_rig(study: Study, *, library: Source | Sequence[Source] | None = None) -> Checked:
     """Check a study of a rig; see `verdict.ask.check`."""
     clean, odd = odd_numbers(study)
     found = testable_causes(clean, catalogue_of(library))

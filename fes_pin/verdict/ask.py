@@ -36,11 +36,10 @@ def check(study: Study, *, library: Source | Sequence[Source] | None = None) -> 
         For numbers that no verdict could follow from, as `diagnose`.
     """
     asked(study)
-    from fes_pin.diagnosis.checked import Checked  # noqa: PLC0415
-    from fes_pin.diagnosis.checked import check as of_a_rig  # noqa: PLC0415
+    from fes_pin.diagnosis.checked import Checked, check_rig  # noqa: PLC0415
 
     if study.rig != "body":
-        return of_a_rig(study, library=library)
+        return check_rig(study, library=library)
     from fes_pin.walk.stated import contradictions_of  # noqa: PLC0415
 
     return Checked(study, contradictions_of(study))
