@@ -32,8 +32,9 @@ class WalkVerdict(Verdict[WalkFit, WalkModels, Weighed]):
 
     The likelihood of held-out strides must support a cause: it counts errors of soft tissue, landmarks and plates in
     every stride as noise, which make up most of an error in newtons. A form that belongs to neither leg must also
-    predict the stances of one leg from those of the other. With a single stride nothing can be held out; only a cause
-    that is certain is then named.
+    predict the stances of one leg from those of the other. An offset that is read in the air need not lessen the errors
+    in newtons, which other errors may hide. With a single stride nothing can be held out; only a cause that is certain
+    is then named.
 
     Parameters
     ----------
@@ -65,7 +66,9 @@ class WalkVerdict(Verdict[WalkFit, WalkModels, Weighed]):
         other = self.other_leg(name)
         if p_value >= (WALK_LEVEL if weighed.evidence else CERTAIN_LEVEL) or (other is not None and other <= 0.0):
             return False
-        return not weighed.evidence or is_supported(weighed.evidence[name], weighed.gains[name], alone)
+        if not weighed.evidence or (self.models.designs.forms[name].reads and weighed.evidence[name].low > 0.0):
+            return True
+        return is_supported(weighed.evidence[name], weighed.gains[name], alone)
 
     def lack_of_fit(self, state: Judgement) -> Remainder:
         """Return the lack of fit: the residual repeats in every stride, or held-out strides rejected a cause."""

@@ -17,8 +17,8 @@ def clean(gait, tmp_path):
     """Return a function that makes a walk in which nothing is wrong but what is in every session: its folder."""
     from walking_matrix.synthetic import Wrong, make
 
-    def made(seed=5):
-        make(gait, tmp_path, Wrong(strides=3, tissue=0.4), seed)
+    def made(seed=5, strides=3):
+        make(gait, tmp_path, Wrong(strides=strides, tissue=0.44), seed)
         return tmp_path
 
     return made
@@ -83,6 +83,14 @@ def test_what_a_plate_reads_in_the_air_is_its_offset(clean, side, by):
     assert not {"plate_gain", "external_force"} & {first.name, *first.equivalents}
     assert first.parameters["up_n"].value == pytest.approx(by, abs=4.0 * first.parameters["up_n"].std)
     assert found.models.designs.strides.count == whole  # feet come and go as they did
+
+
+def test_an_offset_that_is_read_in_the_air_may_add_to_errors_that_it_hid(clean):
+    """Landmarks of this session are off by more: without the offset the squared forces are less."""
+    folder = clean(seed=12, strides=2)
+    raised(folder, "l_Fy", -25.0)
+    (first,) = fp.diagnose(fp.read_study(folder)).causes
+    assert first.site == "left plate, up force, always" and first.gain_held_out.high < 0.0 < first.judged.low
 
 
 def test_the_measured_walk_states_its_mass(walk, tmp_path):
