@@ -5,12 +5,11 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from fes_pin.data.by_itself import PULSES, STILL, Mean, before_pulses, resting
+from fes_pin.data.by_itself import PULSES, STILL, before_pulses, resting
 from fes_pin.data.errors import InputError
 from fes_pin.data.plausibility import ToPredict, implausible, trials_named
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.study import Study
-from fes_pin.data.trial import Trial
 from fes_pin.infer.levels import SEEN_DEVIATIONS
 from fes_pin.models.model import Model
 from fes_pin.models.rigs.base import RUN_OUT
@@ -133,28 +132,24 @@ def _at_rest(study: Study | ToPredict, model: Model) -> Iterable[str]:
 
     Friction is the work along a trial over its way.
     """
-    forces, efforts, c = dict[str, float](), dict[str, float](), model.rig.constants
+    found, c = dict[str, dict[str, float]](), model.rig.constants
     for trial in study.trials:
         if "force_n" in trial and trial.kind != IMPOSED:
-            forces |= _standing_out(trial, before_pulses(trial, "force_n"), trial["force_n"])
+            rest, free, rubs = before_pulses(trial, "force_n"), trial["force_n"], 0.0
+            words = "the force is {} N before any pulse"
         elif {"effort", "position"} <= set(trial.columns) and "revolute" in c:
             angle, way = c["revolute"] * trial["position"], np.gradient(trial["position"])
             weight = c["gravity_cos"] * np.cos(angle) + c["gravity_sin"] * np.sin(angle)
             free = trial["effort"] - model.parameters().get("gravity_scale", 1.0) * weight
             rubs = STICKS * abs(float(free @ way)) / max(float(np.abs(way).sum()), 1e-300)
             rest = resting(trial.with_columns(effort=free), "effort", slice(len(trial) // 10))
-            efforts |= _standing_out(trial, rest, free, rubs)
-    if forces:
-        yield f"the force is {_ends(forces)} N before any pulse in {trials_named([*forces])}"
-    if efforts:
-        said = f"the effort differs from gravity's by {_ends(efforts)} before anything moves"
-        yield f"{said} in {trials_named([*efforts])}: is the zero of its sensor elsewhere (zero in [columns])?"
-
-
-def _standing_out(trial: Trial, rest: Mean | None, values: np.ndarray, least: float = 0.0) -> dict[str, float]:
-    """Return a mean at rest by its trial if it is above its error, a small share of all values, and a least size."""
-    seen = rest is not None and abs(rest[0]) > max(SEEN_DEVIATIONS * rest[1], STILL * float(np.ptp(values)), least)
-    return {trial.name: rest[0]} if rest and seen else {}
+            words = "the effort differs from gravity's by {} before anything moves (another zero of its sensor?)"
+        else:
+            continue
+        if rest and abs(rest[0]) > max(SEEN_DEVIATIONS * rest[1], STILL * float(np.ptp(free)), rubs):
+            found.setdefault(words, {})[trial.name] = rest[0]
+    for words, some in found.items():
+        yield f"{words.format(_ends(some))} in {trials_named([*some])}"
 
 
 def _ends(found: Mapping[str, float]) -> str:
