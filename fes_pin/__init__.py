@@ -50,7 +50,6 @@ if TYPE_CHECKING:  # every public name with its module: it is imported from ther
     from fes_pin.data.trial import Trial as Trial
     from fes_pin.data.trial import read_trial as read_trial
     from fes_pin.data.trial import write_trial as write_trial
-    from fes_pin.diagnosis.checked import check as check
     from fes_pin.diagnosis.result import Diagnosis as Diagnosis
     from fes_pin.identify.fit import Fit as Fit
     from fes_pin.identify.fit import fit as fit
@@ -77,6 +76,7 @@ if TYPE_CHECKING:  # every public name with its module: it is imported from ther
     from fes_pin.paper.antagonist import fit_antagonist as fit_antagonist
     from fes_pin.paper.kalman import GainFilter as GainFilter
     from fes_pin.paper.kalman import track_gain as track_gain
+    from fes_pin.verdict.ask import check as check
     from fes_pin.verdict.ask import diagnose as diagnose
     from fes_pin.view.report import report as report
     from fes_pin.view.viewer import show_influence as show_influence

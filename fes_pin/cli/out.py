@@ -75,7 +75,7 @@ def _stimulated(path: Path) -> Trial:
     """A trial of any rig that is stimulated, whatever else its file holds of the rig."""
     from dataclasses import replace
 
-    from fes_pin.data.plausibility import PULSES
+    from fes_pin.data.by_itself import PULSES
     from fes_pin.data.recorded.sniff import read_csv_or_hint
     from fes_pin.data.schema import known_rigs, schema_of
     from fes_pin.data.trial import read_trial

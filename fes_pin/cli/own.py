@@ -143,7 +143,7 @@ def check(
     """Say what is odd about a study before anything is looked for, and what its trials can and cannot show."""
     import json
 
-    from fes_pin.diagnosis.checked import check as find
+    from fes_pin.verdict.ask import check as find
 
     catalogue = catalogue_with(library)
     found = find(study_of(study, catalogue, trials, exclude), library=catalogue)
@@ -202,8 +202,9 @@ def _ask(question: str) -> str:
     return str(typer.prompt(question, default="", show_default=False))
 
 
-def _tried(made: NewStudy, wanted: Wanted, catalogue: Catalogue) -> tuple[Study, list[str]]:
-    """The study as it will be read, and what is odd about it, before anything of it is written where it belongs.
+def _tried(made: NewStudy, wanted: Wanted, catalogue: Catalogue) -> tuple[Study, list[str] | None]:
+    """The study as it will be read, and what is odd about it, before anything of it is written where it belongs; None
+    of a walk, which takes inverse dynamics to judge.
 
     Raises
     ------
@@ -216,7 +217,7 @@ def _tried(made: NewStudy, wanted: Wanted, catalogue: Catalogue) -> tuple[Study,
     text = str(made.contents["study.toml"])
     try:
         study = study_of_text(text, wanted.folder, made.origins, catalogue.schemas())
-        return study, odd_numbers(study)[1]
+        return study, None if study.schema.owner is None else odd_numbers(study)[1]
     except InputError as error:
         if error.file != wanted.folder / "study.toml":
             raise

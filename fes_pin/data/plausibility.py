@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from fes_pin.data.by_itself import PULSES
 from fes_pin.data.checks import check_values
 from fes_pin.data.counts import hunts
 from fes_pin.data.errors import InputError
@@ -26,8 +27,6 @@ from fes_pin.data.trial import Trial, check_trial
 SAMPLES_EACH = 10
 """Samples for each value that is fitted, at least: a standard deviation that is estimated from fewer is itself
 uncertain by more than a quarter (one over the root of twice their number)."""
-PULSES = ("pulse_width_us", "stim")
-"""Inputs without which nothing happens: a muscle contracts where it is stimulated."""
 FEW = 16
 """Samples of a trial below which it can hardly show a motion: a warning."""
 STRONGEST_N = 1e4

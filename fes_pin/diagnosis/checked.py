@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from fes_pin.data.asked import asked
 from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.show import by_columns, frame, table_html
 from fes_pin.data.study import Study
@@ -23,7 +22,7 @@ if TYPE_CHECKING:
 
 FAR = 0.3
 """Share of the variance that the nominal model leaves above which a warning says so."""
-NOT_JUDGED = "its files can be read; numbers of walking are not judged before a diagnosis"
+OF_WALKS = "the noise of a walk is estimated with its causes"
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -45,7 +44,7 @@ class Checked(ReadOnly):
     study: Study
     odd: tuple[str, ...]
     limits: tuple[str, ...] = ()
-    testable: Testable | str = NOT_JUDGED
+    testable: Testable | str = OF_WALKS
 
     def as_dict(self) -> dict[str, Any]:
         """Return the check for JSON; `shown` has the share of each cause's sensitivity that is its own."""
@@ -88,33 +87,13 @@ class Checked(ReadOnly):
             if found.alike:
                 groups = "; ".join(" and ".join(group) for group in found.alike)
                 lines.append(f"they look alike on these trials: {groups}")
-        elif found != NOT_JUDGED:
+        else:
             lines.append(f"what these trials can show is not known before a diagnosis: {found}")
         return "\n".join([*lines, *self.limits])
 
 
-def check(study: Study, *, library: Source | Sequence[Source] | None = None) -> Checked:
-    """Check a study before a diagnosis: its numbers, and the causes that its trials can and cannot identify.
-
-    Parameters
-    ----------
-    study
-        The rig and its trials.
-    library
-        Causes in addition to those of the library and of installed packages; see `diagnose`.
-
-    Returns
-    -------
-    Checked
-
-    Raises
-    ------
-    InputError
-        For numbers that no verdict could follow from, as `diagnose`.
-    """
-    asked(study)
-    if study.schema.owner is None:
-        return Checked(study, ())
+def check_rig(study: Study, *, library: Source | Sequence[Source] | None = None) -> Checked:
+    """Check a study of a rig; see `verdict.ask.check`."""
     clean, odd = odd_numbers(study)
     found = testable_causes(clean, catalogue_of(library))
     given_away = () if isinstance(found, str) else found.warnings
@@ -131,18 +110,16 @@ def odd_numbers(study: Study) -> tuple[Study, list[str]]:
     InputError
         As `check`.
     """
-    if study.schema.owner is None:
-        return study, []
     clean = measured_study(study)
     count = sum(len(k) for columns in clean.left_out.values() for k in columns.values())
     said = [f"{count} samples look like spikes, and are replaced by what their neighbours say"] if count else []
     return clean.study, [*said, *clean.warnings, *check_study(clean.study, nominal_model(clean.study))]
 
 
-def odd_lines(study: Study, odd: Sequence[str]) -> list[str]:
-    """Return a study in one line, and the warnings about its numbers."""
-    nothing = NOT_JUDGED if study.schema.owner is None else "nothing is odd about its numbers"
-    return [str(study), *(f"odd: {one}" for one in odd)] + [nothing] * (not odd)
+def odd_lines(study: Study, odd: Sequence[str] | None) -> list[str]:
+    """Return a study in one line, and the warnings about its numbers; None of numbers that were not judged."""
+    nothing = "nothing is odd about its numbers"
+    return [str(study), *(f"odd: {one}" for one in odd or ())] + [nothing] * (odd is not None and not odd)
 
 
 def _listed(words: str, names: Sequence[str] | Mapping[str, float]) -> list[str]:

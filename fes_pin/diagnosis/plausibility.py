@@ -1,14 +1,16 @@
 """Checks of a study's time step, range and signs against its nominal model, before a fit."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
+from fes_pin.data.by_itself import PULSES, STILL, before_pulses, resting
 from fes_pin.data.errors import InputError
-from fes_pin.data.plausibility import PULSES, ToPredict, implausible, trials_named
+from fes_pin.data.plausibility import ToPredict, implausible, trials_named
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.study import Study
+from fes_pin.infer.levels import SEEN_DEVIATIONS
 from fes_pin.models.model import Model
 from fes_pin.models.rigs.base import RUN_OUT
 from fes_pin.models.simulate import simulated_trial
@@ -26,11 +28,10 @@ LONGEST_M = 10.0
 """Largest position and pendulum length in m in a laboratory; values in millimetres are larger."""
 SWING = 2.0 * math.pi
 """Largest angle in rad between two turning points of a pendulum that is not driven: from upright round to upright."""
-STILL = 0.02
-"""Share of a trial's range below which its last tenth stands still."""
 ASKEW = 0.5
 """Angle in rad from hanging above which dry friction hardly holds a pendulum: half of its weight acts there."""
-
+STICKS = 2.0
+"""Static friction in sliding friction, at most (a round figure)."""
 
 TURNED = -0.7
 """Correlation of reading and simulation at which the model would explain half of the variance with the sign changed."""
@@ -51,6 +52,7 @@ def check_study(study: Study | ToPredict, model: Model) -> list[str]:
         *_range(study, model),
         *_swings(study, model),
         *_turned(study, model),
+        *_at_rest(study, model),
     ]
 
 
@@ -115,18 +117,44 @@ def _swings(study: Study | ToPredict, model: Model) -> Iterable[str]:
         yield f"position swings back by more than a turn, and nothing drives it, in trial {wide[0]}: is it in degrees?"
         return
     hangs = math.atan2(-c["gravity_cos"], c["gravity_sin"])
-    for trial in free:
-        end = trial["position"][-max(len(trial) // 10, 1) :]
-        if np.ptp(end) > STILL * np.ptp(trial["position"]):
-            continue
-        rest = float(np.mean(end))
-        if math.cos(rest - hangs) < math.cos(ASKEW):
-            said = f"trial {trial.name} comes to rest at {rest:.4g} rad, and by the URDF it hangs at {hangs:.4g}"
-            yield f"{said}: is the position's zero elsewhere (zero in [columns]), or its sign another?"
-            return
+    rests = {t.name: end[0] for t in free if (end := resting(t, "position", slice(-len(t) // 10, None)))}
+    if off := {n: rest for n, rest in rests.items() if math.cos(rest - hangs) < math.cos(ASKEW)}:
+        said = f"position comes to rest at {_ends(off)} rad, and by the URDF it hangs at {hangs + 0.0:.4g}, in"
+        yield f"{said} {trials_named([*off])}: is its zero elsewhere (zero in [columns]), or its sign another?"
+        return
     length = c["inertia"] * 9.81 / weight
     if length > LONGEST_M:
         yield f"by its URDF the rig swings like a pendulum of {length:.4g} m: is the URDF in mm?"
+
+
+def _at_rest(study: Study | ToPredict, model: Model) -> Iterable[str]:
+    """Yield warnings for a force before the first pulse, and for an effort that neither gravity nor friction asks for.
+
+    Friction is the work along a trial over its way.
+    """
+    found, c = dict[str, dict[str, float]](), model.rig.constants
+    for trial in study.trials:
+        if "force_n" in trial and trial.kind != IMPOSED:
+            rest, free, rubs = before_pulses(trial, "force_n"), trial["force_n"], 0.0
+            words = "the force is {} N before any pulse"
+        elif {"effort", "position"} <= set(trial.columns) and "revolute" in c:
+            angle, way = c["revolute"] * trial["position"], np.gradient(trial["position"])
+            weight = c["gravity_cos"] * np.cos(angle) + c["gravity_sin"] * np.sin(angle)
+            free = trial["effort"] - model.parameters().get("gravity_scale", 1.0) * weight
+            rubs = STICKS * abs(float(free @ way)) / max(float(np.abs(way).sum()), 1e-300)
+            rest = resting(trial.with_columns(effort=free), "effort", slice(len(trial) // 10))
+            words = "the effort differs from gravity's by {} before anything moves (another zero of its sensor?)"
+        else:
+            continue
+        if rest and abs(rest[0]) > max(SEEN_DEVIATIONS * rest[1], STILL * float(np.ptp(free)), rubs):
+            found.setdefault(words, {})[trial.name] = rest[0]
+    for words, some in found.items():
+        yield f"{words.format(_ends(some))} in {trials_named([*some])}"
+
+
+def _ends(found: Mapping[str, float]) -> str:
+    """Return the least and the largest of some values, once where they are printed alike."""
+    return " to ".join(dict.fromkeys(f"{v:.3g}" for v in (min(found.values()), max(found.values()))))
 
 
 def _widest_swing(position: np.ndarray) -> float:

@@ -1,4 +1,4 @@
-"""The diagnosis of a study, of a rig or of a walk."""
+"""The check and the diagnosis of a study, of a rig or of a walk."""
 
 from __future__ import annotations
 
@@ -11,8 +11,38 @@ from fes_pin.data.study import Study
 from fes_pin.models.catalogue import Source
 
 if TYPE_CHECKING:
+    from fes_pin.diagnosis.checked import Checked
     from fes_pin.diagnosis.result import Diagnosis
     from fes_pin.walk.result import WalkDiagnosis
+
+
+def check(study: Study, *, library: Source | Sequence[Source] | None = None) -> Checked:
+    """Check a study before a diagnosis: its numbers, and the causes that its trials can and cannot identify.
+
+    Parameters
+    ----------
+    study
+        The rig and its trials.
+    library
+        Causes in addition to those of the library and of installed packages; see `diagnose`.
+
+    Returns
+    -------
+    Checked
+
+    Raises
+    ------
+    InputError
+        For numbers that no verdict could follow from, as `diagnose`.
+    """
+    asked(study)
+    from fes_pin.diagnosis.checked import Checked, check_rig  # noqa: PLC0415
+
+    if study.rig != "body":
+        return check_rig(study, library=library)
+    from fes_pin.walk.stated import contradictions_of  # noqa: PLC0415
+
+    return Checked(study, contradictions_of(study))
 
 
 def diagnose(

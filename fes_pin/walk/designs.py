@@ -13,7 +13,9 @@ from fes_pin.body.build import GRAVITY
 from fes_pin.infer.fits import Names
 from fes_pin.walk.disturb import disturbed, misplaced, tissue, white
 from fes_pin.walk.effects import walk_library
-from fes_pin.walk.likelihood import MEAN_ARM_M, MEAN_FORCE, MEAN_TWIST_NM, WalkNoise, fit_many, rotation
+from fes_pin.walk.likelihood import MEAN_ARM_M, MEAN_FORCE, MEAN_TWIST_NM, Known, WalkNoise, fit_many, rotation
+from fes_pin.walk.plates import ORDINARY_N
+from fes_pin.walk.stated import Stated
 from fes_pin.walk.strides import Strides, strides_of
 from fes_pin.walk.walk_trial import WalkTrial
 
@@ -54,6 +56,8 @@ class Designs:
         The name of the form that shifts the plates' clock.
     strides
         The strides into which signals are cut.
+    stated
+        What the walks state by themselves.
     as_read, shifted
         Design matrices on either clock.
     noise
@@ -67,6 +71,7 @@ class Designs:
         self.forms = {form.label: form for form in walk_library()}
         self.shift = next(n for n, f in self.forms.items() if f.shifts)
         self.strides = strides_of(trials, trials[0].session.cutoff_hz)
+        self.stated = Stated.of(trials, self.strides)
         self._first = trials[self.strides.windows[0][0]]
         self.as_read = self._design(trials, self.forms)
         self._turn(self.as_read.y)
@@ -136,6 +141,14 @@ class Designs:
     def columns(self, names: Names) -> np.ndarray:
         """Return columns of a set in the mean stride, one form after the other: (1, 6, k, p)."""
         return np.concatenate([self._none(), *(self.design(names).x[n] for n in names)], axis=3)
+
+    def readings(self, sets: Sequence[Names]) -> Known:
+        """Return what plates read while a foot is in the air, and what each of some sets of as many parameters adds."""
+        weight = 1.0 / np.hypot(ORDINARY_N, self.stated.air_std_n)
+        forms = [[self.forms[n] for n in names] for names in sets]
+        shown = [[np.isin(range(len(weight)), f.reads) * weight for f in some for _ in f.parameters] for some in forms]
+        columns = np.reshape(shown, (len(sets), -1, len(weight))) if len(sets[0]) else np.zeros((1, 0, len(weight)))
+        return (self.stated.air_n * weight)[None], columns.swapaxes(1, 2)
 
     def residual(self, names: Names, values: np.ndarray) -> np.ndarray:
         """Return the residual of a set in the mean stride, (1, 6, k)."""

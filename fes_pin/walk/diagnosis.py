@@ -94,11 +94,13 @@ def _judged(study: Study, search: WalkSearch, found: SearchResult[WalkFit]) -> W
         verdict=word_of(bool(causes), left),
         causes=tuple(causes),
         remainder=left,
+        reason=left.reason,
         absorbed=tuple(n for n in not_testable(models.designs, found.best) if n not in in_a_set),
         nominal_error=errors.error_percent(found.nominal),
         extended_error=errors.error_percent(found.best),
-        ceiling_percent=errors.errors(found.nominal, False).ceiling_percent(),
+        ceiling_percent=errors.errors(found.nominal, False).ceiling_percent() or math.nan,  # of a single stride
         next_experiment=next((next_walk(models, found, c.name) for c in causes if c.equivalents), None),
         models=models,
         best=found.best,
+        warnings=tuple(models.designs.stated.contradictions(study)),
     )

@@ -43,9 +43,8 @@ class Form:
         Whether a negative value has no meaning.
     ordinary
         Standard deviation of the parameter where nothing is wrong: an ordinary error of every session is no cause.
-    reading
-        Function of a trial that returns directly measured values (p,) and standard deviations of the parameters, or
-        None.
+    reads
+        Numbers of the forces of `Stated.air_n` that its only parameter changes by as much.
     segments
         The change of segments' mass parameters; None of a form that changes none.
     """
@@ -58,9 +57,7 @@ class Form:
     shifts: bool = False
     positive: bool = False
     ordinary: float = 0.0
-    reading: Callable[[WalkTrial], tuple[np.ndarray, float] | None] | None = field(
-        default=None, repr=False, compare=False
-    )
+    reads: tuple[int, ...] = ()
     segments: SegmentChange | None = field(default=None, repr=False, compare=False)
 
     @property

@@ -57,7 +57,8 @@ def lack_of_fit(designs: Designs, one: WalkFit) -> Remainder:
     by_wave = np.array([ratio[:, waves == h].sum(axis=1) for h in np.unique(waves)]).T
     channel, wave = np.unravel_index(int(np.argmax(by_wave)), by_wave.shape)
     word = WAVES[wave] if wave < len(WAVES) else f"{wave} times a stride"
-    return Remainder(p_value < CLAIM_LEVEL, p_value, f"{CHANNELS[channel]}, {word}")
+    left = p_value < CLAIM_LEVEL
+    return Remainder(left, p_value, f"{CHANNELS[channel]}, {word}" if left else None)
 
 
 def not_testable(designs: Designs, one: WalkFit) -> list[str]:

@@ -12,6 +12,9 @@ Sizes of effects are integrated over a normal prior of their plausible sizes (La
 linear). The penalty of a parameter is therefore log(1 + d^2), with d the standard deviation of the prior over that of
 the estimate.
 
+What a plate reads while its foot is in the air is data too (`Known`): it shows an offset of the plate, and nothing
+else.
+
 Every set has nuisance parameters with normal priors, which are no causes (`nuisance`): errors of the motion that scale
 the required reaction, misplaced landmarks, and plates as accurate as their calibration.
 """
@@ -64,6 +67,11 @@ class WalkNoise:
         return out
 
 
+Known = tuple[np.ndarray, np.ndarray]
+"""Readings of known standard deviation, in units of it, (b, m), and their change per unit of each effect, (b, m, p);
+b = 1 for all fits. No nuisance parameter changes them."""
+
+
 @dataclass(frozen=True)
 class Fitted:
     """Effects at their most likely values, with the noise of their residual.
@@ -98,7 +106,9 @@ def rotation(left: np.ndarray, harmonics: np.ndarray) -> np.ndarray:
     return vectors.T * scale
 
 
-def fit_many(y: np.ndarray, x: np.ndarray, prior: np.ndarray, noise: WalkNoise, rounds: int = ROUNDS) -> list[Fitted]:
+def fit_many(
+    y: np.ndarray, x: np.ndarray, prior: np.ndarray, noise: WalkNoise, rounds: int = ROUNDS, read: Known | None = None
+) -> list[Fitted]:
     """Fit effects and noise together, many fits at once.
 
     Parameters
@@ -111,24 +121,29 @@ def fit_many(y: np.ndarray, x: np.ndarray, prior: np.ndarray, noise: WalkNoise, 
         The noise model of all fits.
     rounds
         Alternations of weights and effects.
+    read
+        Readings in addition to the waves.
     """
     count, p, size = len(y), x.shape[-1], y[0].size
     scaled = (x * prior[:, None, None, None]).reshape(len(x), size, p)
     nuisance = noise.nuisance.reshape(size, -1)
     flat = np.concatenate([scaled, np.broadcast_to(nuisance, (len(scaled), *nuisance.shape))], axis=2)
+    told, shows = read or (np.zeros((1, 0)), np.zeros((1, 0, p)))
+    shows = np.pad(shows * prior[:, None], ((0, 0), (0, 0), (0, flat.shape[2] - p)))
     spectra = Spectra(y, noise)
     aim = y.reshape(count, size, 1)
     left, variance = y, spectra.update(y**2)
     for _ in range(rounds):
         weighted = flat / variance.reshape(count, size, 1)
-        gram = weighted.transpose(0, 2, 1) @ flat + np.eye(flat.shape[2])
+        gram = weighted.transpose(0, 2, 1) @ flat + shows.transpose(0, 2, 1) @ shows + np.eye(flat.shape[2])
         inverse = np.linalg.inv(gram)
-        values = inverse @ (weighted.transpose(0, 2, 1) @ aim)
+        values = inverse @ (weighted.transpose(0, 2, 1) @ aim + shows.transpose(0, 2, 1) @ told[:, :, None])
         left = (aim - flat @ values).reshape(y.shape)
         fitted_away = np.sum((flat @ inverse) * flat, axis=2).reshape(y.shape)
         variance = spectra.update(left**2 + fitted_away)
     deviance = np.sum(np.log(variance) + left**2 / variance, axis=(1, 2, 3)) + spectra.penalty()
     values = values[:, :, 0]
+    deviance += np.sum((told - (shows @ values[:, :, None])[:, :, 0]) ** 2, axis=1)
     deviance += np.sum(values**2, axis=1) + np.linalg.slogdet(gram)[1]
     scale = np.broadcast_to(prior, (count, p))
     alone = np.linalg.inv(gram - np.diag(np.r_[np.full(p, 1.0 - PRIOR_LEFT), np.zeros(len(gram[0]) - p)]))

@@ -155,7 +155,7 @@ class WalkModels(FittedSets[WalkFit, None]):
         y = noise.rotated(self.designs.design(group[0]).y)
         x = np.stack([noise.rotated(self.designs.columns(names)) for names in group])
         prior = np.array([self.designs.plausible(names) for names in group]).reshape(len(group), -1)
-        found = fit_many(np.broadcast_to(y, (len(group), *y.shape)), x, prior, noise)
+        found = fit_many(np.broadcast_to(y, (len(group), *y.shape)), x, prior, noise, read=self.designs.readings(group))
         out = []
         for names, fitted in zip(group, found, strict=True):
             low, high = np.array([self.limits[n] for n in names for _ in forms[n].parameters]).reshape(-1, 2).T
@@ -169,12 +169,7 @@ WalkSearch = Search[WalkFit, WalkModels]
 
 
 def _limits(designs: Designs) -> Iterator[tuple[str, tuple[float, float]]]:
-    """Yield forms with the limits of their parameters; where trials show a parameter directly, near their mean."""
+    """Yield forms with the limits of their parameters; a parameter that is read in the air may have any size."""
     for name, form in designs.forms.items():
-        high = POSSIBLE_SIZES * form.plausible
-        low = 0.0 if form.positive else -high
-        found = [form.reading(trial) for trial in designs.as_read.trials] if form.reading else []
-        if known := [one for one in found if one is not None]:
-            middle, reach = float(np.mean([value for value, _ in known])), POSSIBLE_SIZES * known[0][1]
-            low, high = max(low, middle - reach), min(high, middle + reach)
-        yield name, (low, high)
+        high = math.inf if form.reads else POSSIBLE_SIZES * form.plausible
+        yield name, (0.0 if form.positive else -high, high)

@@ -3,8 +3,9 @@
 import numpy as np
 
 from fes_pin.infer.family import SimulatedFamily
+from fes_pin.infer.fits import Names
 from fes_pin.walk.designs import Designs
-from fes_pin.walk.likelihood import fit_many
+from fes_pin.walk.likelihood import Fitted, fit_many
 
 SIMULATED = 100
 """Number of simulated residuals that give the distribution of the largest gain."""
@@ -25,12 +26,16 @@ def simulated_nulls(designs: Designs, variance: np.ndarray) -> tuple[SimulatedFa
         For each form, (p,) root mean square of value over standard deviation: 1 if the intervals are right.
     """
     drawn = _without_a_cause(designs, variance)
-    none = np.zeros((1, *variance.shape, 0))
-    alone = [f.deviance for f in fit_many(drawn, none, np.zeros((1, 0)), designs.noise, SIMULATED_ROUNDS)]
+    told = np.random.default_rng(designs.seed + 1).normal(size=(SIMULATED, designs.stated.air_n.size))
+
+    def fits(names: Names, x: np.ndarray) -> list[Fitted]:
+        read = told, designs.readings([names])[1]
+        return fit_many(drawn, x[None], designs.plausible(names)[None], designs.noise, SIMULATED_ROUNDS, read)
+
+    alone = [f.deviance for f in fits((), np.zeros((*variance.shape, 0)))]
     best, spread = np.full(SIMULATED, -np.inf), {}
     for name in designs.forms:
-        x = designs.noise.rotated(designs.as_read.x[name])
-        fitted = fit_many(drawn, x[None], designs.plausible((name,))[None], designs.noise, SIMULATED_ROUNDS)
+        fitted = fits((name,), designs.noise.rotated(designs.as_read.x[name]))
         best = np.maximum(best, np.subtract(alone, [f.deviance for f in fitted]))
         z = [f.values / np.sqrt(np.diag(f.covariance)) for f in fitted]
         spread[name] = np.sqrt(np.mean(np.square(z), axis=0))

@@ -15,8 +15,17 @@ from fes_pin.walk.motion import Session
 
 LOADED_N = 20.0
 """A foot stands where its vertical force is above this: the usual threshold on instrumented treadmills."""
+ORDINARY_N = 1.5
+"""Standard deviation of the force of calibrated plates: its mean errors were 2.5 to 5 N (A. Cappello et al., Gait
+Posture 33:724, 2011)."""
 SHORTEST_S = 0.1
 """A single support shorter than this is no step."""
+SWINGS = 0.2
+"""Share of the time that a foot which steps is in the air, at least: it swings for 0.4 of a stride (J. Perry, Gait
+Analysis, 1992). The load of one who sways by a quarter of the weight each way is within `LOADED_N` of its least for
+less than 0.16."""
+LEAST = 0.05
+"""Quantile that is taken as the least reading: a few samples may be spikes (a round figure)."""
 
 
 @dataclass(frozen=True)
@@ -32,9 +41,10 @@ class Plates:
     feet
         By side, (n, 6): force, N, and moment about the world's origin, N m; x forward, y left, z up.
     pressure
-        By side, (n, 3) m: the recorded centre of pressure; held while the foot is unloaded, where it means nothing.
+        By side, (n, 3) m: the recorded centre of pressure; held while the plate reads nearly nothing, where it means
+        nothing.
     loaded
-        By side, (n,) bool.
+        By side, (n,) bool: the vertical force is above that of the foot in the air by `LOADED_N`.
     """
 
     time: np.ndarray = field(repr=False)
@@ -85,7 +95,7 @@ def plates_of(
         How much later than their clock says the plates are read, s.
     """
     time, dt = time - later_s, float(time[-1] - time[0]) / (len(time) - 1)
-    feet, pressure, loaded = {}, {}, {}
+    feet, pressure, loaded, total = {}, {}, {}, columns["r_Fy"] + columns["l_Fy"]
     for side in SIDES:
         force, point, free = (
             np.stack([columns[f"{side[0]}_{kind}{c}"] for c in "xyz"], axis=1) @ TO_WORLD.T
@@ -95,9 +105,23 @@ def plates_of(
         wrench = np.hstack([force, np.cross(point, force) + free])
         smooth = low_pass(wrench, dt, session.cutoff_hz)
         feet[side] = _at(at, time, smooth)
-        loaded[side] = _at(at, time, force[:, 2:]).ravel() > LOADED_N
-        pressure[side] = _held(_at(at, time, point), loaded[side])
+        level = level_in_the_air(force[:, 2], total)
+        loaded[side] = _at(at, time, force[:, 2:]).ravel() > LOADED_N + level
+        pressure[side] = _held(_at(at, time, point), loaded[side] | (abs(level) > 0.5 * LOADED_N))
     return Plates(np.asarray(at, dtype=float), session.way(at), feet, pressure, loaded)
+
+
+def level_in_the_air(up: np.ndarray, total: np.ndarray) -> float:
+    """Return the vertical force that a plate reads while its foot is in the air, N; 0 of a foot that does not step.
+
+    Parameters
+    ----------
+    up, total
+        Vertical force of this plate and of both, (n,) N. A foot that steps carries half of the mean total at least.
+    """
+    least = up < np.quantile(up, LEAST) + LOADED_N
+    level = float(np.median(up[least]))
+    return level if np.mean(least) > SWINGS and np.max(up) - level > 0.5 * np.mean(total) else 0.0
 
 
 def _at(at: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarray:

@@ -1,5 +1,6 @@
 """The result of a diagnosis of walking: causes with significance and gain, lack of fit; and it in words."""
 
+import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -56,7 +57,7 @@ class WalkDiagnosis(ModelResult):
     def errors(self) -> list[Explained]:
         """Errors of the ground reaction, on all strides and on held-out strides."""
         pairs = zip((FITTED, CROSS_VALIDATED), self.nominal_error, self.extended_error, strict=True)
-        noise = self.ceiling_percent or None
+        noise = None if math.isnan(self.ceiling_percent) else self.ceiling_percent
         return [
             Explained(self.judged_on, on, before, after, noise)
             for on, before, after in pairs
@@ -91,17 +92,17 @@ class WalkDiagnosis(ModelResult):
 
     def notes(self) -> list[tuple[str, str]]:
         """Return notes in addition to the table, by topic."""
-        where = f", most in {self.remainder.where}" if self.remainder.where else ""
-        state = "a residual repeats in every stride" if self.remainder.unexplained else "none repeats in every stride"
-        rows = [
-            ("noise from stride to stride alone", f"E {percent(self.ceiling_percent)}"),
-            ("low pass", f"{self.cutoff_hz:g} Hz"),
-            ("lack of fit", f"{state} ({probability(self.remainder.p_value)}{where})"),
-        ]
+        where, many = self.remainder.where, self.models.designs.strides.count > 1
+        state = "a residual" if where else "none"
+        state += " repeats in every stride" if many else " exceeds that of 1 mm of marker noise"
+        most = f", most in {where}" if where else ""
+        rows = [("noise from stride to stride alone", f"E {percent(self.ceiling_percent)}")] * many
+        rows += [("low pass", f"{self.cutoff_hz:g} Hz")]
+        rows += [("lack of fit", f"{state} ({probability(self.remainder.p_value)}{most})")]
         for cause in self.causes:
             if (gain := cause.further.get("other_leg")) is not None:
                 words = f"{gain:.0f} % of its squared error, in single supports"
-                rows.append((f"{cause.name} of one leg's size gains on the other", words))
+                rows.append((f"{cause.name} ({cause.site}) of one leg's size gains on the other", words))
             if cause.elsewhere:
                 rows.append((f"{cause.name} as well at", "; ".join(cause.elsewhere[:4])))
         return [*rows, *([("not testable here", ", ".join(self.absorbed))] if self.absorbed else []), *super().notes()]

@@ -8,9 +8,11 @@ from fes_pin.infer.held_out import is_supported
 from fes_pin.infer.levels import CERTAIN_LEVEL, CLAIM_LEVEL, WALK_LEVEL
 from fes_pin.infer.result import FITTED, NO_GAIN, Cause, Evidence, ParameterEstimate, Remainder
 from fes_pin.infer.search import SearchResult
+from fes_pin.infer.text import listed
 from fes_pin.infer.verdict import State, Verdict, Weighed
 from fes_pin.walk.designs import Designs
 from fes_pin.walk.effect import STAGE
+from fes_pin.walk.effects.stated_mass import StatedMass
 from fes_pin.walk.errors import StrideErrors
 from fes_pin.walk.judge import lack_of_fit, other_leg
 from fes_pin.walk.models import WalkFit, WalkModels, WalkSearch
@@ -30,8 +32,9 @@ class WalkVerdict(Verdict[WalkFit, WalkModels, Weighed]):
 
     The likelihood of held-out strides must support a cause: it counts errors of soft tissue, landmarks and plates in
     every stride as noise, which make up most of an error in newtons. A form that belongs to neither leg must also
-    predict the stances of one leg from those of the other. With a single stride nothing can be held out; only a cause
-    that is certain is then named.
+    predict the stances of one leg from those of the other. An offset that is read in the air need not lessen the errors
+    in newtons, which other errors may hide. With a single stride nothing can be held out; only a cause that is certain
+    is then named.
 
     Parameters
     ----------
@@ -63,13 +66,16 @@ class WalkVerdict(Verdict[WalkFit, WalkModels, Weighed]):
         other = self.other_leg(name)
         if p_value >= (WALK_LEVEL if weighed.evidence else CERTAIN_LEVEL) or (other is not None and other <= 0.0):
             return False
-        return not weighed.evidence or is_supported(weighed.evidence[name], weighed.gains[name], alone)
+        if not weighed.evidence or (self.models.designs.forms[name].reads and weighed.evidence[name].low > 0.0):
+            return True
+        return is_supported(weighed.evidence[name], weighed.gains[name], alone)
 
     def lack_of_fit(self, state: Judgement) -> Remainder:
         """Return the lack of fit: the residual repeats in every stride, or held-out strides rejected a cause."""
         remainder = state.weighed.lack_of_fit
-        left = remainder.unexplained or bool(state.rejected)
-        return replace(remainder, unexplained=left, where=remainder.where if left else None)
+        if remainder.unexplained or not state.rejected:
+            return remainder
+        return replace(remainder, unexplained=True, reason=f"strides held out reject {listed(sorted(state.rejected))}")
 
     def cause(self, state: Judgement, name: str) -> Cause:
         """Return the report of one form of the set."""
@@ -78,8 +84,12 @@ class WalkVerdict(Verdict[WalkFit, WalkModels, Weighed]):
         near = self.models.near_rivals(found, name)
         instead = [forms[n] for r in near for n in r.names if n not in best.names]
         values, stds = self.models.sizes(best)[name].tolist(), self.models.deviations(best)[name].tolist()
-        each = zip(form.parameters, values, stds, form.units, strict=True)
-        gain = weighed.gains[name]
+        each, words = [*zip(form.parameters, values, stds, form.units, strict=True)], ""
+        if form.cause == StatedMass.name:
+            body, (share,), (std,) = self.models.designs.stated.body_kg, values, stds
+            each = [(form.site, body * (1.0 + share), body * std, "kg")]
+            words = f"the body is stated to weigh {body:.4g} kg; it weighs {body * (1.0 + share):.4g}"
+        gain, gained = weighed.gains[name], found.without[name].fitted.deviance - best.fitted.deviance
         return Cause(
             name=form.cause,
             stage=STAGE,
@@ -90,7 +100,8 @@ class WalkVerdict(Verdict[WalkFit, WalkModels, Weighed]):
             p_value=found.p_values[name],
             gain_fit=self.errors.gain(found.without[name], best, False).percent,
             gain_held_out=gain if weighed.evidence else replace(gain, on=FITTED),
-            evidence=weighed.evidence.get(name),
+            evidence=weighed.evidence.get(name) or replace(Evidence.of(gained), on=FITTED),
+            words=words,
             further={"other_leg": self.other_leg(name)},
         )
 

@@ -3,6 +3,7 @@
 
 import functools
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -12,11 +13,12 @@ from diagnosis.hidden import study_of as made
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.plausibility import ToPredict
-from fes_pin.diagnosis.checked import check
+from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.diagnosis import UNCHECKED, diagnose_joint
 from fes_pin.diagnosis.plausibility import check_study
 from fes_pin.diagnosis.testable import given_away
 from fes_pin.models.nominal import nominal_model
+from fes_pin.verdict.ask import check
 from fes_pin.view.report import report_html
 from fes_pin.workers import OutOfTime, time_limit
 
@@ -149,6 +151,47 @@ def test_what_no_pendulum_does_by_itself():
     assert any("comes to rest at 1.2 rad, and by the URDF it hangs at" in words for words in said(settled))
     fine = free(lambda t: 0.5 * np.exp(-3.0 * t) * np.cos(6.0 * t) + noise(t))
     assert len(said(fine)) == 1  # that it is not driven
+
+
+def test_all_trials_that_rest_elsewhere_are_named_with_where():
+    settled = free(lambda t: 1.2 + 0.5 * np.exp(-3.0 * t) * np.cos(6.0 * t))
+    lower = changed(settled, ("position",), lambda y: y - 0.1, 1)
+    (words,) = (one for one in said(lower) if "comes to rest" in one)
+    assert "at 1.1 to 1.2 rad, and by the URDF it hangs at" in words
+    assert f"in {len(lower.trials)} trials ({lower.trials[0].name} to {lower.trials[-1].name})" in words
+
+
+def test_a_force_before_the_first_pulse_is_said():
+    lead, random = 40, np.random.default_rng(0)
+    later = lambda y: np.concatenate([np.zeros(lead), y[:-lead]])  # noqa: E731
+    study = changed(study_of("muscle"), INPUTS, later)
+    noise = 1e-3 * max(float(t["force_n"].max()) for t in study.trials) * random.standard_normal(lead)
+    study = changed(study, ("force_n",), lambda y: np.concatenate([noise, y[:-lead]]))
+    assert said(study) == []
+    rest = 0.1 * max(float(t["force_n"].max()) for t in study.trials)
+    for only, where in ((None, f"{len(study.trials)} trials (00 to 04)"), (2, "trial 02")):
+        (words,) = said(changed(study, ("force_n",), lambda y: y + rest, only))
+        value, ending = re.fullmatch(r"the force is ([\d.]+)(?: to [\d.]+)? N before any pulse in (.*)", words).groups()
+        assert float(value) == pytest.approx(rest, rel=0.01) and ending == where
+
+
+@pytest.mark.parametrize("held", [0.0, 0.05, 0.5, -0.5])
+def test_an_effort_that_neither_gravity_nor_friction_asks_for_is_said(held):
+    """Dry friction of 0.1 N m holds 0.05 N m; it does not hold five times as much."""
+    study = study_of("joint")
+    c, random = nominal_model(study).rig.constants, np.random.default_rng(0)
+    time = np.arange(0.0, 10.0, 0.01)
+    q = 0.3 + np.where(time > 2.0, 0.4 * np.sin(2.0 * (time - 2.0)), 0.0)
+    v = np.gradient(q, time)
+    effort = c["inertia"] * np.gradient(v, time) + c["gravity_cos"] * np.cos(q) + c["gravity_sin"] * np.sin(q)
+    effort += held + 0.1 * np.sign(v) + 1e-3 * random.standard_normal(len(time))
+    turned = Trial(
+        "turned", "imposed", {"position": q + 1e-4 * random.standard_normal(len(time)), "effort": effort}, time
+    )
+    words = [one for one in said(replace(study, trials=(turned,))) if "before anything moves" in one]
+    expected = f"the effort differs from gravity's by {held:g} before anything moves (another zero of its sensor?) in"
+    expected += " trial turned"
+    assert words == [expected] * (abs(held) > 0.2)
 
 
 def test_slides():

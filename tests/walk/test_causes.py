@@ -80,7 +80,7 @@ def test_the_catalogue_is_the_contracts(shared):
     import tomllib
 
     contract = tomllib.loads((shared / "contract/effects.toml").read_text())
-    asked = {name for name, entry in contract.items() if "body" in entry["rigs"]} | {"base_tilt"}
+    asked = {name for name, entry in contract.items() if "body" in entry["rigs"]} | {"base_tilt", "condition_misread"}
     assert {e.name for e in EFFECTS} == asked
 
 

@@ -4,17 +4,15 @@ from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
-from scipy.ndimage import binary_dilation
 
+from fes_pin.body.joints import SIDES
 from fes_pin.walk.effect import AXES, PLATES, Form, WalkEffect
+from fes_pin.walk.plates import ORDINARY_N
 from fes_pin.walk.walk_trial import WalkTrial
 
-ORDINARY_N, ORDINARY_M = 1.5, 0.004
-"""Standard deviations of calibrated plates while loaded: mean errors of force were 2.5 to 5 N, of the centre of
-pressure 0.6 to 2.3 mm after and 2 to 14 mm before calibration (A. Cappello et al., Gait Posture 33:724, 2011)."""
-
-SETTLED_S = 0.1
-"""s; how far from a step the low pass no longer carries it."""
+ORDINARY_M = 0.004
+"""Standard deviation of the centre of pressure of calibrated plates: its errors were 0.6 to 2.3 mm after and 2 to 14 mm
+before calibration (A. Cappello et al., Gait Posture 33:724, 2011)."""
 
 
 class PlateOffset(WalkEffect):
@@ -39,7 +37,7 @@ class PlateOffset(WalkEffect):
                     yield Form(
                         cls.name, f"{site}, {word} force, {when}", (f"{word}_n",), 20.0, columns,
                         ordinary=single * ORDINARY_N * (when == "while loaded"),
-                        reading=partial(_unloaded, sides=sides, axis=axis) if when == "always" else None,
+                        reads=tuple(3 * SIDES.index(s) + axis for s in sides) if when == "always" else (),
                     )  # fmt: skip
             for axis, word in enumerate(AXES[:2]):
                 columns = partial(_displaced, sides=sides, axis=axis)
@@ -54,17 +52,6 @@ def _constant(trial: WalkTrial, sides: tuple[str, ...], axis: int, loaded: bool)
     return np.sum([w * (trial.plates.loaded[s][:, None] if loaded else 1.0) for s, w in unit.items()], axis=0)[
         ..., None
     ]
-
-
-def _unloaded(trial: WalkTrial, sides: tuple[str, ...], axis: int) -> tuple[np.ndarray, float] | None:
-    """What the plates read while nobody stands on them, which is what they always read: the least of both."""
-    values = []
-    for side in sides:
-        free = ~binary_dilation(trial.plates.loaded[side], iterations=int(np.ceil(SETTLED_S / trial.motion.dt)))
-        if not free.any():
-            return None
-        values.append(float(np.mean(trial.plates.feet[side][free, axis])))
-    return np.array([min(values, key=abs)]), ORDINARY_N
 
 
 def _displaced(trial: WalkTrial, sides: tuple[str, ...], axis: int) -> np.ndarray:
