@@ -1,13 +1,11 @@
 """Errors of sets of causes in held-out strides: in newtons, and as evidence in units of the noise."""
 
-from dataclasses import replace
 from functools import cache, partial
 
 import numpy as np
 
 from fes_pin.infer.held_out import Errors, added_likelihood, held_out_gain
 from fes_pin.infer.result import Evidence, Gain
-from fes_pin.infer.text import WHOLE
 from fes_pin.walk.designs import Designs
 from fes_pin.walk.likelihood import fit_many
 from fes_pin.walk.models import WalkFit, WalkModels
@@ -50,14 +48,10 @@ class StrideErrors:
         return self.errors(one, False).error_percent(), held_out
 
     def gain(self, without: WalkFit, best: WalkFit, held_out: bool) -> Gain:
-        """Return the share of the nominal error above the noise that a set removes, against a smaller set.
-
-        It is all of that error at most: a smaller set may err more than the nominal model.
-        """
+        """Return the share of the nominal error above the noise that a set removes, against a smaller set."""
         sets = (self.models.nominal(), without, best)
         nominal, before, after = (self.errors(one, held_out) for one in sets)
-        gain = held_out_gain(nominal, before, after, self.models.designs.seed)
-        return replace(gain, **{n: min(getattr(gain, n), WHOLE) for n in ("percent", "low", "high")})
+        return held_out_gain(nominal, before, after, self.models.designs.seed)
 
     def evidence(self, without: WalkFit, best: WalkFit) -> Evidence:
         """Return the evidence for a set in held-out strides, against a smaller set, with the set's noise.
