@@ -104,7 +104,7 @@ def in_one_line(classes: Iterable[type[Effect] | type[Rig]], method: str = "") -
         yield
     except InputError:
         raise
-    except Exception as error:  # anybody's code: anything may be wrong with it
+    except (Exception, SystemExit) as error:  # anybody's code: anything may be wrong with it
         theirs = {_path(one): one for one in classes if origin(one)}
         for frame in reversed(traceback.extract_tb(error.__traceback__)):
             if one := theirs.get(Path(frame.filename).resolve()):
@@ -116,12 +116,10 @@ def in_one_line(classes: Iterable[type[Effect] | type[Rig]], method: str = "") -
 
 
 def fault_of(one: type, method: str, words: str) -> InputError:
-    """One line on a method of a class, with the row where it, or the class that lacks it, is defined."""
+    """One line on a method of a class, with the row where it is defined if that is with the class."""
     function = inspect.unwrap(getattr(one, method, one))
-    code = getattr(getattr(function, "__func__", function), "__code__", None)
-    is_theirs = code is not None and Path(code.co_filename).resolve() == _path(one)
-    row = code.co_firstlineno if code is not None and is_theirs else inspect.getsourcelines(one)[1]
-    return InputError(f"class {one.__name__}: {words}", file=_where(one.__module__), row=row)
+    code = getattr(function, "__code__", None) if function.__module__ == one.__module__ else None
+    return InputError(f"class {one.__name__}: {words}", file=_where(one.__module__), row=code and code.co_firstlineno)
 
 
 def _path(one: type) -> Path:

@@ -102,7 +102,7 @@ def _expected(name: str, found: Any, owner: Any = None, first: Any = None, *_: A
         return "" if is_whole else "a lower and an upper bound of each"
     if name in ("grids", "far_sizes") and any(np.ndim(many) != 1 for many in found.values()):
         return "a tuple of numbers of each"
-    numbers = [np.asarray(one) for one in _leaves(found) if not is_expression(one)]
+    numbers = [np.asarray(one) for one in ([found] if name == "apply" else _leaves(found)) if not is_expression(one)]
     if not all(np.issubdtype(one.dtype, np.number) for one in numbers):
         return "numbers"
     is_any = name in EQUATIONS and _NOTES.get() is None  # what was not measured is NaN
@@ -200,7 +200,7 @@ def _try(model: Model, part: Effect | Rig, kind: str, inputs: tuple[str, ...], *
     InputError
         For what is not as `try_effect` says.
     """
-    one, notes = type(part), _Notes()
+    notes = _Notes()
     also = dict.fromkeys([*inputs, *(n for e in model.effects for n in e.inputs)])
     layout = make_layout(model, kind, tuple(also), tuple(model.parameters()))
     sym, plain = (Symbols(model, layout, estimated=False) for _ in range(2))
@@ -209,12 +209,18 @@ def _try(model: Model, part: Effect | Rig, kind: str, inputs: tuple[str, ...], *
     numbers = _numbers(sym, [{**model.parameters(), **{f"{part.name}.{n}": v for n, v in s.items()}} for s in settings])
     _NOTES.set(notes)
     try:
-        of_rig = column(_about_rest(sym))
-        _reject(part, [note for note in notes if type(note[1][0]) is one], symbols, numbers, len(settings) > 1)
+        of_rig, steps = _near_rest(sym)
+        moving = ["." in n and values is not sym.p for values, n in places]
+        names, *both = _returned([note for note in notes if type(note[1][0]) is type(part)])
+        made = ca.Function("tried", [ca.vertcat(*symbols)], [column(one) for one in (*both, steps)])
+        for _ in range(2):  # at their rest, and a step from it
+            signals, results, step = map(np.array, made.call([numbers]))
+            _reject(part, zip(names, signals, results, strict=True), len(settings) > 1)
+            numbers[moving] += step
         for (values, n), number in zip(_places(plain), numbers[:, -1], strict=True):
             values[n] = float(number)
         with np.errstate(all="ignore"):  # what is not finite is rejected
-            _about_rest(plain)
+            _near_rest(plain)
     finally:
         _NOTES.set(None)
     if isinstance(part, Effect):
@@ -224,7 +230,7 @@ def _try(model: Model, part: Effect | Rig, kind: str, inputs: tuple[str, ...], *
             method(dict.fromkeys(columns, np.linspace(0.1, 0.9)))
         part.start_variances(1.0, 1.0)
     own = [symbol for symbol, (_, n) in zip(symbols, places, strict=True) if n.startswith(f"{part.name}.")]
-    return bool(own) and ca.depends_on(of_rig, ca.vertcat(*own))
+    return bool(own) and ca.depends_on(column(of_rig), ca.vertcat(*own))
 
 
 def _numbers(sym: Symbols, settings: list[dict[str, float]]) -> np.ndarray:
@@ -245,29 +251,33 @@ def _places(sym: Symbols) -> list[tuple[dict[str, Any], str]]:
     return places + [(vars(sym), n) for n in ("t", "since", "into", "z")]
 
 
-def _about_rest(sym: Symbols) -> list[Any]:
-    """The rates, memories and readings of the rig, where states and memories are differences from rest."""
+def _near_rest(sym: Symbols) -> tuple[list[Any], list[Any]]:
+    """Return rates, memories and readings of a rig, and steps of effects' states and memories; all differ from rest."""
     states, memories, _ = sym.at_rest()
     sym.x, sym.m = ({n: v + there[n] for n, v in one.items()} for one, there in ((states, sym.x), (memories, sym.m)))
     after, rates, readings = sym.running()
-    rows = [*zip(sym.memories, after, strict=True), *zip(sym.states, rates, strict=True)]
-    return [value for n, value in rows if "." not in n] + readings
+    rows = [(n, sym.c["step"] * rate) for n, rate in zip(sym.states, rates, strict=True)]
+    rows += [(n, value - sym.m[n]) for n, value in zip(sym.memories, after, strict=True)]
+    return [*(v for n, v in rows if "." not in n), *readings], [v for n, v in rows if "." in n]
 
 
-def _reject(part: Effect | Rig, notes: _Notes, symbols: list[Any], numbers: np.ndarray, null_first: bool) -> None:
-    """Reject what is not finite, an effect that ignores its signal, and one that is not nominal at its null."""
-    one, other = type(part), ca.SX.sym("value")
-    applied = [(effect.apply(other, s.of(effect)), other) for n, (effect, *_, s), _ in notes if n == "apply"]
-    if applied and not any(ca.depends_on(ca.SX(found), other) for found, _ in applied):
-        raise fault_of(one, "apply", "apply ignores value; expected the signal with the effect")
-    leaves = [(n, given[1] if n == "apply" else 0.0, leaf) for n, given, found in notes for leaf in _leaves(found)]
-    names, *pairs = zip(*leaves, strict=True) if leaves else ((), (), ())
-    values = ca.Function("tried", [ca.vertcat(*symbols)], [column([*one]) for one in pairs]).call([numbers])
-    for n, value, found in zip(names, *map(np.array, values), strict=True):
-        bad = np.isfinite(value) & ~np.isfinite(found)
+def _returned(notes: _Notes) -> list[list[Any]]:
+    """Return for each number that a method returned: the method, the signal of `apply` (else 0), and the number."""
+    other = ca.SX.sym("value")
+    applied = [effect.apply(other, s.of(effect)) for n, (effect, *_, s), _ in notes if n == "apply"]
+    if applied and not any(ca.depends_on(ca.SX(found), other) for found in applied):
+        raise fault_of(type(notes[0][1][0]), "apply", "apply ignores value; expected the signal with the effect")
+    rows = [(n, given[1] if n == "apply" else 0.0, leaf) for n, given, found in notes for leaf in _leaves(found)]
+    return [[row[k] for row in rows] for k in range(3)]
+
+
+def _reject(part: Effect | Rig, rows: Iterable[tuple[str, np.ndarray, np.ndarray]], null_first: bool) -> None:
+    """Reject what is not finite, and an effect that is not nominal at its null, the first setting."""
+    for n, signal, result in rows:
+        bad = np.isfinite(signal) & ~np.isfinite(result)
         if bad.all() if isinstance(part, Rig) else bad.any():
-            raise fault_of(one, n, f"{n} gives NaN or infinity; expected {FINITE}")
-        off = np.abs(found - value)[:POINTS] > ROUNDING * np.maximum(1.0, np.abs(value[:POINTS]))
+            raise fault_of(type(part), n, f"{n} gives NaN or infinity; expected {FINITE}")
+        off = np.abs(result - signal)[:POINTS] > ROUNDING * np.maximum(1.0, np.abs(signal[:POINTS]))
         if n == "apply" and null_first and off.any():
-            words = f"apply makes {found[:POINTS][off][0]:.6g} of {value[:POINTS][off][0]:.6g} at the null"
-            raise fault_of(one, n, f"{words}; expected the same number")
+            words = f"apply makes {result[:POINTS][off][0]:.6g} of {signal[:POINTS][off][0]:.6g} at the null"
+            raise fault_of(type(part), n, f"{words}; expected the same number")

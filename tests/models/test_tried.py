@@ -77,6 +77,8 @@ CAUSES = {  # text, the words of the row that is named, what is said
     ),
     "another_null": (CAUSE.replace("null=0.0", "null=0.5"), "def apply", "at the null; expected the same number"),
     "forgotten_return": (applying(LINE.replace("return ", "")), "def apply", "apply returns None; expected numbers"),
+    "several": (applying("        return value, s.v\n"), "def apply", "expected numbers"),
+    "an_end": (applying("        raise SystemExit(3)\n"), "SystemExit(3)", "SystemExit: 3"),
     "text": (applying('        return "value"\n'), "def apply", "apply returns 'value'; expected numbers"),
     "a_number_that_is_none": (
         applying('        return value + self.coefficient * float("inf")\n'),
@@ -90,6 +92,11 @@ CAUSES = {  # text, the words of the row that is named, what is said
         applying("        return value + 0.0 * self.coefficient * s.v\n"),
         "def apply",
         "the rig does not depend",
+    ),
+    "a_state_without_its_size": (
+        changed("- self.coefficient * s.own.late - self.coefficient * s.own.held", "- s.own.late"),
+        "def apply",
+        "at the null; expected the same number",
     ),
     "no_such_signal": (CAUSE.replace("s.v", "s.speed"), "s.speed", "AttributeError"),
     "no_such_input": (CAUSE.replace("s.v", "s.u.efort"), "s.u.efort", "has no attribute 'efort'"),
