@@ -126,17 +126,20 @@ def _leaves(found: Any) -> list[Any]:
 
 
 def try_rig(rig: type[Rig], effects: Iterable[type[Effect]]) -> None:
-    """Evaluate a rig in every kind of trial, alone and with every cause that it can have.
+    """Evaluate a rig in every kind of trial, alone and with every cause that it can have, once for these.
 
     Raises
     ------
     InputError
         For equations that give no finite numbers.
     """
-    every = Model(_rig(rig), tuple(e() for e in effects if rig.takes(e)))
+    if (key := (rig, *(taken := [e for e in effects if rig.takes(e)]))) in _DONE:
+        return
+    every = Model(_rig(rig), tuple(e() for e in taken))
     for kind, inputs in _kinds(rig):
         for model in (Model(every.rig), every.acting(kind, inputs)):
             _try(model, every.rig, kind, inputs, {})
+    _DONE.add(key)
 
 
 def try_effect(one: type[Effect], rigs: Iterable[type[Rig]], effects: Iterable[type[Effect]]) -> None:

@@ -282,10 +282,12 @@ def test_a_cause_that_acts_by_a_state_of_its_own_is_not_refused(tmp_path):
 
 
 def test_a_class_is_tried_once(tmp_path, monkeypatch):
-    runs, run = [], tried._try_on
-    monkeypatch.setattr(tried, "_try_on", lambda *given: (runs.append(given), run(*given)))
+    runs, run = [], tried._try
+    monkeypatch.setattr(tried, "_try", lambda *given: (runs.append(given), run(*given))[1])
     (tmp_path / "wrong.py").write_text(CAUSE)
-    library = fp.load_library(tmp_path / "wrong.py")
-    assert len(runs) == 1
-    fp.load_library(library, library.effect("door_closer"))
-    assert len(runs) == 1
+    (tmp_path / "tail.py").write_text(RIG)
+    library = fp.load_library(tmp_path / "tail.py", tmp_path / "wrong.py")
+    count = len(runs)
+    assert count >= 3  # the rig alone, the rig with all causes, the cause
+    assert fp.load_library(library).origins() == library.origins()
+    assert len(runs) == count
