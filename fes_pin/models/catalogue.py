@@ -13,9 +13,10 @@ from typing import Any
 from fes_pin.data.errors import InputError
 from fes_pin.data.schema import RigSchema
 from fes_pin.models import effects, rigs
-from fes_pin.models.outside import check_effect, check_rig, classes_of, load_module, origin
+from fes_pin.models.outside import check_effect, check_rig, classes_of, in_one_line, load_module, origin
 from fes_pin.models.rigs.base import Rig
 from fes_pin.models.stage import Effect, by_name, in_order
+from fes_pin.models.tried import guard, try_effect, try_rig
 
 GROUPS = ("fes_pin.effects", "fes_pin.rigs")
 """Entry points of packages: each names a class, or a module that holds classes."""
@@ -76,9 +77,17 @@ class Catalogue:
         for rig in (one for one in added if issubclass(one, Rig)):  # first: an effect may act on a rig of its own
             check_rig(rig)
             _refuse_another(known_rigs.setdefault(rig.name, rig), rig)
+            if origin(rig):
+                with in_one_line((rig,), "rates"):
+                    guard(rig)
+                    try_rig(rig, self.effects)
         for effect in (one for one in added if issubclass(one, Effect)):
             check_effect(effect, known_rigs.values())
             _refuse_another(known_effects.setdefault(effect.name, effect), effect)
+            if origin(effect):
+                with in_one_line((effect,), "apply"):
+                    guard(effect)
+                    try_effect(effect, known_rigs.values(), known_effects.values())
         return Catalogue(in_order(known_effects.values()), tuple(known_rigs[n] for n in sorted(known_rigs)))
 
 

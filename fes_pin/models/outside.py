@@ -3,9 +3,11 @@
 import hashlib
 import importlib
 import importlib.util
+import inspect
 import sys
 import traceback
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
 
@@ -19,6 +21,18 @@ OF_A_FILE = "fes_pin_library_"
 """How the names of modules begin that are made of files."""
 PACKAGE = "fes_pin."
 FROZEN = "expected @dataclass(frozen=True) above it"
+EQUATIONS = (
+    "signals",
+    "states",
+    "memories",
+    "constant_names",
+    "trial_constants",
+    "set_rest",
+    "sample",
+    "rates",
+    "readings",
+)
+"""Methods without which a rig has no equations."""
 STAGES = ", ".join(f"Stage.{stage.name}" for stage in Stage)
 
 
@@ -70,14 +84,42 @@ def _text_of(error: BaseException) -> str:
     return f"{type(error).__name__}: {words}".rstrip(": ")
 
 
-def at_fault(error: Exception, classes: Iterable[type]) -> InputError | None:
-    """One line on an error in the equations of somebody's own cause or rig; None if it is not in their code."""
-    theirs = {_path(one): one for one in classes if origin(one)}
-    for frame in reversed(traceback.extract_tb(error.__traceback__)):
-        one = theirs.get(Path(frame.filename).resolve())
-        if one is not None:
-            return InputError(f"class {one.__name__}: {_text_of(error)}", file=_where(one.__module__), row=frame.lineno)
-    return None
+@contextmanager
+def in_one_line(classes: Iterable[type[Effect] | type[Rig]], method: str = "") -> Iterator[None]:
+    """Let errors in somebody's own causes and rigs be one line, with the row where they are raised.
+
+    Parameters
+    ----------
+    classes
+        Those that may be at fault; what is written here is none.
+    method
+        Of the first of them: at fault as well where an error is raised outside of them all. Without, that is raised.
+
+    Raises
+    ------
+    InputError
+        In the place of such an error.
+    """
+    try:
+        yield
+    except InputError:
+        raise
+    except (Exception, SystemExit) as error:  # anybody's code: anything may be wrong with it
+        theirs = {_path(one): one for one in classes if origin(one)}
+        for frame in reversed(traceback.extract_tb(error.__traceback__)):
+            if one := theirs.get(Path(frame.filename).resolve()):
+                words = f"class {one.__name__}: {_text_of(error)}"
+                raise InputError(words, file=_where(one.__module__), row=frame.lineno) from error
+        if not method:
+            raise
+        raise fault_of(next(iter(classes)), method, _text_of(error)) from error
+
+
+def fault_of(one: type, method: str, words: str) -> InputError:
+    """One line on a method of a class, with the row where it is defined if that is with the class."""
+    function = inspect.unwrap(getattr(one, method, one))
+    code = getattr(function, "__code__", None) if function.__module__ == one.__module__ else None
+    return InputError(f"class {one.__name__}: {words}", file=_where(one.__module__), row=code and code.co_firstlineno)
 
 
 def _path(one: type) -> Path:
@@ -152,6 +194,8 @@ def check_rig(one: type[Rig]) -> None:
         problem = "expected a name of letters, digits and _"
     elif not isinstance(getattr(one, "schema", None), RigSchema):
         problem = "expected schema, a RigSchema: the keys and columns of its studies"
+    elif lacking := [name for name in EQUATIONS if getattr(one, name) is getattr(Rig, name)]:
+        problem = f"expected methods {', '.join(lacking)}"
     if problem:
         raise InputError(f"class {one.__name__}: {problem}", file=_where(one.__module__))
 
@@ -166,6 +210,8 @@ def _form_lacks(one: type[Effect]) -> str:
         f"expected a stage, one of {STAGES}": not isinstance(getattr(one, "stage", None), Stage),
         'expected rigs, a tuple of names as in ("joint",)': not isinstance(getattr(one, "rigs", None), tuple),
         "expected a method apply(self, value, s)": one.apply is Effect.apply,
+        "expected a method rate(self, s) of its states": bool(one.states) and one.rate is Effect.rate,
+        "expected a method update(self, s) of its memories": bool(one.memories) and one.update is Effect.update,
         "expected a parameter with a null, which switches it off": not one.amplitudes(),
     }
     for name, info in one.parameters().items():

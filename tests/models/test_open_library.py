@@ -20,6 +20,7 @@ from fes_pin.models.catalogue import installed, shipped
 from fes_pin.models.disturbance import disturbed
 from fes_pin.models.effects import CoulombFriction
 from fes_pin.models.model import Model
+from fes_pin.models.outside import load_module
 from fes_pin.models.stage import classes_in
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "own_causes_and_rigs.md"
@@ -212,14 +213,14 @@ def test_a_file_that_is_not_whole_is_one_line(text, words, tmp_path):
     assert stays == (text is not None and "cannot be run" not in message)  # what did not run is no module
 
 
-def test_an_error_in_its_equations_is_one_line(own, study, tmp_path):
-    path = tmp_path / "mine.py"
+def test_an_error_in_its_equations_is_one_line_without_a_library_too(own):
+    path = own / "mine.py"
     path.write_text(CAUSE.replace("s.v", "s.speed"))
     row = 1 + next(k for k, line in enumerate(path.read_text().splitlines()) if "s.speed" in line)
-    library = fp.load_library(own / "tail.py", path)
-    measured = fp.read_study(study, rigs=library.schemas())
+    rig = rigs.Joint(constants={"inertia": INERTIA, "gravity_cos": 0.0, "gravity_sin": 0.6, "revolute": 1.0})
+    trial = fp.Trial("a", "motion", {"effort": np.zeros(9)}, DT * np.arange(9), {"position0": 0.1})
     with pytest.raises(fp.InputError) as caught:
-        fp.diagnose(measured, library=library)
+        fp.simulate(Model(rig) + load_module(path).DoorCloser(), trial)
     assert str(caught.value).startswith(f"{path}, row {row}: class DoorCloser: AttributeError: ")
     assert "\n" not in str(caught.value)
 

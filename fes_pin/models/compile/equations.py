@@ -50,7 +50,7 @@ class Equations:
         return Sizes(f["start"].numel_out(0), f["start"].numel_out(1), reading, f["rates"].numel_out(0))
 
 
-class _Symbols:
+class Symbols:
     """Symbols of one model, and the signals made of them."""
 
     def __init__(self, model: Model, layout: Layout, estimated: bool) -> None:
@@ -176,7 +176,7 @@ class Tangents:
     """
 
     def __init__(self, model: Model, layout: Layout, estimated: bool = False) -> None:
-        self.layout, self.sym = layout, (sym := _Symbols(model, layout, estimated))
+        self.layout, self.sym = layout, (sym := Symbols(model, layout, estimated))
         self.x, self.m, self.p, self.c, self.u = (sym.vector(v) for v in (sym.x, sym.m, sym.p, sym.c, sym.u))
         self.t, self.since, self.into, self.z = sym.t, sym.since, sym.into, sym.z
         states, memories, residual = sym.at_rest()

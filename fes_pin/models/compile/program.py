@@ -19,7 +19,9 @@ from fes_pin.models.compile.layout import Layout
 from fes_pin.models.compile.predictor import derive_predictor
 from fes_pin.models.compile.virtual import VirtualProgram
 from fes_pin.models.model import Model
-from fes_pin.models.outside import at_fault
+from fes_pin.models.outside import in_one_line
+from fes_pin.models.rigs.base import Rig
+from fes_pin.models.stage import Effect
 
 _LOG = logging.getLogger("fes_pin")
 
@@ -84,16 +86,11 @@ def derived(model: Model, layout: Layout) -> Equations:
     InputError
         With file and row, if the equations of an own cause or rig cannot be run.
     """
-    try:
+    with in_one_line(_classes(model)):
         return derive_predictor(model, layout) if layout.measured else derive(model, layout)
-    except Exception as error:
-        fault = at_fault(error, _classes(model))
-        if fault is None:
-            raise
-        raise fault from error
 
 
-def _classes(model: Model) -> tuple[type, ...]:
+def _classes(model: Model) -> tuple[type[Rig] | type[Effect], ...]:
     """Return the key of the equations: the classes of rig and effects, own ones of the same name too."""
     return (type(model.rig), *(type(e) for e in model.effects))
 
