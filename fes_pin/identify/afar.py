@@ -20,7 +20,7 @@ from fes_pin.identify.likelihood_fit import LikelihoodFit, maximise
 from fes_pin.identify.problem import Problem
 from fes_pin.identify.process_noise import first_guess
 from fes_pin.infer.held_out import percent_of_spread
-from fes_pin.infer.levels import CONFIDENCE_95, FAR_PERCENT, NOTHING_PERCENT, RUNAWAY
+from fes_pin.infer.levels import CONFIDENCE_95, NOTHING_PERCENT, RUNAWAY
 from fes_pin.infer.noise import Noise
 from fes_pin.infer.problem import completed
 from fes_pin.models.model import Model
@@ -46,11 +46,6 @@ def misfit_percent(fitted: Fit) -> float:
         ]
     most = RUNAWAY**2 * len(outputs)
     return percent_of_spread(np.clip(np.nan_to_num(squares, nan=most, posinf=most), 0.0, most), float(len(outputs)))
-
-
-def is_far(fitted: Fit) -> bool:
-    """Return whether a fit is far from the data: E of its free simulations is above `FAR_PERCENT`."""
-    return misfit_percent(fitted) > FAR_PERCENT
 
 
 def following(model: Model, trials: Sequence[Trial]) -> StateSpaceNoise | None:

@@ -61,8 +61,8 @@ UNFELT = 1e-4
 amplitude, a tenth of `SMALL_SHARE`."""
 SMALL_PERCENT = 100.0 * SMALL_SHARE**2
 """Error E that is small, in percent. Literature: a tenth of what Dombre, Fournier and Coiffet call a good fit."""
-FAR_PERCENT = 25.0
-"""Error E of a model that is far from the data, in percent. Theory: it leaves half of the amplitude."""
+FAR_PERCENT = 100.0 * SMALL_SHARE
+"""Error E of a model that is far from the data, in percent. Theory: what it leaves is no small share of the squares."""
 NOTHING_PERCENT = SMALL_SHARE * SMALL_PERCENT
 """Gain that is negligible, in percent. Theory: a small share of a small error."""
 MOST_PERCENT = 50.0

@@ -15,7 +15,7 @@ from fes_pin.diagnosis.search.likelihood_maxima import less, likeliest, look, ma
 from fes_pin.diagnosis.search.possible import is_possible
 from fes_pin.diagnosis.search.score import Scored, best_by_effect
 from fes_pin.diagnosis.search.starts import STARTED, STARTS, at_null, from_afar, refinements, started
-from fes_pin.identify.afar import followed, following, freed, is_far, misfit_percent, with_beliefs
+from fes_pin.identify.afar import followed, following, freed, misfit_percent, with_beliefs
 from fes_pin.identify.ahead import default_horizon
 from fes_pin.identify.correlation_time import with_new_noise
 from fes_pin.identify.likelihood import LikelihoodProblem
@@ -23,7 +23,7 @@ from fes_pin.identify.likelihood_fit import LikelihoodFit, at_noise, fit_of, max
 from fes_pin.identify.process_noise import first_guess, stilled, without_memory
 from fes_pin.infer.covariance import step_gain
 from fes_pin.infer.fits import Candidate, FittedSets, Names
-from fes_pin.infer.levels import MOST_CAUSES, SMALL_PERCENT, SMALL_SHARE
+from fes_pin.infer.levels import FAR_PERCENT, MOST_CAUSES, SMALL_PERCENT, SMALL_SHARE
 from fes_pin.infer.maximise import ROUNDS
 from fes_pin.infer.optimize import WORTH
 from fes_pin.infer.optimum import minimise
@@ -107,7 +107,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         self._calm: StateSpaceNoise | None = None
         self._following = None if answered else following(self.model, self.trials)
         self._followed: dict[Names, LikelihoodFit] = {}
-        self._far: dict[LikelihoodFit, bool] = {}
+        self._misfits: dict[LikelihoodFit, float] = {}
         self._rough: Self | None = None
         self._compared: dict[tuple[Names, str], LikelihoodFit] = {}
 
@@ -123,7 +123,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         """Return the same trials and causes with some fits to start from; the process noise is timed as in these."""
         other = copy.copy(self)
         other.fits = {f.names: f for f in fits}
-        other._converged, other._begun, other._compared, other._far = set(), set(), {}, {}
+        other._converged, other._begun, other._compared = set(), set(), {}
         return other
 
     def with_noise(self, noise: str) -> Self:
@@ -180,7 +180,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         problem.noise = problem.with_orders(fitted.values, fitted.unknowns)
         problem.renew(fitted.values, fitted.unknowns)
         found = self._maximum(fitted.model, problem.noise, fitted.unknowns, rounds)
-        if self.is_far(found) and misfit_percent(found) > MORE * misfit_percent(fitted):
+        if self.misfit(found) > max(FAR_PERCENT, MORE * self.misfit(fitted)):
             return fit_of(problem, minimise(problem, fitted.values, fitted.unknowns, 0))
         return found
 
@@ -222,12 +222,19 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         return {n: min((*fits, restarted.get(n, fits[0])), key=lambda f: f.criterion) for n, fits in each}
 
     def is_far(self, fitted: LikelihoodFit) -> bool:
-        """Return whether a fit is far from the data (`identify.afar`); never in closed loop, where a filter is used."""
+        """Return whether E of a fit's free simulations is more than `FAR_PERCENT`, or small by least squares.
+
+        In closed loop it is not: a filter follows the data there.
+        """
         if self.answered:
             return False
-        if fitted not in self._far:
-            self._far[fitted] = is_far(fitted)
-        return self._far[fitted]
+        return self.misfit(fitted) > (SMALL_PERCENT if self.noise == WHITE else FAR_PERCENT)
+
+    def misfit(self, fitted: LikelihoodFit) -> float:
+        """Return E of a fit's free simulations, percent; see `identify.afar`."""
+        if fitted not in self._misfits:
+            self._misfits[fitted] = misfit_percent(fitted)
+        return self._misfits[fitted]
 
     def scored_in(self, base: LikelihoodFit) -> LikelihoodFit:
         """Return the fit in which causes are scored: the fit itself, or far from the data a filter that follows it."""
@@ -270,15 +277,15 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         best: Names = ()
         fits = self.fits
         self.nominal()
-        while misfit_percent(fits[best]) > SMALL_PERCENT and len(best) < MOST_CAUSES:
-            for names in self.near(len(best))[:NEAREST]:
+        while self.misfit(fits[best]) > SMALL_PERCENT and len(best) < MOST_CAUSES:
+            for names in self.ranked(len(best))[:NEAREST]:
                 self.extend(names, FITTED if names else None)
             larger = [n for n in self.ranked(len(best) + 1) if self.is_possible(fits[n])]
-            if not larger or misfit_percent(fits[larger[0]]) > (1.0 - SMALL_SHARE) * misfit_percent(fits[best]):
+            if not larger or self.misfit(fits[larger[0]]) > (1.0 - SMALL_SHARE) * self.misfit(fits[best]):
                 break
             best = larger[0]
         refined = refined_form(fits[best], self.library.measured) if best else None
-        if refined is not None and MORE * misfit_percent(refined) < misfit_percent(fits[best]):
+        if refined is not None and MORE * self.misfit(refined) < self.misfit(fits[best]):
             fits[best] = refined
         return best
 
