@@ -3,6 +3,7 @@
 .venv/bin/python scripts/control_safety.py                    # 1000 faults, 10 hours; 15 minutes on two cores
 .venv/bin/python scripts/control_safety.py --faults 80 --hours 0.5
 .venv/bin/python scripts/control_safety.py --faults 0 --hours 0 --steps 100000    # whatever callers do
+.venv/bin/python scripts/control_safety.py --faults 0 --hours 0 --steps 0 --schedules 1000    # whenever they call
 
 The ankles are twins (`analysis/paper_ankle/twin.py`), whose integrator shares no line with the controller's model. Each
 is off by up to 30 % in gain, time constant and stiffness from what the controller believes, half of them tire, a third
@@ -15,11 +16,14 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-from collections.abc import Callable, Iterable
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from multiprocessing import Pool
 from pathlib import Path
+from types import SimpleNamespace
+from unittest.mock import patch
 
 import numpy as np
 from scipy.stats import chi2
@@ -384,6 +388,110 @@ def abused(seed: int, steps: int = 2000) -> Abuse:
     return Abuse(2 * steps, pauses, rejected, tuple(wrong))
 
 
+@dataclass(frozen=True)
+class Calls:
+    """When a controller is called: in truth, and as stated; None where the computer's clock is asked."""
+
+    true_s: np.ndarray
+    stated_s: np.ndarray | None
+
+
+def calls(rng: np.random.Generator, seconds: float) -> Calls:
+    """Calls on a beat of 45 Hz, each up to 0 to 10 ms late; a program that is held up for 20 to 400 ms calls in a burst
+    what it has missed. In half of the schedules times are stated, by a clock that is set by 1 ms to an hour every two
+    seconds."""
+    true = np.arange(round(seconds / PULSE_S)) * PULSE_S
+    true += rng.uniform(0.0, rng.uniform(0.0, 0.01), len(true))
+    for begin in np.flatnonzero(rng.random(len(true)) < rng.choice([0.0, 0.005, 0.02])):
+        end = true[begin] + math.exp(rng.uniform(math.log(0.02), math.log(0.4)))
+        true[begin:] = np.maximum(true[begin:], end)
+    order = np.arange(len(true)) * rng.uniform(1e-5, 1e-3)  # of calls in a burst
+    true = np.maximum.accumulate(true - order) + order
+    if rng.random() < 0.5:
+        return Calls(true, None)
+    stated = true.copy()
+    for set_s in np.arange(rng.uniform(0.5, 2.0), seconds, 2.0):
+        stated[true >= set_s] += rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-3.0, 3.5)
+    return Calls(true, stated)
+
+
+def passed(true_s: np.ndarray, widths_us: Sequence[float], limits: StimulationLimits) -> list[str]:
+    """Limits that pulses at these times are beyond; the charge in any second."""
+    widths = np.asarray(widths_us)
+    total = np.r_[0.0, np.cumsum(widths)]
+    inside = total[np.searchsorted(true_s, true_s + 1.0)] - total[:-1]
+    on = (widths[1:] > 0.0) & (widths[:-1] > 0.0)
+    found = {
+        "charge": 1e-3 * (limits.current_ma or 0.0) * inside.max() > limits.charge_uc_per_s * (1.0 + 1e-9),
+        "width": widths.max() > limits.pulse_width_us,
+        "rise": np.max(np.diff(widths)[on], initial=0.0) > limits.rate_us_per_s * PULSE_S * (1.0 + 1e-9),
+    }
+    return [what for what, is_so in found.items() if is_so]
+
+
+@dataclass(frozen=True)
+class Called:
+    """What came of a schedule of calls: how many were refused, which faults there were, which limits were passed, and
+    in how many of the calls the controller was running."""
+
+    refused: int
+    faults: tuple[str, ...]
+    passed: tuple[str, ...]
+    running: int
+    calls: int
+
+
+def pulsed(joint: RunningTwin, lasts: tuple[float, float], gap: float) -> tuple[float, float]:
+    """Let a pulse of this width act on a joint for the time that it lasts, within a gap; what is left of both."""
+    width, left = lasts
+    joint.step(width, min(gap, left))
+    joint.step(0.0, max(gap - left, 0.0))
+    return width, max(left - gap, 0.0)
+
+
+def called(seed: int, seconds: float = 10.0) -> Called:
+    """A controller with limits that are reached, called by a schedule; after a fault it is reset."""
+    rng, controller, now = np.random.default_rng([seed, 79]), None, [0.0]
+    while controller is None:
+        try:
+            controller = PositionController(ankle_of(BELIEVED), BELIEVED.load_kg, limits=limits_of(rng))
+        except InputError:
+            continue
+    when, joint = calls(rng, seconds), RunningTwin(BELIEVED, max_step_s=STEP_S)
+    controller.follow(schedule(rng, seconds))
+    gaps = np.diff(when.true_s, append=when.true_s[-1] + PULSE_S).tolist()
+    widths, refused, faults, running, lasts = [], 0, [], 0, (0.0, 0.0)
+    with patch("fes_pin.control.timing.time", SimpleNamespace(monotonic=lambda: now[0])):
+        for k, gap in enumerate(gaps):
+            now[0] = float(when.true_s[k])
+            stated = None if when.stated_s is None else float(when.stated_s[k])
+            reading = joint.angle_rad + NOISE_RAD * rng.standard_normal()
+            try:
+                widths.append(controller.step(reading, time_s=stated))
+            except InputError:
+                refused += 1
+                widths.append(0.0)
+            if controller.status.is_fault:
+                faults.append(controller.status.name)
+                controller.reset()
+            running += controller.status is Status.RUNNING
+            lasts = pulsed(joint, lasts if not widths[-1] else (widths[-1], PULSE_S), gap)
+    return Called(refused, tuple(faults), tuple(passed(when.true_s, widths, controller.limits)), running, len(gaps))
+
+
+def show_called(outcomes: Iterable[Called]) -> None:
+    """What came of it."""
+    every = list(outcomes)
+    faults = Counter(name for o in every for name in o.faults)
+    limits = Counter(name for o in every for name in o.passed)
+    count, running = (sum(getattr(o, n) for o in every) for n in ("calls", "running"))
+    print(
+        f"{len(every)} schedules, {count} calls with jitter, bursts and clocks that are set: "
+        f"{sum(o.refused > 0 for o in every)} schedules refused; limits passed: {dict(limits) or 'none'}; "
+        f"faults: {dict(faults) or 'none'}; running in {100 * running / count:.0f} % of the calls"
+    )
+
+
 def show_abuse(outcomes: Iterable[Abuse]) -> None:
     """What came of it."""
     every = list(outcomes)
@@ -471,6 +579,7 @@ def main() -> None:
     parser.add_argument("--faults", type=int, default=1000, help="of all kinds together")
     parser.add_argument("--hours", type=float, default=10.0, help="of normal use")
     parser.add_argument("--steps", type=int, default=100_000, help="of controllers whose callers do anything")
+    parser.add_argument("--schedules", type=int, default=1000, help="of calls with jitter, bursts and clock steps")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--jobs", type=int, default=2, help="processes")
     given = parser.parse_args()
@@ -483,6 +592,8 @@ def main() -> None:
             show_normal(pool.imap_unordered(normal, bouts), given.hours)
         if given.steps:
             show_abuse(pool.imap_unordered(abused, range(given.seed, given.seed + -(-given.steps // 4000))))
+        if given.schedules:
+            show_called(pool.imap_unordered(called, range(given.seed, given.seed + given.schedules)))
 
 
 if __name__ == "__main__":

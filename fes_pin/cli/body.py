@@ -186,7 +186,7 @@ def view(
     force: Force = False,
 ) -> None:
     """A page with the body, or a live one: a posture, a mode in motion, a nerve's influence, or measured walking."""
-    from fes_pin.data.outputs import Outputs, check_ending
+    from fes_pin.data.outputs import Outputs
     from fes_pin.muscles.nerve_inputs import subject_nerves
     from fes_pin.view.viewer import show_influence, show_mode, show_posture
 
@@ -210,10 +210,7 @@ def view(
     else:
         scene = show_posture(linear)
     if out is not None:
-        outputs = Outputs("body view", force)
-        outputs.check_file(out)
-        check_ending(out, (".html", ".htm"))
-        outputs.write_file(out, scene.html())
+        Outputs("body view", force).write_file(out, scene.html(), (".html", ".htm"))
         typer.echo(f"wrote {out}")
     if live:
         _serve(scene)

@@ -24,16 +24,13 @@ def urdf(
     force: Force = False,
 ) -> None:
     """Write a fitted joint as URDF: inertia and weight as fitted, damping and friction in <dynamics>."""
-    from fes_pin.data.outputs import Outputs, check_ending
+    from fes_pin.data.outputs import Outputs
     from fes_pin.models.store import load_model
     from fes_pin.models.urdf_out import extended_urdf
 
     catalogue = catalogue_with(library)
-    outputs, loaded = Outputs("urdf", force), load_model(model, library=catalogue)
-    text, left_out, changed = extended_urdf(loaded, believed)
-    outputs.check_file(out)
-    check_ending(out, (".urdf", ".xml"))
-    outputs.write_file(out, text)
+    text, left_out, changed = extended_urdf(load_model(model, library=catalogue), believed)
+    Outputs("urdf", force).write_file(out, text, (".urdf", ".xml"))
     say_whose_code(catalogue)
     typer.echo(f"wrote {out}")
     if changed:
@@ -60,13 +57,11 @@ def pulses(
     """Write a trial as a list of pulses within stated limits; a trial beyond them is an input error."""
     from fes_pin.data.outputs import Outputs
     from fes_pin.data.pulses import PulseLimits, pulse_list
-    from fes_pin.data.tabular import check_table, table_bytes
+    from fes_pin.data.tabular import table_bytes
 
     limits, outputs = PulseLimits(max_width, max_rate, max_charge, current), Outputs("pulses", force)
-    stimulated = _stimulated(trial)
+    listed = pulse_list(_stimulated(trial), limits, rate, width)
     outputs.check_file(out)
-    check_table(out)
-    listed = pulse_list(stimulated, limits, rate, width)
     outputs.write_file(out, table_bytes(listed, out))
     typer.echo(f"wrote {len(listed['time_s'])} pulses to {out}")
 

@@ -38,6 +38,9 @@ from fes_pin.muscles.recruitment import LinearRecruitment
 
 START_READINGS = 5
 """Valid readings in a row, before the first pulse: 0.11 s, in which the observer estimates the torque at rest."""
+LET_GO = 9
+"""Readings more after a pause, 0.2 s, in which a muscle lets go: a clock that was set tells a pause that there was not,
+and the joint still falls."""
 START_RAD = math.radians(10.0)
 """The first pulse waits for a joint this near to where the model has it at rest: load, sensor's zero, its sign."""
 MARGIN_RAD = math.radians(2.0)
@@ -173,7 +176,7 @@ class PositionController:
         self.swings, self.calm = OscillationWatch(), 1.0
         self.observer.torque_wander = self.gains.torque_wander
         self.watch = EnduranceWatch(self.fatigue) if self.fatigue else None
-        self.clock = PulseClock()
+        self.clock = PulseClock(min(self.limits.charge_uc_per_s, self.limits.rate_us_per_s) < math.inf)
         self.beyond_rad = self.paused_s = 0.0
         self._begin()
 
@@ -256,33 +259,37 @@ class PositionController:
             and at the next `LOOKAHEAD` pulses, as far as they are known; the last is held. Or a single number, for a
             target that nobody knows before: it is taken for `LOOKAHEAD` pulses ahead, and the joint follows that late.
         time_s
-            When the reading was taken, s, from any start: a gap of `timing.PAUSE_S` is a pause. Without it the
-            computer's clock is asked, and a gap of `timing.CLOCK_PAUSE_S` is one. State it in simulations.
+            When the reading was taken, s, from any start: a gap of `timing.PAUSE_S` is a pause, and so is a step back.
+            Without it the computer's clock is asked, and a gap of `timing.CLOCK_PAUSE_S` is one. State it in
+            simulations: with limits of charge or of its rate a call that the clock finds too early gives no pulse.
 
         Returns
         -------
         float
-            0, or threshold to saturation, within the limits.
+            0, or threshold to saturation, within the limits; 0 of a call that comes too early to be a pulse
+            (`fes_pin.control.timing`), of which nothing else is taken.
 
         Raises
         ------
         InputError
-            For what is no reading, no reference or no time: text, lists, booleans, degrees, angles outside the range of
-            motion, times that go on faster than pulses by more than jitter. It is a fault, too. A number that no joint
-            can have is an input error only before the first pulse; later it is a fault of the sensor.
+            For what is no reading or no reference: text, lists, booleans, degrees, angles outside the range of motion.
+            It is a fault, too. A number that no joint can have is an input error only before the first pulse; later it
+            is a fault of the sensor. For what is no time, and for calls that come faster than pulses for long: it gives
+            no pulse, and the next call is taken again.
         """
         try:
-            self._notice(time_s)
+            if not self._notice(time_s):
+                return 0.0
             if self.status.is_fault:
                 return self._ramp()
             reading = read(angle_rad)
             if self.status is Status.WAITING and abs(reading) > LARGEST_RAD:
                 raise InputError(f"angle_rad: expected an angle in rad, found {reading:g}{hint(reading)}")
             wanted, preview = self._coming(reference_rad)
-        except InputError:
+        except InputError as error:
             if self.status.is_fault:
                 return self._ramp()
-            self.status = Status.REFUSED
+            self.status = self.status if error.column == "time_s" else Status.REFUSED
             raise
         self._next(wanted, preview)
         if self.status is Status.WAITING:
@@ -301,18 +308,22 @@ class PositionController:
             self.short_of = max(needed - 1.0, self._lacking(wanted[0]), 0.0)
         if self.watch is not None:
             self.watch.take(self.observer.x[0] * self.share, self.share)
-        self.observer.predict(self.recruitment)
         return width
 
-    def _notice(self, time_s: float | None) -> None:
-        """Begin again after a pause; a fault stays one, and its ramp is over."""
-        pause_s = self.clock.pause_s(time_s)
+    def _notice(self, time_s: float | None) -> bool:
+        """Return whether a call is a pulse; begin again after a pause; a fault stays one, and its ramp is over."""
+        if (call := self.clock.take(time_s)) is None:
+            return False
+        since_s, pause_s = call
+        self.pulse.limiter.wait(since_s)
+        self.observer.predict(self.recruitment, since_s)
         if pause_s and self.status.is_fault:
             self.falling = []
         elif pause_s:
             self.paused_s = max(self.paused_s, pause_s)
             self._begin()
-            self.risen = 0
+            self.risen, self.good = 0, -LET_GO
+        return True
 
     def _coming(self, reference_rad: object) -> tuple[list[float], bool]:
         """Return the reference of this pulse and the next ones, and whether those are known."""
@@ -345,12 +356,12 @@ class PositionController:
     def _await(self, reading: float) -> None:
         """Wait for a row of readings of one joint near its rest."""
         if not (self.monitor.possible(reading) and abs(reading - self.lowest) < START_RAD):
-            self.good = 0
+            self.good = min(self.good, 0)
             return
         if not (self.good and self.monitor.judge(reading, self.observer, False)) or self.monitor.fault:
             self.monitor.reset()
             self.observer.reset(reading)
-            self.good = 0
+            self.good = min(self.good, 0)
         self.observer.correct(reading)
         self.good += 1
         if self.good >= START_READINGS:

@@ -138,10 +138,10 @@ class AnkleDynamics(Tabulated):
         return f
 
     def moved(
-        self, act: float, q: float, v: float, torque: float, share: float, recruitment: float
+        self, act: float, q: float, v: float, torque: float, share: float, recruitment: float, time_s: float = PULSE_S
     ) -> tuple[float, float, float]:
-        """Activation, angle and rate a pulse later: the classical Runge-Kutta method, activation exact."""
-        rise, pull, h = self.acceleration, self.pull_nm * share, PULSE_S / self.pieces
+        """Activation, angle and rate a time of up to a pulse later: classical Runge-Kutta method, activation exact."""
+        rise, pull, h = self.acceleration, self.pull_nm * share, time_s / self.pieces
         half, half_fade = 0.5 * h, math.exp(-0.5 * h / self.time_constant)
         for _ in range(self.pieces):
             rest = (act - recruitment) * half_fade
@@ -158,6 +158,6 @@ class AnkleDynamics(Tabulated):
             act = end
         return act, q, v
 
-    def transition(self, q: float, activation: float, share: float) -> np.ndarray:
-        """The transition of `linear` over a pulse about a state, shape (5, 5)."""
-        return scipy.linalg.expm(PULSE_S * self.linear(q, activation, share))
+    def transition(self, q: float, activation: float, share: float, time_s: float = PULSE_S) -> np.ndarray:
+        """The transition of `linear` over a time about a state, shape (5, 5)."""
+        return scipy.linalg.expm(time_s * self.linear(q, activation, share))

@@ -93,6 +93,8 @@ class Limiter:
     can then hold more than the limit, and a steady demand meets a steady width instead of bursts. Charge comes before
     the rate of change: an empty bucket lets the width fall at once.
 
+    Without `wait` pulses are taken to come every `PULSE_S`.
+
     Raises
     ------
     InputError
@@ -109,7 +111,7 @@ class Limiter:
             )
         self.most_us = min(limits.pulse_width_us, saturation_us)
         self.threshold_us = threshold_us
-        self.change_us = limits.rate_us_per_s * PULSE_S
+        self.change_us = self.most_change_us = limits.rate_us_per_s * PULSE_S
         # charge in us of pulse width: current times width
         whole = limits.charge_uc_per_s / (1e-3 * (limits.current_ma or 1.0))
         self.bucket_us, self.refill_us = BURST * whole, (1.0 - BURST) * whole * PULSE_S
@@ -140,6 +142,17 @@ class Limiter:
         width = min(width, max(self.last_us, self.threshold_us) + self.change_us)
         width = min(width, self.most_us, self.left_us)
         return width if width >= self.threshold_us else 0.0
+
+    def wait(self, time_s: float) -> None:
+        """Let the time since the last pulse have been so long: a pulse that comes early finds less charge and change.
+
+        Of a longer time than `PULSE_S` no more counts, and a pulse's share of the bucket stays empty: where a clock is
+        set forward while two pulses are near each other, a second holds no more than its charge all the same.
+        """
+        missing = 1.0 - min(time_s / PULSE_S, 1.0)
+        if self.bucket_us < math.inf:
+            self.left_us = min(self.left_us - missing * self.refill_us, self.bucket_us - self.refill_us)
+        self.change_us = self.most_change_us * (1.0 - missing if self.most_change_us < math.inf else 1.0)
 
     def give(self, width_us: float) -> None:
         """Note the width that was given."""

@@ -29,6 +29,9 @@ of a nerve with play for spikes."""
 RATE_WANDER = 0.5
 """Standard deviation of the unknown change of the rate in a second, rad/s."""
 
+RESOLVED_S = 1e-6
+"""A shorter time is none: seconds since 1970 are resolved to 2.4e-7 s."""
+
 
 class JointObserver:
     """See the module.
@@ -111,16 +114,19 @@ class JointObserver:
     def torque_wander(self, wander: float) -> None:
         self.noise[3] = wander * wander * PULSE_S
 
-    def predict(self, recruitment: float) -> None:
-        """Go on by one pulse with this recruitment in the nerve."""
-        act, q, v, torque, share = self.x
-        a = self.dynamics.transition(q, act, share)
-        self.x = [*self.dynamics.moved(act, q, v, torque, share, recruitment), torque, share]
-        spread = a @ self.covariance @ a.T
-        self.covariance = 0.5 * (spread + spread.T)
-        self.covariance.flat[::6] += self.noise  # its diagonal
-        if not (math.isfinite(self.covariance.sum() + sum(self.x)) and 0.0 < self.x[1] < math.pi):
-            self.reset()
+    def predict(self, recruitment: float, time_s: float = PULSE_S) -> None:
+        """Go on by a time with this recruitment in the nerve, and after `PULSE_S` with none."""
+        while time_s > RESOLVED_S:
+            part = min(time_s, PULSE_S)
+            act, q, v, torque, share = self.x
+            a = self.dynamics.transition(q, act, share, part)
+            self.x = [*self.dynamics.moved(act, q, v, torque, share, recruitment, part), torque, share]
+            spread = a @ self.covariance @ a.T
+            self.covariance = 0.5 * (spread + spread.T)
+            self.covariance.flat[::6] += np.multiply(part / PULSE_S, self.noise)  # its diagonal
+            if not (math.isfinite(self.covariance.sum() + sum(self.x)) and 0.0 < self.x[1] < math.pi):
+                self.reset()
+            recruitment, time_s = 0.0, time_s - part
 
     def steady_gain(self, transition: np.ndarray) -> np.ndarray:
         """Return the stationary gains of an innovation to activation, angle, rate and torque, shape (4,).

@@ -71,9 +71,17 @@ class Outputs:
             kept |= {name: self._note(content) for name, content in contents.items()}
             write_files(folder, {RECORD: json.dumps(kept, indent=1) + "\n", **contents}, without=gone)
 
-    def write_file(self, path: str | Path, content: str | bytes) -> None:
-        """Write one file into a folder that is there, as `write`; to a special file, such as a pipe, without a note."""
-        if (place := _place(path)) is not None:
+    def write_file(self, path: str | Path, content: str | bytes, endings: Sequence[str] = ()) -> None:
+        """Write one file into a folder that is there, as `write`; to a special file, such as a pipe, without a note.
+
+        Parameters
+        ----------
+        endings
+            As of `check_ending`.
+        """
+        place = _place(path)
+        check_ending(path, endings)
+        if place is not None:
             self.write(place.parent, {place.name: content})
         else:
             write_bytes(path, content.encode() if isinstance(content, str) else content)
@@ -113,14 +121,14 @@ def check_ending(path: str | Path, endings: Sequence[str]) -> None:
     Parameters
     ----------
     endings
-        Of what can be written: ".csv" ...
+        Of what can be written: ".csv" ...; without any each may be.
 
     Raises
     ------
     InputError
         Another ending.
     """
-    if (found := Path(path).suffix) and found.lower() not in endings:
+    if endings and (found := Path(path).suffix) and found.lower() not in endings:
         raise InputError(f"expected a name that ends in {' or '.join(endings)}, found {found}", file=path)
 
 

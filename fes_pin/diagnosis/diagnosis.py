@@ -42,8 +42,7 @@ LOOKED = 0.1
 """Share of a limit of time that the checks of the fitted nominal model may take in addition."""
 
 UNCHECKED = (
-    "the limit of time ended the check for trials that are shifted in time and efforts of the opposite sign, which "
-    "fes-pin check makes"
+    "the limit of time ended the check for shifted trials and for efforts of the opposite sign: see fes-pin check"
 )
 """Warning of a diagnosis whose limit of time ended that check."""
 
