@@ -89,7 +89,8 @@ def autocorrelation(z: Sequence[np.ndarray]) -> np.ndarray:
     size = scipy.fft.next_fast_len(max(map(len, z)) + most, real=True)
     power = np.sum([np.abs(np.fft.rfft(one, size)) ** 2 for one in z], axis=0)
     half = np.fft.irfft(power, size)[: most + 1]
-    return np.r_[half[:0:-1], half] / half[0]
+    half = half / half[0] if half[0] > 0.0 else np.eye(1, most + 1)[0]  # a channel of zeros is taken for white
+    return np.r_[half[:0:-1], half]
 
 
 def convolved(a: np.ndarray, b: np.ndarray) -> np.ndarray:
