@@ -43,5 +43,5 @@ def _one(e: np.ndarray, count: int) -> float:
     trials, mean = len(z), z.mean(axis=0)
     apart = z - mean
     degrees = len(mean) / float(np.sum(autocorrelation(list(apart)) ** 2))
-    ratio = trials * float(mean @ mean) / (float(np.sum(apart**2)) / (trials - 1))
+    ratio = trials * float(mean @ mean) / max(float(np.sum(apart**2)) / (trials - 1), 1e-300)
     return f_tail(ratio, degrees, degrees * (trials - 1))
