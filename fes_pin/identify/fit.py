@@ -17,6 +17,7 @@ from fes_pin.data.numbers import as_number, instance, number, whole
 from fes_pin.data.results import Saveable
 from fes_pin.data.schema import IMPOSED, unknown
 from fes_pin.data.show import by_columns
+from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.identify.problem import Problem
 from fes_pin.infer.noise import ORDERS, Noise, NoiseModel, estimate_noise, noise_step, thin, thinning
@@ -283,7 +284,7 @@ def ended(model: Model, found: Optimum) -> dict[str, Any]:
 
 def fit(
     model: Model,
-    trials: Trial | Iterable[Trial],
+    trials: Study | Trial | Iterable[Trial],
     noise: NoiseModel | None = None,
     max_iterations: int = MAX_ITERATIONS,
     *,
@@ -297,7 +298,7 @@ def fit(
     model
         The model, whose values are the start values.
     trials
-        Measured trials.
+        Measured trials; of a study those whose role is not "held_out".
     noise
         Noise by output column. By default the model is fitted with white noise, the noise is estimated from the
         residuals, and the fit is repeated with that.
@@ -316,10 +317,11 @@ def fit(
     Raises
     ------
     InputError
-        No trials, trials that are not of the model's rig or were not measured, names of no fitted parameter, values or
-        bounds that cannot be.
+        No trials to fit, trials that are not of the model's rig or were not measured, names of no fitted parameter,
+        values or bounds that cannot be.
     """
-    measured = accepted_trials(model, trials, inputs_only=False)
+    chosen = trials.to_fit() if isinstance(trials, Study) else trials
+    measured = accepted_trials(model, chosen, inputs_only=False)
     max_iterations = whole(max_iterations, "max_iterations", least=1)
     if noise is not None:
         instance(noise, Mapping, "noise")
