@@ -7,6 +7,7 @@ import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
+from types import MappingProxyType
 from typing import Any, TypeVar
 
 import numpy as np
@@ -28,7 +29,9 @@ from fes_pin.infer.result import shown
 from fes_pin.infer.scoring import LITTLE
 from fes_pin.models.accepted import accepted_trials
 from fes_pin.models.model import Model
+from fes_pin.models.plausibility import warn_of_odd_numbers
 from fes_pin.models.predictor import StateSpaceNoise
+from fes_pin.models.simulate import simulated_trial
 from fes_pin.workers import one_thread_each
 
 GROWTH = (1 / 8, 1 / 4, 1 / 2)
@@ -319,6 +322,11 @@ def fit(
     InputError
         No trials to fit, trials that are not of the model's rig or were not measured, names of no fitted parameter,
         values or bounds that cannot be.
+
+    Warns
+    -----
+    InputWarning
+        Of numbers that are odd, as `check` finds them: a unit or a sign may be wrong.
     """
     chosen = trials.to_fit() if isinstance(trials, Study) else trials
     measured = accepted_trials(model, chosen, inputs_only=False)
@@ -329,7 +337,19 @@ def fit(
         model = model.with_parameters({n: number(v, f"fixed.{n}") for n, v in fixed.items()})
     names = [fixed] if isinstance(fixed, str) else list(instance(fixed, Iterable, "fixed"))
     free, narrower = _chosen(model, names, instance({} if bounds is None else bounds, Mapping, "bounds"))
+    warn_of_odd_numbers(model, measured, simulated_trial)
+    return fit_accepted(model, measured, noise, max_iterations, free, narrower)
 
+
+def fit_accepted(
+    model: Model,
+    measured: Sequence[Trial],
+    noise: NoiseModel | None = None,
+    max_iterations: int = MAX_ITERATIONS,
+    free: tuple[str, ...] | None = None,
+    narrower: Mapping[str, tuple[float, float]] = MappingProxyType({}),
+) -> Fit:
+    """Return the result of `fit` for trials that are known to belong to the model's rig, without its warnings."""
     problem = Problem(model, measured, rough_noise(model, measured) if noise is None else noise, free)
     problem.limits |= narrower
     with one_thread_each():  # products this small are slower on several threads

@@ -83,6 +83,7 @@ def test_of_a_linear_parameter_both_intervals_are_one():
     assert fitted.interval("gain", method="profile") == pytest.approx(fitted.interval("gain"), rel=1e-4)
 
 
+@pytest.mark.filterwarnings("ignore:pulse_width_us is never above the threshold:fes_pin.InputWarning")
 def test_a_profile_of_what_is_not_identified_reaches_its_bounds():
     model = Model(RIGS["muscle"])
     bare = Trial("rest", "isometric", {"pulse_width_us": np.zeros(300)}, np.arange(300) * 5e-3)
