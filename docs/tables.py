@@ -225,8 +225,11 @@ def public_text() -> str:
     return table(("name", "what it is"), rows)
 
 
-REASONED = ("infer", "identify", "diagnosis", "contrasts", "walk", "comparison", "cohort", "verdict")
-"""Rooms of inference, whose numbers are listed with their reasons."""
+REASONED = (
+    *("infer", "identify", "diagnosis", "contrasts", "walk", "comparison", "cohort", "verdict"),
+    "models/plausibility.py",
+)
+"""Rooms of inference, and a file of another room, whose numbers are listed with their reasons."""
 DECIDING = "infer/levels.py"
 """File of the numbers that decide what is claimed."""
 KINDS = {
@@ -250,8 +253,11 @@ class Number:
 def numbers() -> list[Number]:
     """Every number that a file of the rooms of inference names, in their order."""
     root = Path(fes_pin.__file__).parent
-    files = [path for room in REASONED for path in sorted((root / room).rglob("*.py"))]
-    return [Number(str(path.relative_to(root)), *one) for path in files for one in _named(path)]
+    return [Number(str(path.relative_to(root)), *one) for path in _reasoned(root) for one in _named(path)]
+
+
+def _reasoned(root: Path) -> list[Path]:
+    return [path for room in REASONED for path in sorted((root / room).rglob("*.py")) or [root / room]]
 
 
 def kinds() -> dict[str, str]:
@@ -272,7 +278,7 @@ def unnamed_numbers() -> list[str]:
     Those that say empty, first, one, a pair, a half or percent, and those that only guard arithmetic, are none.
     """
     root, found = Path(fes_pin.__file__).parent, []
-    for path in sorted(path for room in REASONED for path in (root / room).rglob("*.py")):
+    for path in sorted(_reasoned(root)):
         for node in ast.walk(ast.parse(path.read_text())):
             parts: list[ast.expr] = []
             if isinstance(node, ast.Compare):

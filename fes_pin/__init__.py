@@ -41,6 +41,7 @@ if TYPE_CHECKING:  # every public name with its module: it is imported from ther
     from fes_pin.control.margins import delay_margin as delay_margin
     from fes_pin.control.observer import JointObserver as JointObserver
     from fes_pin.data.errors import InputError as InputError
+    from fes_pin.data.errors import InputWarning as InputWarning
     from fes_pin.data.named import NamedArray as NamedArray
     from fes_pin.data.results import load_result as load_result
     from fes_pin.data.results import save_result as save_result

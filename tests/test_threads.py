@@ -21,7 +21,7 @@ from fes_pin.models.effects.electromechanical_delay import ElectromechanicalDela
 from fes_pin.models.effects.sensor_offset import SensorOffset
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import Predictor, StateSpaceNoise
-from fes_pin.models.simulate import Simulator, simulate
+from fes_pin.models.simulate import Simulator, simulated_trial
 from fes_pin.muscles.nerves import Nerves
 from fes_pin.workers import in_parallel, one_thread_each
 
@@ -73,7 +73,7 @@ def test_a_predictor_that_delays_the_stimulus_is_shared():
     rng = np.random.default_rng(5)
     model = Model(RIGS["muscle"]) + ElectromechanicalDelay(delay_s=0.01)
     bare = trial("muscle", "isometric", rng, 100)
-    measured = bare.with_columns(force_n=simulate(model, bare)["force_n"] + 0.2 * rng.standard_normal(100))
+    measured = bare.with_columns(force_n=simulated_trial(model, bare)["force_n"] + 0.2 * rng.standard_normal(100))
     predictor, noise = Predictor(model, [measured], (), (), [{}]), StateSpaceNoise({"force_n": 0.2})
 
     def run(delay_s):
@@ -96,7 +96,7 @@ def test_models_are_compiled_and_run_side_by_side(engine, monkeypatch):
 
     def run(case):
         model, one = case
-        simulated = simulate(model, one)
+        simulated = simulated_trial(model, one)
         return np.column_stack([simulated[n] for n in model.rig.outputs(one.kind)])
 
     alone = [run(case) for case in cases]
@@ -113,7 +113,8 @@ def test_fits_side_by_side():
     trials = []
     for _ in range(8):
         bare = trial("muscle", "isometric", rng, 200)
-        trials.append(bare.with_columns(force_n=simulate(model, bare)["force_n"] + 0.2 * rng.standard_normal(200)))
+        force = simulated_trial(model, bare)["force_n"]
+        trials.append(bare.with_columns(force_n=force + 0.2 * rng.standard_normal(200)))
     start = model.with_parameters({n: 1.2 * model.parameters()[n] for n in model.fitted_parameters()})
     names = model.fitted_parameters()
 
@@ -175,7 +176,7 @@ def test_no_lock_is_held_while_a_model_is_simulated(engine, monkeypatch):
     rng, held = np.random.default_rng(4), []
     model = Model(RIGS["muscle"]) + SensorOffset()
     bare = trial("muscle", "isometric", rng, 60)
-    measured = bare.with_columns(force_n=simulate(model, bare)["force_n"] + 0.2 * rng.standard_normal(60))
+    measured = bare.with_columns(force_n=simulated_trial(model, bare)["force_n"] + 0.2 * rng.standard_normal(60))
     kind = VirtualProgram if engine == "casadi" else NativeProgram
     run = kind.run
 

@@ -55,6 +55,7 @@ def test_type_checkers_are_told_of_types():
     assert (Path(fp.__file__).parent / "py.typed").exists()
 
 
+@pytest.mark.filterwarnings("ignore:fewer than 16 samples:fes_pin.InputWarning")
 def test_what_a_user_writes_in_types_runs(tmp_path):
     study = fp.read_study(studies.ankle(tmp_path / "study"))
     model = typed.with_friction(study)

@@ -69,7 +69,7 @@ def predict(
     from fes_pin.diagnosis.plausibility import check_study
     from fes_pin.diagnosis.replay import trial_table
     from fes_pin.identify.stored import load_log
-    from fes_pin.models.predict import predict as run
+    from fes_pin.models.predict import predicted_trial
     from fes_pin.models.store import load_model
 
     catalogue = catalogue_with(library)
@@ -88,7 +88,7 @@ def predict(
     with _by_option(pairs("--set", setting)):
         odd = check_study(ToPredict(measured, schema, loaded.rig.constants, trial), loaded)
     given = [load_log(model).applied(one) for one in measured]
-    found = [run(loaded, one) if horizon is None else _along(model, loaded, one, horizon) for one in given]
+    found = [predicted_trial(loaded, one) if horizon is None else _along(model, loaded, one, horizon) for one in given]
     errors = _errors(model, given, found, horizon)
     if (residuals or out is None) and not errors:
         columns = " or ".join(dict.fromkeys(n for one in found for n in one.columns))

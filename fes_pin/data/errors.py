@@ -34,6 +34,10 @@ class InputError(ValueError):
         return line if line.isprintable() else "".join(each if each.isprintable() else " " for each in line)
 
 
+class InputWarning(UserWarning):
+    """Numbers that a person gave are odd, as they are where a unit or a sign is wrong; what was asked is done."""
+
+
 KeyFault = Callable[[str, str], InputError]
 """Makes the error of a key and a message."""
 

@@ -3,7 +3,8 @@
 Rejected, as no verdict could follow from it: no stimulus above threshold in any trial, outputs that never change or go
 to and fro between two counts, too few samples, a load that only grams explain, an imposed motion that never moves; and
 what `check_trial` refuses of each trial: an angle that only degrees explain. Everything else is a warning, and the
-diagnosis goes on. Trials that are only to be predicted are held to the same list, but for what a fit needs.
+diagnosis goes on. Trials that are only to be predicted, or fitted by themselves, are held to the same list, but for
+what a study needs: they may be few, and nothing need drive them.
 """
 
 import itertools
@@ -151,7 +152,8 @@ def _inputs(study: Study | ToPredict) -> Iterable[str]:
     if short:
         yield f"fewer than {FEW} samples in {trials_named(short)}"
     names = dict.fromkeys(n for t in study.trials for n in _stimuli(study, t))
-    if not names and not any(t.kind == IMPOSED for t in study.trials):
+    may_be_free = isinstance(study, ToPredict) or any(t.kind == IMPOSED for t in study.trials)
+    if not names and not may_be_free:
         column = " or ".join(study.schema.inputs)
         yield f"no trial is driven: there is no column {column}, and the motion is taken for free"
     for name in names:
@@ -166,7 +168,8 @@ def _inputs(study: Study | ToPredict) -> Iterable[str]:
                     check_values({name: trial[name]}, study.schema, trial.error, threshold)
                 yield f"{zero} in {trials_named(idle)}"
         elif name not in PULSES:
-            yield f"no trial is driven: {zero}"
+            if not isinstance(study, ToPredict):
+                yield f"no trial is driven: {zero}"
         else:
             most = max(float(np.abs(t[name]).max()) for t in study.trials if name in t)
             unit = "ms" if threshold < 1e3 * most else "s"

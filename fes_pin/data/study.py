@@ -250,6 +250,18 @@ class Study(ReadOnly):
     def __contains__(self, which: object) -> bool:
         return which in self.trials or any(trial.name == which for trial in self.trials)
 
+    def to_fit(self) -> tuple[Trial, ...]:
+        """The trials whose role is not "held_out".
+
+        Raises
+        ------
+        InputError
+            If there is none.
+        """
+        if not (found := tuple(t for t in self.trials if t.role != "held_out")):
+            raise InputError("expected at least one trial to fit; all have role = held_out", file=self.folder)
+        return found
+
     def trial(self, name: str) -> Trial:
         """One trial by its name.
 

@@ -269,12 +269,9 @@ def split(study: Study) -> tuple[list[Trial], list[Trial]]:
 
     Free motion is fitted at the rate that its noise is modelled at, since no input is faster.
     """
-    test = [t for t in study.trials if t.role == "held_out"]
-    schema, fitted = study.schema, [t for t in study.trials if t.role != "held_out"]
-    train = [t if set(schema.inputs) & set(t.columns) else thinned(t, schema) for t in fitted]
-    if not train:
-        raise InputError("expected at least one trial to fit; all have role = held_out", file=study.folder)
-    return train, test
+    schema = study.schema
+    train = [t if set(schema.inputs) & set(t.columns) else thinned(t, schema) for t in study.to_fit()]
+    return train, [t for t in study.trials if t.role == "held_out"]
 
 
 def few_trials(count: int) -> list[str]:

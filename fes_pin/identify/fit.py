@@ -7,6 +7,7 @@ import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
+from types import MappingProxyType
 from typing import Any, TypeVar
 
 import numpy as np
@@ -17,6 +18,7 @@ from fes_pin.data.numbers import as_number, instance, number, whole
 from fes_pin.data.results import Saveable
 from fes_pin.data.schema import IMPOSED, unknown
 from fes_pin.data.show import by_columns
+from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.identify.problem import Problem
 from fes_pin.infer.noise import ORDERS, Noise, NoiseModel, estimate_noise, noise_step, thin, thinning
@@ -27,7 +29,9 @@ from fes_pin.infer.result import shown
 from fes_pin.infer.scoring import LITTLE
 from fes_pin.models.accepted import accepted_trials
 from fes_pin.models.model import Model
+from fes_pin.models.plausibility import warn_of_odd_numbers
 from fes_pin.models.predictor import StateSpaceNoise
+from fes_pin.models.simulate import simulated_trial
 from fes_pin.workers import one_thread_each
 
 GROWTH = (1 / 8, 1 / 4, 1 / 2)
@@ -283,7 +287,7 @@ def ended(model: Model, found: Optimum) -> dict[str, Any]:
 
 def fit(
     model: Model,
-    trials: Trial | Iterable[Trial],
+    trials: Study | Trial | Iterable[Trial],
     noise: NoiseModel | None = None,
     max_iterations: int = MAX_ITERATIONS,
     *,
@@ -297,7 +301,7 @@ def fit(
     model
         The model, whose values are the start values.
     trials
-        Measured trials.
+        Measured trials; of a study those whose role is not "held_out".
     noise
         Noise by output column. By default the model is fitted with white noise, the noise is estimated from the
         residuals, and the fit is repeated with that.
@@ -316,10 +320,16 @@ def fit(
     Raises
     ------
     InputError
-        No trials, trials that are not of the model's rig or were not measured, names of no fitted parameter, values or
-        bounds that cannot be.
+        No trials to fit, trials that are not of the model's rig or were not measured, names of no fitted parameter,
+        values or bounds that cannot be.
+
+    Warns
+    -----
+    InputWarning
+        Of numbers that are odd, as `check` finds them: a unit or a sign may be wrong.
     """
-    measured = accepted_trials(model, trials, inputs_only=False)
+    chosen = trials.to_fit() if isinstance(trials, Study) else trials
+    measured = accepted_trials(model, chosen, inputs_only=False)
     max_iterations = whole(max_iterations, "max_iterations", least=1)
     if noise is not None:
         instance(noise, Mapping, "noise")
@@ -327,7 +337,19 @@ def fit(
         model = model.with_parameters({n: number(v, f"fixed.{n}") for n, v in fixed.items()})
     names = [fixed] if isinstance(fixed, str) else list(instance(fixed, Iterable, "fixed"))
     free, narrower = _chosen(model, names, instance({} if bounds is None else bounds, Mapping, "bounds"))
+    warn_of_odd_numbers(model, measured, simulated_trial)
+    return fit_accepted(model, measured, noise, max_iterations, free, narrower)
 
+
+def fit_accepted(
+    model: Model,
+    measured: Sequence[Trial],
+    noise: NoiseModel | None = None,
+    max_iterations: int = MAX_ITERATIONS,
+    free: tuple[str, ...] | None = None,
+    narrower: Mapping[str, tuple[float, float]] = MappingProxyType({}),
+) -> Fit:
+    """Return the result of `fit` for trials that are known to belong to the model's rig, without its warnings."""
     problem = Problem(model, measured, rough_noise(model, measured) if noise is None else noise, free)
     problem.limits |= narrower
     with one_thread_each():  # products this small are slower on several threads

@@ -1,11 +1,15 @@
 """Prediction of a trial from its inputs and conditions alone."""
 
+from functools import cache
+
 import numpy as np
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.trial import Trial, derived_trial
+from fes_pin.models.accepted import accepted_trials
 from fes_pin.models.model import Model
-from fes_pin.models.simulate import simulate
+from fes_pin.models.plausibility import warn_of_odd_numbers
+from fes_pin.models.simulate import simulated_trial
 
 
 def predict(model: Model, trial: Trial) -> Trial:
@@ -19,11 +23,26 @@ def predict(model: Model, trial: Trial) -> Trial:
     ------
     InputError
         As `simulate`, or if the prediction does not stay finite.
+
+    Warns
+    -----
+    InputWarning
+        As `simulate`.
     """
-    simulated = simulate(model, trial)
-    outputs = {n: simulated[n] for n in model.rig.outputs(trial.kind)}
+    accepted, simulated = accepted_trials(model, trial), cache(simulated_trial)
+    warn_of_odd_numbers(model, accepted, simulated)
+    return _outputs(model, simulated(model, *accepted))
+
+
+def predicted_trial(model: Model, trial: Trial) -> Trial:
+    """Return the result of `predict` without its warnings."""
+    return _outputs(model, simulated_trial(model, *accepted_trials(model, trial)))
+
+
+def _outputs(model: Model, simulated: Trial) -> Trial:
+    outputs = {n: simulated[n] for n in model.rig.outputs(simulated.kind)}
     for name, values in outputs.items():
         if not np.isfinite(values).all():
             row = int(np.argmin(np.isfinite(values)))
             raise InputError(f"the prediction of {name} is not finite from sample {row} on: the model is unstable here")
-    return derived_trial(trial, columns=outputs)
+    return derived_trial(simulated, columns=outputs)

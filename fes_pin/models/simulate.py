@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from fes_pin.models.compile.layout import Layout, make_layout, widest, width_of
 from fes_pin.models.compile.program import Program, compiled_program
 from fes_pin.models.least_squares import least_squares
 from fes_pin.models.model import Model
+from fes_pin.models.plausibility import warn_of_odd_numbers
 from fes_pin.models.storage import pass_as_stored
 
 EachTrial = Sequence[Mapping[str, float]]
@@ -319,8 +321,15 @@ def simulate(model: Model, trial: Trial) -> Trial:
     InputError
         If the rig cannot have such a trial: it lacks an input, a condition or its initial state, has a column that the
         rig does not read, or values in another unit.
+
+    Warns
+    -----
+    InputWarning
+        Of numbers that are odd, as `check` and `fes-pin predict` find them.
     """
-    return simulated_trial(model, *accepted_trials(model, trial))
+    accepted, simulated = accepted_trials(model, trial), cache(simulated_trial)
+    warn_of_odd_numbers(model, accepted, simulated)
+    return simulated(model, *accepted)
 
 
 def simulated_trial(model: Model, trial: Trial) -> Trial:

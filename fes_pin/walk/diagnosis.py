@@ -5,7 +5,6 @@ import time
 from dataclasses import replace
 
 from fes_pin.data.asked import asked
-from fes_pin.data.errors import InputError
 from fes_pin.data.provenance import provenance_now
 from fes_pin.data.smooth import CUTOFF_HZ
 from fes_pin.data.study import Study
@@ -52,9 +51,7 @@ def diagnose_walk(
     """
     began = time.perf_counter()
     tell, made = asked(study, seed, limit, progress), provenance_now(study, seed)
-    trials = tuple(t for t in study.trials if t.role != "held_out")
-    if not trials:
-        raise InputError("expected at least one trial to fit; all have role = held_out", file=study.folder)
+    trials = study.to_fit()
     with one_thread_each(), noting_stops() as stops:
         tell(0.02, "inverse dynamics")
         recordings = recordings_of(replace(study, trials=trials), cutoff_hz=cutoff_hz)

@@ -23,6 +23,7 @@ from fes_pin.identify.fit import noise_of, rough_noise
 DEMO = Path(__file__).parents[2] / "analysis/studies/ankle_demo"
 
 
+@pytest.mark.filterwarnings("ignore:force_n stays at 0:fes_pin.InputWarning")
 def test_ding_is_the_published_equations():
     """Against the sums over pulses written out, by another integrator."""
     study = twins.study("ding", 1, noise=0.0, scatter=0.0)

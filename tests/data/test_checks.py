@@ -186,6 +186,7 @@ def test_times_with_few_decimals_may_begin_anywhere():
             assert trial({"position": np.zeros(300)}, times=times).dt == pytest.approx(1 / 60, rel=1e-3)
 
 
+@pytest.mark.filterwarnings("ignore:fewer than 16 samples:fes_pin.InputWarning")
 def test_what_the_library_makes_of_a_trial_may_be_unmeasured_or_run_away(tmp_path):
     study = read_study(studies.ankle(tmp_path))
     hidden = derived_trial(study.trials[0], columns={"angle_rad": np.full(5, np.nan)})

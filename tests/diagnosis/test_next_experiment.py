@@ -77,6 +77,7 @@ def rivals():
     return study, *fitted_rivals(study, model)
 
 
+@pytest.mark.filterwarnings("ignore:angle_rad is cut off:fes_pin.InputWarning")
 def test_what_is_expected_is_what_a_refit_cannot_take_up(rivals):
     """D against fits to the same data and the noiseless trial: linear theory, so for a trial that tells little."""
     study, best, rival = rivals

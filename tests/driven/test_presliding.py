@@ -14,7 +14,7 @@ from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import maximise
 from fes_pin.identify.process_noise import first_guess
 from fes_pin.models.effects import CoulombFriction
-from fes_pin.models.simulate import simulate
+from fes_pin.models.simulate import simulated_trial
 
 NAMES = ("coulomb_friction",)
 STRETCH = 2e-3
@@ -26,7 +26,7 @@ def pulled(force):
     time = np.arange(len(force)) * DT
     columns = {"effort": np.asarray(force, float), "position": np.zeros(len(force))}
     friction = CoulombFriction(FRICTION, stretch=STRETCH)
-    return simulate(model + friction, Trial("a", "motion", columns, time))["position"]
+    return simulated_trial(model + friction, Trial("a", "motion", columns, time))["position"]
 
 
 def test_a_force_below_friction_is_held_by_a_spring_that_lets_go_back():
@@ -58,7 +58,7 @@ def test_a_stretch_too_short_for_integration_steps_is_not_shorter_than_they_reso
     n = round(1.0 / DT)
     model = believed().with_parameters({"inertia_scale": 1.0}) + CoulombFriction(FRICTION, stretch=1e-9)
     columns = {"effort": np.full(n, 0.5 * FRICTION), "position": np.zeros(n)}
-    position = simulate(model, Trial("a", "motion", columns, np.arange(n) * DT))["position"]
+    position = simulated_trial(model, Trial("a", "motion", columns, np.arange(n) * DT))["position"]
     assert np.abs(position).max() < 1e-4
 
 

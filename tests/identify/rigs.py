@@ -11,7 +11,7 @@ from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.noise import Noise
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import StateSpaceNoise
-from fes_pin.models.simulate import simulate
+from fes_pin.models.simulate import simulated_trial
 
 SIZE = {"angle_rad": 2e-3, "force_n": 0.2, "position": 2e-3, "velocity": 2e-2}
 WHITE = {name: Noise(size, (), size) for name, size in SIZE.items()}
@@ -19,7 +19,7 @@ WHITE = {name: Noise(size, (), size) for name, size in SIZE.items()}
 
 def measured(model, bare, rng, noise=True, velocity=False):
     """A bare trial with the model's answer and white noise on it."""
-    simulated = simulate(model, bare)
+    simulated = simulated_trial(model, bare)
     names = [n for n in model.rig.outputs(bare.kind) if velocity or n != "velocity"]
     return bare.with_columns(
         **{n: simulated[n] + (SIZE[n] * rng.standard_normal(len(bare)) if noise else 0.0) for n in names}

@@ -100,6 +100,7 @@ def test_a_bound_holds():
     assert close.all()
 
 
+@pytest.mark.filterwarnings("ignore:the longest trial lasts 1.198 s:fes_pin.InputWarning")
 @pytest.mark.parametrize("start", [{"gain": 22.0, "time_constant_s": 2.0}, {"gain": 5.0, "time_constant_s": 1.0}])
 def test_a_step_beyond_two_bounds_is_no_end(start):
     """One train, a start so slow that the first step would leave both bounds: the fit goes on to the optimum."""
@@ -135,6 +136,7 @@ def test_free_motion_shows_ratios_only():
     assert ratio == pytest.approx(known.values["gravity_scale"], abs=2.0 * known.std("gravity_scale"))
 
 
+@pytest.mark.filterwarnings("ignore:pulse_width_us is never above the threshold:fes_pin.InputWarning")
 def test_nothing_is_identified_without_a_stimulus():
     rng = np.random.default_rng(5)
     model = Model(RIGS["muscle"])

@@ -3,6 +3,7 @@
 import copy
 import math
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pandas
@@ -82,6 +83,7 @@ def test_of_a_linear_parameter_both_intervals_are_one():
     assert fitted.interval("gain", method="profile") == pytest.approx(fitted.interval("gain"), rel=1e-4)
 
 
+@pytest.mark.filterwarnings("ignore:pulse_width_us is never above the threshold:fes_pin.InputWarning")
 def test_a_profile_of_what_is_not_identified_reaches_its_bounds():
     model = Model(RIGS["muscle"])
     bare = Trial("rest", "isometric", {"pulse_width_us": np.zeros(300)}, np.arange(300) * 5e-3)
@@ -201,6 +203,20 @@ def test_trials_may_be_one_or_come_one_after_another():
     whole = fit(model, trials, WHITE)
     assert fit(model, (t for t in trials), WHITE).values == whole.values
     assert fit(model, trials[0], WHITE).values == fit(model, trials[:1], WHITE).values
+
+
+def test_of_a_study_trials_that_it_holds_out_are_not_fitted():
+    model, trials = trials_of("muscle", np.random.default_rng(0))
+    roles = enumerate(("fit", None, "held_out"))
+    trials = tuple(replace(t, name=str(k), role=role) for t, (k, role) in zip(trials, roles, strict=True))
+    known = {n: model.rig.constants[n] for n in ("threshold_us", "saturation_us")}
+    study = fp.Study("s", "muscle", known, {"gain": 30.0, "time_constant_s": 0.06}, trials)
+    assert fit(model, study, WHITE).trials == trials[:2]
+    assert fit(model, study.trials, WHITE).trials == trials
+    held = replace(study, trials=trials[2:])
+    assert fit(model, held.trials, WHITE).trials == trials[2:]
+    with pytest.raises(fp.InputError, match="expected at least one trial to fit; all have role = held_out"):
+        fit(model, held, WHITE)
 
 
 def test_effects_of_each_trial_are_profiled_as_well():

@@ -21,7 +21,7 @@ from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.predict import predict
 from fes_pin.models.rigs import Ankle
-from fes_pin.models.simulate import simulate
+from fes_pin.models.simulate import simulated_trial
 from fes_pin.models.store import load_model, save_model
 
 RIG = Ankle(0.65, 0.05, 1.4e-3, 0.06, constants=ankle.KNOWN)
@@ -53,7 +53,7 @@ def test_unstimulated_the_torque_is_that_of_inverse_dynamics():
     needed = np.array([pin.rnea(body, data, *(np.array([x[k]]) for x in (q, v, a)))[0] for k in range(len(q))])
     antagonist = ankle.KNOWN["f0_n"] * np.expm1(ankle.KNOWN["f1_per_rad"] * (q - ankle.KNOWN["theta_r_rad"]))
     wanted = -needed - RIG.damping_nms * v - ankle.KNOWN["com_distance_m"] * antagonist * np.sin(q)
-    missed = simulate(Model(RIG), trial)["torque_nm"] - wanted
+    missed = simulated_trial(Model(RIG), trial)["torque_nm"] - wanted
     assert np.abs(missed).max() < 1e-3 * np.ptp(wanted)
 
 
@@ -65,15 +65,15 @@ def test_stimulated_the_muscle_pulls_with_its_lever():
         return (max(float(r[min(int(t / trial.dt + 1e-9), len(r) - 1)]), 0.0) - act) / RIG.time_constant_s
 
     act = solve_ivp(rate, (0.0, trial.time[-1]), [0.0], "RK45", trial.time, max_step=trial.dt, rtol=1e-8).y[0]
-    pull = simulate(Model(RIG), trial)["torque_nm"] - simulate(Model(RIG), moved()[1])["torque_nm"]
+    pull = simulated_trial(Model(RIG), trial)["torque_nm"] - simulated_trial(Model(RIG), moved()[1])["torque_nm"]
     wanted = RIG.gain * 56.0 * 0.034 * act * np.sin(motion.at(trial.time))
     assert np.abs(pull - wanted).max() < 0.02 * wanted.max()
 
 
 def test_friction_follows_the_velocity():
     motion, trial = moved()
-    v, plain = motion.at(trial.time, 1), simulate(Model(RIG), trial)["torque_nm"]
-    rubbed = simulate(Model(RIG) + CoulombFriction(torque_nm=0.1), trial)["torque_nm"]
+    v, plain = motion.at(trial.time, 1), simulated_trial(Model(RIG), trial)["torque_nm"]
+    rubbed = simulated_trial(Model(RIG) + CoulombFriction(torque_nm=0.1), trial)["torque_nm"]
     fast = np.abs(v) > 0.1
     assert np.abs(plain - rubbed - 0.1 * np.sign(v))[fast].max() < 1e-3
 
@@ -83,7 +83,7 @@ def test_a_muscle_pulls_whichever_way_the_dynamometer_counts(tmp_path):
     other = replace(one, trials=tuple(t.with_columns(torque_nm=-t["torque_nm"]) for t in one.trials))
     signs = [nominal_model(s).rig.constants.get("torque_sign", 1.0) for s in (one, other)]
     assert sorted(signs) == [-1.0, 1.0]
-    answers = [simulate(nominal_model(s), one.trials[1])["torque_nm"] for s in (one, other)]
+    answers = [simulated_trial(nominal_model(s), one.trials[1])["torque_nm"] for s in (one, other)]
     assert np.array_equal(answers[0], -answers[1])
     told = [any("the opposite sign" in w for w in check_study(s, nominal_model(s))) for s in (one, other)]
     assert told == [s < 0.0 for s in signs]
@@ -101,7 +101,7 @@ def test_a_hidden_cause_is_named_and_predicted(tmp_path, cause):
     write_trial(study.trials[1].without("torque_nm"), tmp_path / "one.csv")
     again = read_trial(tmp_path / "one.csv", rig="ankle", kind="imposed", inputs_only=True)
     predicted = predict(load_model(tmp_path / "model.toml"), again)["torque_nm"]
-    assert np.abs(predicted - simulate(found.model, study.trials[1])["torque_nm"]).max() < 1e-9
+    assert np.abs(predicted - simulated_trial(found.model, study.trials[1])["torque_nm"]).max() < 1e-9
 
 
 @pytest.mark.parametrize("seed", [7, 8])

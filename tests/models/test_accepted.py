@@ -9,9 +9,14 @@ from identify.rigs import WHITE, measured
 from models.cases import RIGS, trial
 
 import fes_pin as fp
+from fes_pin.identify.fit import fit_accepted
 from fes_pin.models.effects import SensorOffset
 from fes_pin.models.model import Model
+from fes_pin.models.predict import predicted_trial
 from fes_pin.models.rigs import Joint, Muscle
+from fes_pin.models.simulate import Simulator, simulated_trial
+
+run = Simulator.run
 
 MODELS = {rig: Model(one) for rig, one in RIGS.items()}
 KINDS = {"ankle": "motion", "joint": "motion", "muscle": "isometric"}
@@ -20,7 +25,7 @@ VERBS = {"simulate": fp.simulate, "predict": fp.predict, "fit": lambda model, on
 
 def recorded(rig):
     rng = np.random.default_rng(0)
-    return measured(MODELS[rig], trial(rig, KINDS[rig], rng, 200), rng)
+    return measured(MODELS[rig], trial(rig, KINDS[rig], rng, 400), rng)
 
 
 def without_condition(one):
@@ -132,6 +137,52 @@ def test_whole_trials_are_taken_and_answered_as_before(rig):
     for name, values in fp.predict(model, one).columns.items():
         np.testing.assert_array_equal(values, simulated[name])
     assert fp.fit(MODELS[rig], [one], WHITE).converged
+
+
+def in_degrees(one):
+    return one.with_columns(position=np.degrees(one["position"]))
+
+
+def stuck(values):
+    return np.r_[values[:200], np.full(50, values[200]), values[250:]]
+
+
+ODD = {
+    "degrees": ("joint", in_degrees, ["turns: is it in degrees?"]),
+    "turned round": ("muscle", lambda t: t.with_columns(force_n=-t["force_n"]), ["is its sign turned round"]),
+    "a heavy load and a sensor that sticks": (
+        "ankle",
+        lambda t: replace(t, conditions={"load_kg": 150.0}).with_columns(angle_rad=stuck(t["angle_rad"])),
+        ["load_kg is above 100 kg", "angle_rad stays at"],
+    ),
+    "a load in g": ("ankle", lambda t: replace(t, conditions={"load_kg": 1e3}), ["load_kg is 1000 kg; no ankle holds"]),
+    "ms": ("muscle", lambda t: replace(t, time=1e3 * t.time), ["is time_s in ms?"]),
+}
+
+
+@pytest.mark.parametrize("verb", VERBS)
+@pytest.mark.parametrize("odd", ODD)
+def test_numbers_that_are_odd_are_warned_of_once_a_call_and_answered(odd, verb):
+    rig, change, told = ODD[odd]
+    with pytest.warns(fp.InputWarning) as warned:
+        answer = VERBS[verb](MODELS[rig], change(recorded(rig)))
+    (one,) = warned
+    assert all(words in str(one.message) for words in told) and one.filename == __file__
+    assert isinstance(answer, fp.Fit | fp.Trial)
+
+
+def test_what_fits_and_simulates_within_warns_nobody():
+    one = in_degrees(recorded("joint"))
+    assert isinstance(fit_accepted(MODELS["joint"], (one,), WHITE), fp.Fit)
+    assert isinstance(simulated_trial(MODELS["joint"], one), fp.Trial)
+    assert isinstance(predicted_trial(MODELS["joint"], one), fp.Trial)
+
+
+def test_a_trial_is_simulated_once_where_its_sign_is_judged(monkeypatch):
+    made = []
+    monkeypatch.setattr(Simulator, "run", lambda self, *given: made.append(self) or run(self, *given))
+    fp.predict(MODELS["muscle"], recorded("muscle"))
+    assert len(made) == 2  # of them one by `recorded`
 
 
 def test_a_misspelt_start_names_what_it_may_be(ankle_study):

@@ -100,6 +100,7 @@ def test_the_nominal_model_is_exact_at_1_khz(rig, kind):
     assert error <= 1e-6
 
 
+@pytest.mark.filterwarnings("ignore:force_n is cut off:fes_pin.InputWarning")
 @pytest.mark.parametrize("second_s", [0.001, 0.002, 0.004])
 def test_a_short_lag_is_told_from_a_delay(second_s):
     """What the engine's steps do to a lag shorter than they are is small beside what makes it a lag and no delay."""

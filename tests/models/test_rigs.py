@@ -271,8 +271,7 @@ def test_a_sensor_lags_behind_a_play_and_not_beside_it():
     """Where a play stands its reading comes to rest; a low pass of the play, by its exact recursion."""
     lag, dt = 0.03, 1e-3
     time = np.arange(3000) * dt
-    columns = {"effort": 0.4 * np.sin(4.0 * time), "position": np.zeros(len(time))}
-    swung = Trial("t", "motion", columns, time, {"position0": 0.0, "velocity0": 0.0})
+    swung = Trial("t", "motion", {"effort": 0.4 * np.sin(4.0 * time)}, time, {"position0": 0.0, "velocity0": 0.0})
     plain = Model(RIGS["joint"]) + Backlash(half_width=0.02)
     play, late = (simulate(m, swung)["position"] for m in (plain, plain + SensorLag(lag_s=lag)))
     keep, expected = np.exp(-dt / lag), np.zeros(len(time))

@@ -142,6 +142,7 @@ def test_recorded_pulses_carry_the_same_mean_at_any_rate():
         assert force[-10 * period :].mean() == pytest.approx(GAIN, rel=2e-3)
 
 
+@pytest.mark.filterwarnings("ignore:force_n is cut off:fes_pin.InputWarning")
 def test_a_faster_train_makes_more_force():
     """Pulses add up, whatever the rate: the area of one is the study's, not the trial's."""
     time, trains = np.arange(4000) * 1e-3, []

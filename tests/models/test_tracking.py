@@ -7,7 +7,7 @@ from view.reported import joint_study
 from fes_pin.models.effects import effect_named
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
-from fes_pin.models.simulate import simulate
+from fes_pin.models.simulate import simulated_trial
 from fes_pin.models.tracking import TrackingEffort, can_track, measured_motion, tracking_effort
 
 A_FIFTH = 8e-4
@@ -25,7 +25,7 @@ def test_the_effort_that_was_hidden_is_found(pendulum, gravity):
     model, trial = pendulum
     model = model.with_parameters({"gravity_scale": gravity})
     hidden = model + effect_named("effort_offset")(offset=0.004)
-    measured = simulate(hidden, trial)
+    measured = simulated_trial(hidden, trial)
     motion = measured_motion(measured, "position")
     inside = slice(40, -40)  # the servo has settled
     assert tracking_effort(model, measured, *motion)[inside] == pytest.approx(0.004, abs=A_FIFTH)
@@ -35,7 +35,7 @@ def test_the_effort_that_was_hidden_is_found(pendulum, gravity):
 def test_a_sensor_that_is_part_of_the_model_is_no_effort(pendulum):
     model, trial = pendulum
     skewed = model + effect_named("sensor_offset")(offset=0.05)
-    measured = simulate(skewed, trial)
+    measured = simulated_trial(skewed, trial)
     left = tracking_effort(skewed, measured, *measured_motion(measured, "position"))
     assert np.abs(left[40:-40]).max() < 3e-4
     wrong = tracking_effort(model, measured, *measured_motion(measured, "position"))

@@ -33,6 +33,7 @@ def framed():
     return problem, least_error(problem)
 
 
+@pytest.mark.filterwarnings("ignore:angle_rad :fes_pin.InputWarning")
 @pytest.mark.parametrize("coupling", [0.0, 1.3])
 def test_the_twins_integrator_and_the_engine_agree(coupling):
     twin = replace(paper_twin("3-23"), frame_coupling=coupling, frame_hz=4.5, frame_damping=0.03)

@@ -14,7 +14,7 @@ from fes_pin.identify.fit import fit
 from fes_pin.infer.result import CROSS_VALIDATED, Cause, Gain, ParameterEstimate, Ranked, Remainder
 from fes_pin.models.effects import effect_named
 from fes_pin.models.nominal import nominal_model
-from fes_pin.models.simulate import simulate
+from fes_pin.models.simulate import simulated_trial
 
 NASTY = '<script>alert("x")</script> & $a_b$'
 ANKLE = {
@@ -62,7 +62,7 @@ def measured(study: Study, names: tuple[str, ...], noise: float = 1e-3, seed: in
     model, rng = _extended(study, names), np.random.default_rng(seed)
     trials = []
     for trial in study.trials:
-        made = simulate(model, trial)
+        made = simulated_trial(model, trial)
         outputs = model.rig.outputs(trial.kind)
         trials.append(trial.with_columns(**{n: made[n] + noise * rng.standard_normal(len(trial)) for n in outputs}))
     return Study(study.name, study.rig, study.constants, study.start, tuple(trials), study.folder, study.files)

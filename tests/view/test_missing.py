@@ -5,7 +5,7 @@ from view.reported import ankle_diagnosis, ankle_study, joint_study
 from fes_pin.diagnosis.replay import replayed_trials
 from fes_pin.models.effects import effect_named
 from fes_pin.models.nominal import nominal_model
-from fes_pin.models.simulate import simulate
+from fes_pin.models.simulate import simulated_trial
 from fes_pin.view.missing import binned, missing_input, smooth
 
 
@@ -13,7 +13,7 @@ def missing_of(study, added, index=0):
     """What the true nominal model lacks in a trial that an effect has changed."""
     model = nominal_model(study)
     trial = study.trials[index]
-    return missing_input(model, simulate(model + added, trial), simulate(model, trial))
+    return missing_input(model, simulated_trial(model + added, trial), simulated_trial(model, trial))
 
 
 def test_missing_torque_of_a_spring_is_its_torque():

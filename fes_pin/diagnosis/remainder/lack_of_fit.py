@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from fes_pin.diagnosis.remainder.open_set import residual_tests
-from fes_pin.identify.fit import fit
+from fes_pin.identify.fit import fit_accepted
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.problem import limits_of
@@ -35,7 +35,7 @@ def lack_of_fit(fitted: LikelihoodFit) -> Remainder:
     `remainder.open_set`: process noise would take bursts and detents for its own. The p-value is that of the
     most significant test, times the number of tests.
     """
-    free = fit(fitted.model, fitted.trials) if fitted.noise.ar else None
+    free = fit_accepted(fitted.model, fitted.trials) if fitted.noise.ar else None
     others = residual_tests(free) if free is not None and math.isfinite(free.sse) else []
     found = [_features_left(fitted), *others]
     p_value, where = min(found, key=lambda f: f[0])
