@@ -2,6 +2,8 @@
 
 import os
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -34,6 +36,21 @@ def test_each_block_runs(names, page, code):
 
 def test_every_page_has_a_block():
     assert {block.values[0] for block in BLOCKS} == set(PAGES)
+
+
+def test_every_page_passes_a_strict_type_checker(tmp_path):
+    """As the file of a user, whose checker does not report what is within the library."""
+    pytest.importorskip("mypy")
+    given = [f"{name} = {value}" for name, value in GIVEN.items()]
+    for page in PAGES:
+        code = [block.values[1] for block in BLOCKS if block.values[0] == page]
+        (tmp_path / f"{Path(page).stem}.py").write_text("\n".join([*given, *code]))
+    files = [str(path) for path in (*sorted(tmp_path.glob("*.py")), ROOT / "tests" / "typed.py")]
+    strict = ["--strict", "--follow-imports=silent", "--cache-dir", str(tmp_path / "cache")]
+    run = [sys.executable, "-m", "mypy", *strict, *files]
+    told = subprocess.run(run, capture_output=True, text=True, cwd=ROOT, check=False)
+    assert told.returncode == 0, told.stdout
+    assert f"in {len(PAGES) + 1} source files" in told.stdout
 
 
 def test_the_first_one_leaves_a_model_and_a_report(names):

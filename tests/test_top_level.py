@@ -4,6 +4,7 @@ import importlib
 import inspect
 import pickle
 import pkgutil
+import sys
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,11 @@ import typed
 from data import studies
 
 import fes_pin as fp
+
+ROOT = Path(__file__).parents[1]
+DEMO = ROOT / "analysis/studies/ankle_demo"
+sys.path.insert(0, str(ROOT / "scripts" / "generate"))
+import effect_types  # noqa: E402
 
 
 def test_every_public_name_can_be_had():
@@ -55,6 +61,17 @@ def test_type_checkers_are_told_of_types():
     assert (Path(fp.__file__).parent / "py.typed").exists()
 
 
+def test_answers_on_rigs_are_told_from_those_on_walks(tmp_path):
+    verdict, model = typed.answered(fp.read_study(DEMO), tmp_path)
+    assert verdict == "stopped" and isinstance(model, fp.Model)
+    assert fp.load_model(tmp_path / "model.toml") == model and (tmp_path / "report.html").exists()
+
+
+def test_type_checkers_know_every_effect_by_name():
+    """A new effect is told by `scripts/generate/effect_types.py`."""
+    assert effect_types.FILE.read_text() == effect_types.text()
+
+
 @pytest.mark.filterwarnings("ignore:fewer than 16 samples:fes_pin.InputWarning")
 def test_what_a_user_writes_in_types_runs(tmp_path):
     study = fp.read_study(studies.ankle(tmp_path / "study"))
@@ -64,4 +81,5 @@ def test_what_a_user_writes_in_types_runs(tmp_path):
     assert "torque_nm" in repr(fitted)
     pytest.importorskip("pandas")
     assert typed.tables(study, fitted)[0] > 0.0
+    assert typed.friction().torque_nm == 0.04
     assert typed.one_line(tmp_path / "none").startswith(str(tmp_path / "none"))

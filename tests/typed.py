@@ -1,6 +1,7 @@
 """What a user writes, in types that `mypy --strict` accepts; `.ci/run` checks them, a test runs it."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,3 +45,22 @@ def one_line(folder: Path) -> str:
         return repr(fp.read_study(folder))
     except fp.InputError as error:
         return f"{error.file}: {error.message}"
+
+
+def answered(study: fp.Study, folder: Path) -> tuple[str, fp.Model | None]:
+    """A verdict with its model and its page; of a rig, which is no walk, the model as such."""
+    diagnosis = fp.diagnose(study, limit=0.0)
+    fp.save_model(diagnosis.model, folder / "model.toml")
+    fp.report(diagnosis, folder / "report.html")
+    return diagnosis.verdict, diagnosis.model if isinstance(diagnosis, fp.Diagnosis) else None
+
+
+def friction() -> fp.effects.CoulombFriction:
+    """A cause by the name of its class."""
+    return fp.effects.CoulombFriction(torque_nm=0.04)
+
+
+if TYPE_CHECKING:  # what is misspelt is found before it runs
+    fp.effects.CoulombFrictoin(torque_nm=0.04)  # type: ignore[attr-defined]
+    fp.effects.CoulombFriction(torque=0.04)  # type: ignore[call-arg]
+    fp.save_model(friction(), "model.toml")  # type: ignore[arg-type]

@@ -308,10 +308,16 @@ class ModelResult(Result):
         E of noise alone.
     """
 
+    causes: tuple[Cause, ...]
     absorbed: tuple[str, ...]
     nominal_error: tuple[float | None, float | None]
     extended_error: tuple[float | None, float | None]
     ceiling_percent: float
+
+    @property
+    def model(self) -> Any:
+        """The extended model: of a rig a `Model`, of a walk a `Body`."""
+        raise NotImplementedError
 
     def models_record(
         self, nominal: dict[str, Any], extended: dict[str, Any], noise: dict[str, Any], files: Sequence[str] = ("file",)

@@ -13,7 +13,7 @@ from fes_pin.diagnosis.experiment import NextExperiment
 from fes_pin.identify.error_measures import FREE, ONE_STEP
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.stored import log_table, stored_tables
-from fes_pin.infer.result import FITTED, STOPPED, Cause, Explained, ParameterEstimate, Ranked, shown
+from fes_pin.infer.result import FITTED, STOPPED, Explained, ParameterEstimate, Ranked, shown
 from fes_pin.infer.text import percent, probability
 from fes_pin.models.catalogue import Catalogue, installed
 from fes_pin.models.model import Model
@@ -54,7 +54,6 @@ class Diagnosis(ModelResult):
         those of free simulations.
     """
 
-    causes: tuple[Cause, ...]
     nominal: LikelihoodFit
     extended: LikelihoodFit
     next_experiment: NextExperiment | None = None

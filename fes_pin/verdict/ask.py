@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING
 
 from fes_pin.data.asked import asked
 from fes_pin.data.errors import InputError
+from fes_pin.data.results import ModelResult
 from fes_pin.data.study import Study
 from fes_pin.models.catalogue import Source
 
 if TYPE_CHECKING:
     from fes_pin.diagnosis.checked import Checked
-    from fes_pin.diagnosis.result import Diagnosis
-    from fes_pin.walk.result import WalkDiagnosis
 
 
 def check(study: Study, *, library: Source | Sequence[Source] | None = None) -> Checked:
@@ -52,11 +51,12 @@ def diagnose(
     seed: int = 0,
     limit: float | None = None,
     progress: Callable[[float, str], None] | None = None,
-) -> Diagnosis | WalkDiagnosis:
+) -> ModelResult:
     """Find out what the model of a study gets wrong: `diagnose.diagnosis.diagnose_joint`, for a body `diagnose_walk`.
 
     Both answers have `verdict`, `causes`, `remainder`, `absorbed`, `nominal_error`, `extended_error`,
-    `ceiling_percent`, `next_experiment`, `warnings`, `wall_s`, and the extended `model`: a body's is a `Body`.
+    `ceiling_percent`, `next_experiment`, `warnings`, `wall_s`, and the extended `model`: a body's is a `Body`. What
+    else the answer on a rig has, `isinstance(answer, fp.Diagnosis)` tells type checkers.
 
     Parameters
     ----------

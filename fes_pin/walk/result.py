@@ -9,7 +9,7 @@ import tomli_w
 
 from fes_pin.body.build import Body
 from fes_pin.data.results import ModelResult
-from fes_pin.infer.result import CROSS_VALIDATED, FITTED, Cause, Explained, shown
+from fes_pin.infer.result import CROSS_VALIDATED, FITTED, Explained, shown
 from fes_pin.infer.text import percent, probability
 from fes_pin.walk.effect import WalkEffect
 from fes_pin.walk.effects import EFFECTS
@@ -34,7 +34,6 @@ class WalkDiagnosis(ModelResult):
         The fits behind it.
     """
 
-    causes: tuple[Cause, ...]
     models: WalkModels
     best: WalkFit
     MODEL: ClassVar[str] = "the walking model"
