@@ -176,8 +176,8 @@ class Result(Saveable):
     def title(self) -> str:
         """Return the verdict in a few words."""
         begun = "stopped: best set so far: " if self.is_stopped else ""
-        lacks = [one.name.replace("_", " ") for one in self.causes if one.trial is None]
-        said = [one.words for one in self.causes if one.trial is not None]
+        lacks = [one.name.replace("_", " ") for one in self.causes if not one.words]
+        said = [one.words for one in self.causes if one.words]
         said += [f"{self.MODEL} lacks {listed(lacks)}"] if lacks else []
         nothing = {
             STOPPED: "no cause, and no claim about causes that were not tried",

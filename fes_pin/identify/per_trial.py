@@ -7,6 +7,7 @@ ones and vice versa (cross-fitting), so that no sample takes part in its own pre
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import fields, replace
 from functools import partial
 
 import numpy as np
@@ -16,9 +17,11 @@ from fes_pin.identify.fit import fit_problem, from_beginnings
 from fes_pin.identify.likelihood import LikelihoodProblem, is_simulated
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.problem import Problem, unknown_names
-from fes_pin.identify.process_noise import spread_of_start
+from fes_pin.identify.process_noise import first_guess, spread_of_start
+from fes_pin.infer.covariance import covariance_of
 from fes_pin.infer.levels import RUNAWAY
 from fes_pin.infer.noise import NoiseModel
+from fes_pin.infer.optimum import Optimum
 from fes_pin.infer.problem import Linearized, normal_equations
 from fes_pin.models.least_squares import least_squares
 from fes_pin.models.model import Model
@@ -29,8 +32,8 @@ from fes_pin.models.stage import Effect
 SEGMENTS = 4
 """Pieces of a trial. With two, a slow oscillation would have to be predicted over half a trial; many short pieces would
 share slow noise."""
-STEPS = 3
-"""Gauss-Newton steps: the amplitudes are nearly linear, but for the nonlinearity of the joint."""
+STEPS = 12
+"""Most Gauss-Newton steps; amplitudes that are nearly linear take three."""
 
 
 def predictions(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> list[np.ndarray]:
@@ -92,20 +95,32 @@ def cross_fitted_unknowns(
     """
     if not model.own_unknowns():
         return [(np.ones(len(trial), dtype=bool), {})]
-    outputs, values = [n for n in model.rig.outputs(trial.kind) if n in trial.columns], model.parameters()
-    out = []
+    outputs = [n for n in model.rig.outputs(trial.kind) if n in trial.columns]
+    out, spread = [], spread_of_start(model, trial)
+    followed = replace(first_guess(model, [trial]), white=noise.white)
     for half in halves(len(trial)):
         masked = {n: np.where(half, np.nan, trial[n]) for n in outputs}
         shown = derived_trial(trial, columns={**trial.columns, **masked})
-        problem = LikelihoodProblem(model, [shown], noise, (), starts=[trial])
-        (now,) = [dict(start)] if start else problem.start_unknowns()
-        spread = {n: d for n, d in spread_of_start(model, trial).items() if n in problem.unknown_names}
-        reach = {n: (now[n] - d, now[n] + d) for n, d in spread.items()}
-        for _ in range(STEPS):
-            (part,) = problem.linearize(values, [now])
-            now = _moved(part, problem.unknown_names, now, reach)
+        now = {**model.initial_unknowns(trial), **(start or {})}
+        for one in (followed, noise):
+            now = _descended(LikelihoodProblem(model, [shown], one, (), starts=[trial]), now, spread)
         out.append((half, {n: now[n] for n in model.own_unknowns()}))
     return out
+
+
+def _descended(problem: LikelihoodProblem, now: dict[str, float], spread: Mapping[str, float]) -> dict[str, float]:
+    """Return the unknowns of a trial after steps of least squares, each as long as lowers the cost most."""
+    values = problem.model.parameters()
+    reach = {n: (now[n] - d, now[n] + d) for n, d in spread.items() if n in problem.unknown_names}
+    for _ in range(STEPS):
+        (part,) = problem.linearize(values, [now])
+        there = _moved(part, problem.unknown_names, now, reach)
+        tried = [now, *({n: v + 0.5**k * (there[n] - v) for n, v in now.items()} for k in range(problem.batch - 1))]
+        best = int(np.argmin(np.nan_to_num(problem.costs([(values, [one]) for one in tried]), nan=np.inf)))
+        if best == 0:
+            break
+        now = tried[best]
+    return now
 
 
 def _moved(
@@ -120,6 +135,21 @@ def _moved(
         free = least_squares(part.local[:, others], left, rcond=1e-6)
         step = {**kept, **{names[k]: d for k, d in zip(others, free, strict=True)}}
     return {**now, **{n: now[n] + float(d) for n, d in step.items()}}
+
+
+def as_parameters(fitted: LikelihoodFit, path: str) -> Optimum:
+    """Return the optimum of a fit with an unknown of each trial as a parameter, `path@trial`, of all trials."""
+    at = unknown_names(fitted.model, fitted.trials, is_simulated(fitted.noise, fitted.trials)).index(path)
+    own = {f"{path}@{t.name}": u[path] for t, u in zip(fitted.trials, fitted.unknowns, strict=True)}
+    each, free = np.eye(len(own)), (*fitted.free, *own)
+    parts = [
+        replace(p, jacobian=np.c_[p.jacobian, np.outer(p.local[:, at], row)], local=np.delete(p.local, at, axis=1))
+        for p, row in zip(fitted.parts, each, strict=True)
+    ]
+    covariance = covariance_of(normal_equations(parts).hessian, np.array([n not in fitted.at_bound for n in free]))
+    known = {f.name: getattr(fitted, f.name) for f in fields(Optimum)}
+    more = {"free": free, "parameters": {**fitted.parameters, **own}, "parts": parts, "covariance": covariance}
+    return Optimum(**{**known, **more})
 
 
 def amplitude(fitted: LikelihoodFit, effect: Effect) -> tuple[float, float]:

@@ -116,8 +116,14 @@ class Effect:
     screened_with: ClassVar[tuple[str, ...]] = ()
     remembers: ClassVar[bool] = False
     scales: ClassVar[bool] = False
+    of_record: ClassVar[bool] = False
 
     each_trial: bool = dataclasses.field(default=False, kw_only=True)
+
+    @property
+    def is_fault(self) -> bool:
+        """Whether it is a fault of the record: a zero or a scale of each trial's own."""
+        return self.of_record and self.each_trial
 
     def __init_subclass__(cls) -> None:
         for old, new in _RENAMED.items():
