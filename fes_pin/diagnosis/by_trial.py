@@ -9,6 +9,7 @@ searched again in a model that has it. That search is the answer if
 3. a zero that is estimated from other parts of its trial lowers the errors of prediction.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -18,17 +19,19 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.held_out import Again, Found, gains_of, make_folds, refit
 from fes_pin.diagnosis.restate import Made, with_first
 from fes_pin.diagnosis.result import Diagnosis
+from fes_pin.diagnosis.search.library import Library
 from fes_pin.diagnosis.search.likelihood_maxima import look
 from fes_pin.diagnosis.search.likelihood_models import LikelihoodSearch
-from fes_pin.identify.likelihood_fit import LikelihoodFit, maximum_from
-from fes_pin.identify.per_trial import as_parameters
-from fes_pin.infer.distributions import chi2_tail
+from fes_pin.identify.likelihood_fit import LikelihoodFit, at_noise, maximum_from
+from fes_pin.identify.per_trial import as_parameters, cross_fitted_unknowns, halves, pieces
+from fes_pin.infer.distributions import chi2_quantile, chi2_tail
 from fes_pin.infer.fits import more_degrees
-from fes_pin.infer.levels import SEPARABLE
+from fes_pin.infer.levels import IDENTIFIABLE_SHARE, SEPARABLE, UNUSUAL_LEVEL
 from fes_pin.infer.result import Cause, ParameterEstimate
 from fes_pin.infer.scatter import excess_scatter, with_honest_intervals
 from fes_pin.infer.search import SearchResult
 from fes_pin.models.model import Model
+from fes_pin.models.predictor import StateSpaceNoise
 from fes_pin.models.stage import Effect, Stage
 from fes_pin.workers import attempted
 
@@ -45,37 +48,51 @@ class ByTrial:
 
     Attributes
     ----------
-    kind
+    effect
         The effect of which every trial has its own amplitude.
     p_value
         Against one amplitude of all trials, over all kinds.
     """
 
-    kind: type[Effect]
+    effect: Effect
     p_value: float
 
     @property
     def path(self) -> str:
         """Name of the amplitude among a trial's unknowns."""
-        return f"{self.kind.name}.{self.kind.amplitudes()[0]}"
+        return f"{self.effect.name}.{self.effect.amplitudes()[0]}"
 
     def common(self, fitted: LikelihoodFit) -> LikelihoodFit:
         """Return a fit again with one amplitude of all trials."""
         mean = float(np.mean([u[self.path] for u in fitted.unknowns]))
-        model = (fitted.model - self.kind + self.kind()).with_parameters({self.path: mean})
+        model = (fitted.model - self.effect + type(self.effect)()).with_parameters({self.path: mean})
         return maximum_from(replace(fitted, model=model, parameters=model.parameters()), fitted.trials)
 
-    def values(self, fitted: LikelihoodFit) -> dict[str, ParameterEstimate]:
-        """Return the zero or scale of the record in each trial; the effect of an effort is of the one that acts."""
-        wide, acts = with_honest_intervals(as_parameters(fitted, self.path)), self.kind.signal == "effort"
-        info = self.kind.parameters()[self.kind.amplitudes()[0]].in_units(fitted.model.rig.units())
-        out = {}
-        for trial in fitted.trials:
-            value, std = wide.values[n := f"{self.path}@{trial.name}"], wide.std(n)
-            if self.kind.scales:
-                value, std = (1.0 / (1.0 + value), std / (1.0 + value) ** 2) if acts else (1.0 + value, std)
-            out[trial.name] = ParameterEstimate(-value if acts and not self.kind.scales else value, std, info.unit)
-        return out
+    def values(self, fitted: LikelihoodFit, relative: bool) -> dict[str, ParameterEstimate]:
+        """Return the zero or scale of the record in each trial; the effect of an effort is of the one that acts.
+
+        Where the estimates from both halves of a trial differ more than is expected, the intervals are as much wider.
+
+        Parameters
+        ----------
+        relative
+            Whether only the ratio of a scale to the mean of all is known.
+        """
+        wide, count = with_honest_intervals(as_parameters(fitted, self.effect)), len(fitted.trials)
+        values, stds = np.array([[wide.values[n], wide.std(n)] for n in wide.free[-count:]]).T
+        both = [cross_fitted_unknowns(fitted.model, t, fitted.noise) for t in fitted.trials]
+        apart = np.array([odd[self.path] - even[self.path] for (_, odd), (_, even) in both])
+        ratio = float(np.mean((0.5 * apart / stds) ** 2))
+        stds = stds * math.sqrt(ratio) if count * ratio > chi2_quantile(1.0 - UNUSUAL_LEVEL, count) else stds
+        if self.effect.scales:
+            values, stds = 1.0 + values, stds / (1.0 + values)
+            values = 1.0 / values if self.effect.signal == "effort" else values
+            values, stds = (values / np.mean(values) if relative else values), stds * values
+        elif self.effect.signal == "effort":
+            values = -values
+        unit = self.effect.parameters()[self.effect.amplitudes()[0]].in_units(fitted.model.rig.units()).unit
+        each = zip(fitted.trials, values, stds, strict=True)
+        return {t.name: ParameterEstimate(float(v), float(s), unit) for t, v, s in each}
 
 
 def with_faults(ran: Ran, ask: Ask, kinds: Sequence[type[Effect]]) -> tuple[Ran, list[ByTrial]]:
@@ -88,12 +105,30 @@ def with_faults(ran: Ran, ask: Ask, kinds: Sequence[type[Effect]]) -> tuple[Ran,
     """
     kinds = [e for e in kinds if e.of_record and e.name not in {one.name for one in ran[0].models.model.effects}]
     kind = attempted(lambda: _likeliest(ran, kinds), None)
-    other = None if kind is None else attempted(lambda: ask(ran[0].models.model + kind.of_each_trial()), None)
+    other = None if kind is None else attempted(lambda: ask(_begun(ran, kind)), None)
     fault = None if kind is None or other is None else attempted(lambda: _fault(ran, other, kind, len(kinds)), None)
     if other is None or fault is None:
         return ran, []
     last, faults = with_faults(other, ask, kinds)
     return last, [fault, *faults]
+
+
+def _begun(ran: Ran, kind: type[Effect]) -> Model:
+    """Return the model with an amplitude of each trial's own.
+
+    Where the nominal parameters take the place of one amplitude of all trials, as of a scale of the effort where
+    gravity is not known, the first of them is held. Whether they do is seen where every trial is simulated freely in
+    pieces, each from its own state.
+    """
+    model, nominal = ran[0].models.model, ran[1].nominal
+    fitted, noise, rig = nominal, StateSpaceNoise(nominal.noise.white), nominal.model.rig
+    if all(rig.unknowns(t.kind) for t in nominal.trials):
+        short = [p for t in nominal.trials for half in halves(len(t)) for p in pieces(t, half)]
+        fitted = at_noise(replace(nominal, trials=tuple(short), unknowns=[{} for _ in short]), noise)
+    kept = max(s.kept for s in Library(model, fitted.trials, [kind]).scores(fitted).scored)
+    if kept < IDENTIFIABLE_SHARE:
+        model = Model(replace(rig, fitted=rig.fitted_parameters()[1:]), model.effects)
+    return model + kind.of_each_trial()
 
 
 def _likeliest(ran: Ran, kinds: Sequence[type[Effect]]) -> type[Effect] | None:
@@ -130,9 +165,10 @@ def _fault(ran: Ran, other: Ran, kind: type[Effect], count: int) -> ByTrial | No
     count
         Number of kinds that were looked for.
     """
-    (_, before, _), (search, found, _), fault = ran, other, ByTrial(kind, 1.0)
-    best, one = found.best, fault.common(found.best)
-    gain = max(one.sse - best.sse, 0.0) / excess_scatter(as_parameters(best, fault.path), one)
+    (_, before, _), (search, found, _) = ran, other
+    best, fault = found.best, ByTrial(kind.of_each_trial(), 1.0)
+    one = fault.common(best)
+    gain = max(one.sse - best.sse, 0.0) / excess_scatter(as_parameters(best, fault.effect), one)
     p_value = count * float(chi2_tail(gain, more_degrees(best, one)))
     lower = best.criterion < _on(before.best, best.trials).criterion - SEPARABLE
     named = p_value < best.level and lower and not search.was_stopped and search.models.predicts_better(best, one)
@@ -149,16 +185,18 @@ def with_fault(
     nominal
         Fit of the nominal model without it.
     """
-    best, kind = diagnosis.extended, fault.kind
-    nominal, one, values = _on(nominal, best.trials), fault.common(best), fault.values(best)
-    found = SearchResult(nominal, best, {}, {}, {kind.name: one})
+    best, effect = diagnosis.extended, fault.effect
+    nominal, one = _on(nominal, best.trials), fault.common(best)
+    relative = effect.scales and nominal.model.rig.fitted != best.model.rig.fitted
+    values = fault.values(best, relative)
+    found = SearchResult(nominal, best, {}, {}, {effect.name: one})
     horizon = diagnosis.ahead.horizon_s if diagnosis.ahead and diagnosis.is_driven else None
-    gain = gains_of(make_folds(found, best.trials, test, Again(refit)), found.without, horizon, seed)[kind.name]
-    column = "effort" if kind.signal == "effort" else best.model.rig.output(best.trials[0].kind)
+    gain = gains_of(make_folds(found, best.trials, test, Again(refit)), found.without, horizon, seed)[effect.name]
+    column = "effort" if effect.signal == "effort" else best.model.rig.output(best.trials[0].kind)
     said = ", ".join(f"{n} {v.value:.3g}" for n, v in values.items())
-    words = f"the {'scale' if kind.scales else 'zero'} of {column} differs between trials: {said}"
+    unit = " of their mean" if relative else f" {next(iter(values.values())).unit}".rstrip()
     cause = Cause(
-        name=SCALE if kind.scales else ZERO,
+        name=SCALE if effect.scales else ZERO,
         stage=str(Stage.SENSOR),
         site=column,
         parameters=values,
@@ -166,6 +204,6 @@ def with_fault(
         p_value=fault.p_value,
         gain_fit=100.0 * (one.sse - best.sse) / max(nominal.sse - best.sse, 1e-9),
         gain_held_out=replace(gain, on=diagnosis.held_out_by),
-        words=f"{words} {next(iter(values.values())).unit}".strip(),
+        words=f"the {'scale' if effect.scales else 'zero'} of {column} differs between trials: {said}{unit}",
     )
     return with_first(replace(diagnosis, nominal=nominal), cause, nominal, best, test)

@@ -22,7 +22,8 @@ from fes_pin.infer.covariance import covariance_of
 from fes_pin.infer.levels import RUNAWAY
 from fes_pin.infer.noise import NoiseModel
 from fes_pin.infer.optimum import Optimum
-from fes_pin.infer.problem import Linearized, normal_equations
+from fes_pin.infer.problem import normal_equations
+from fes_pin.infer.scatter import with_honest_intervals
 from fes_pin.models.least_squares import least_squares
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import StateSpaceNoise
@@ -86,7 +87,9 @@ def cross_fitted_unknowns(
 
     Without effects that have amplitudes of a trial's own, one pair holds all samples. Where the rig is simulated, the
     initial state is estimated together with them, no farther from the start than `spread_of_start`, since the other
-    half may not determine it. White noise estimates sinusoids as well as the right noise does (Grenander 1954).
+    half may not determine it. White noise estimates sinusoids as well as the right noise does (Grenander 1954). Of
+    a zero or a scale, which does not depend on the time since the trial began, estimates start in a filter that begins
+    again after each gap: a free simulation of a rig that falls, or turns over, has many minima.
 
     Parameters
     ----------
@@ -98,25 +101,41 @@ def cross_fitted_unknowns(
     outputs = [n for n in model.rig.outputs(trial.kind) if n in trial.columns]
     out, spread = [], spread_of_start(model, trial)
     followed = replace(first_guess(model, [trial]), white=noise.white)
+    cut = bool(spread) and all(e.is_fault for e in model.effects if e.each_trial)
     for half in halves(len(trial)):
         masked = {n: np.where(half, np.nan, trial[n]) for n in outputs}
-        shown = derived_trial(trial, columns={**trial.columns, **masked})
+        shown = [derived_trial(trial, columns={**trial.columns, **masked})]
         now = {**model.initial_unknowns(trial), **(start or {})}
-        for one in (followed, noise):
-            now = _descended(LikelihoodProblem(model, [shown], one, (), starts=[trial]), now, spread)
+        for one in (followed, noise) if cut else (noise,):
+            if one.processes and cut:
+                problem = LikelihoodProblem(model, pieces(trial, ~half), one, ())
+            else:
+                problem = LikelihoodProblem(model, shown, one, (), starts=[trial])
+            now |= _descended(problem, {n: now[n] for n in problem.unknown_names}, spread)
         out.append((half, {n: now[n] for n in model.own_unknowns()}))
     return out
 
 
+def pieces(trial: Trial, rows: np.ndarray) -> list[Trial]:
+    """Return the stretches of a trial in which `rows`, shape (n,), is True."""
+    ends = np.flatnonzero(np.diff(rows, prepend=False, append=False))
+    return [trial.part(slice(int(a), int(b))) for a, b in zip(ends[::2], ends[1::2], strict=True)]
+
+
 def _descended(problem: LikelihoodProblem, now: dict[str, float], spread: Mapping[str, float]) -> dict[str, float]:
-    """Return the unknowns of a trial after steps of least squares, each as long as lowers the cost most."""
-    values = problem.model.parameters()
-    reach = {n: (now[n] - d, now[n] + d) for n, d in spread.items() if n in problem.unknown_names}
+    """Return the unknowns of a trial after steps of least squares, each as long as lowers the cost most.
+
+    Pieces of a trial have the same unknowns.
+    """
+    values, count = problem.model.parameters(), len(problem.trials)
+    reach = {n: (now[n] - d, now[n] + d) for n, d in spread.items() if n in now}
     for _ in range(STEPS):
-        (part,) = problem.linearize(values, [now])
-        there = _moved(part, problem.unknown_names, now, reach)
-        tried = [now, *({n: v + 0.5**k * (there[n] - v) for n, v in now.items()} for k in range(problem.batch - 1))]
-        best = int(np.argmin(np.nan_to_num(problem.costs([(values, [one]) for one in tried]), nan=np.inf)))
+        parts = problem.linearize(values, [now] * count)
+        residual, local = (np.concatenate([getattr(p, n) for p in parts]) for n in ("residual", "local"))
+        there = _moved(residual, local, problem.unknown_names, now, reach)
+        tried = [now, *({n: v + 0.5**k * (there[n] - v) for n, v in now.items()} for k in range(problem.batch))]
+        costs = problem.costs([(values, [one] * count) for one in tried])
+        best = int(np.argmin(np.nan_to_num(costs, nan=np.inf)))
         if best == 0:
             break
         now = tried[best]
@@ -124,32 +143,39 @@ def _descended(problem: LikelihoodProblem, now: dict[str, float], spread: Mappin
 
 
 def _moved(
-    part: Linearized, names: Sequence[str], now: Mapping[str, float], reach: Mapping[str, tuple[float, float]]
+    residual: np.ndarray,
+    local: np.ndarray,
+    names: Sequence[str],
+    now: Mapping[str, float],
+    reach: Mapping[str, tuple[float, float]],
 ) -> dict[str, float]:
     """Return unknowns after a step of least squares; where some would leave their bounds, the others are adapted."""
-    step = dict(zip(names, least_squares(part.local, part.residual, rcond=1e-6), strict=True))
+    step = dict(zip(names, least_squares(local, residual, rcond=1e-6), strict=True))
     kept = {n: float(np.clip(step[n], low - now[n], high - now[n])) for n, (low, high) in reach.items()}
     if any(kept[n] != step[n] for n in kept):
         others = [k for k, n in enumerate(names) if n not in kept]
-        left = part.residual - part.local @ [kept.get(n, 0.0) for n in names]
-        free = least_squares(part.local[:, others], left, rcond=1e-6)
+        left = residual - local @ [kept.get(n, 0.0) for n in names]
+        free = least_squares(local[:, others], left, rcond=1e-6)
         step = {**kept, **{names[k]: d for k, d in zip(others, free, strict=True)}}
     return {**now, **{n: now[n] + float(d) for n, d in step.items()}}
 
 
-def as_parameters(fitted: LikelihoodFit, path: str) -> Optimum:
-    """Return the optimum of a fit with an unknown of each trial as a parameter, `path@trial`, of all trials."""
-    at = unknown_names(fitted.model, fitted.trials, is_simulated(fitted.noise, fitted.trials)).index(path)
-    own = {f"{path}@{t.name}": u[path] for t, u in zip(fitted.trials, fitted.unknowns, strict=True)}
-    each, free = np.eye(len(own)), (*fitted.free, *own)
+def as_parameters(fitted: LikelihoodFit, effect: Effect) -> Optimum:
+    """Return the optimum of a fit with each trial's own amplitudes of an effect as parameters of all.
+
+    In order of trials they are `name@0`, `name@1` and so on.
+    """
+    names = unknown_names(fitted.model, fitted.trials, is_simulated(fitted.noise, fitted.trials))
+    at = [names.index(f"{effect.name}.{n}") for n in effect.unknowns()]
+    own = {f"{names[k]}@{i}": u[names[k]] for i, u in enumerate(fitted.unknowns) for k in at}
     parts = [
-        replace(p, jacobian=np.c_[p.jacobian, np.outer(p.local[:, at], row)], local=np.delete(p.local, at, axis=1))
-        for p, row in zip(fitted.parts, each, strict=True)
+        replace(p, jacobian=np.c_[p.jacobian, np.kron(row, p.local[:, at])], local=np.delete(p.local, at, axis=1))
+        for p, row in zip(fitted.parts, np.eye(len(fitted.parts)), strict=True)
     ]
-    covariance = covariance_of(normal_equations(parts).hessian, np.array([n not in fitted.at_bound for n in free]))
+    moving = np.array([n not in fitted.at_bound for n in (*fitted.free, *own)])
     known = {f.name: getattr(fitted, f.name) for f in fields(Optimum)}
-    more = {"free": free, "parameters": {**fitted.parameters, **own}, "parts": parts, "covariance": covariance}
-    return Optimum(**{**known, **more})
+    known |= {"free": (*fitted.free, *own), "parameters": {**fitted.parameters, **own}, "parts": parts}
+    return Optimum(**{**known, "covariance": covariance_of(normal_equations(parts).hessian, moving)})
 
 
 def amplitude(fitted: LikelihoodFit, effect: Effect) -> tuple[float, float]:
@@ -158,21 +184,14 @@ def amplitude(fitted: LikelihoodFit, effect: Effect) -> tuple[float, float]:
     The mean is over the trials of the first kind in which the effect acts, as a motion and a force have no common unit.
     The variance of the single estimates is subtracted from their squares.
     """
-    names = unknown_names(fitted.model, fitted.trials, is_simulated(fitted.noise, fitted.trials))
-    own = np.array([names.index(f"{effect.name}.{n}") for n in effect.unknowns()])
-    slopes = [slope for _, slope in normal_equations(fitted.parts).eliminated]
-    squares, spread, kind = [], [], None
-    for trial, part, unknowns, slope in zip(fitted.trials, fitted.parts, fitted.unknowns, slopes, strict=True):
-        felt = np.flatnonzero(part.local.any(axis=0))
-        if not np.isin(own, felt).all() or (kind or trial.kind) != trial.kind:
+    whole, squares, spread, kind = with_honest_intervals(as_parameters(fitted, effect)), [], [], None
+    for i, trial in enumerate(fitted.trials):
+        own = [f"{effect.name}.{n}@{i}" for n in effect.unknowns()]
+        at = [whole.place(n) for n in own]
+        value, covariance = np.array([whole.parameters[n] for n in own]), whole.covariance[np.ix_(at, at)]
+        if not np.isfinite(covariance).all() or (kind or trial.kind) != trial.kind:
             continue
         kind = trial.kind
-        value = np.array([unknowns[names[k]] for k in own])
-        variance = np.linalg.pinv(part.local[:, felt].T @ part.local[:, felt], hermitian=True)
-        mine = np.searchsorted(felt, own)
-        free = np.isfinite(np.diag(fitted.covariance))
-        shared = slope[np.ix_(own, free)] @ fitted.covariance[np.ix_(free, free)] @ slope[np.ix_(own, free)].T
-        covariance = variance[np.ix_(mine, mine)] + shared
         squares.append(float(value @ value - np.trace(covariance)))
         spread.append(float(value @ covariance @ value))
     if not squares:

@@ -76,7 +76,9 @@ def free(causes: tuple[str, ...], rng: np.random.Generator, folder: Path) -> fp.
     trials = []
     for k in range(int(rng.integers(2, 7))):
         sizes, waves = rng.uniform(0.2, 1.0, 3), rng.uniform(0.1, 1.5, 3)
-        effort = sum(a * np.sin(2.0 * np.pi * f * time + rng.uniform(0, 6.28)) for a, f in zip(sizes, waves, strict=True))
+        effort = sum(
+            a * np.sin(2.0 * np.pi * f * time + rng.uniform(0, 6.28)) for a, f in zip(sizes, waves, strict=True)
+        )
         effort = np.round(rng.uniform(0.3, 0.8) * weight * effort / float(np.abs(effort).max()), 4)
 
         def rates(t: float, x: np.ndarray, drive: float) -> list[float]:
@@ -99,9 +101,7 @@ def free(causes: tuple[str, ...], rng: np.random.Generator, folder: Path) -> fp.
         trials.append(Trial(f"{k:02d}", "motion", {"effort": effort, "position": read}, time))
     folder.mkdir(parents=True)
     lever = 0.2
-    text = draw.URDF.format(
-        name="arm", lever=f"0 0 {-lever}", mass=mass, about=about, kind="revolute", axis="0 1 0"
-    )
+    text = draw.URDF.format(name="arm", lever=f"0 0 {-lever}", mass=mass, about=about, kind="revolute", axis="0 1 0")
     (folder / "rig.urdf").write_text(text)
     start = {"inertia_scale": float(rng.uniform(0.8, 1.2)), "damping": float(damping * rng.uniform(0.5, 1.5))}
     return fp.Study("arm", "joint", {}, start, tuple(trials), folder, {"urdf": folder / "rig.urdf"})
