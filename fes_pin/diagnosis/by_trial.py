@@ -55,7 +55,7 @@ class ByTrial:
     """
 
     effect: Effect
-    p_value: float
+    p_value: float = 1.0
 
     @property
     def path(self) -> str:
@@ -104,13 +104,26 @@ def with_faults(ran: Ran, ask: Ask, kinds: Sequence[type[Effect]]) -> tuple[Ran,
         The search in a model without them.
     """
     kinds = [e for e in kinds if e.of_record and e.name not in {one.name for one in ran[0].models.model.effects}]
-    kind = attempted(lambda: _likeliest(ran, kinds), None)
-    other = None if kind is None else attempted(lambda: ask(_begun(ran, kind)), None)
-    fault = None if kind is None or other is None else attempted(lambda: _fault(ran, other, kind, len(kinds)), None)
-    if other is None or fault is None:
+    found = attempted(lambda: _further(ran, ask, kinds), None)
+    if found is None:
         return ran, []
-    last, faults = with_faults(other, ask, kinds)
-    return last, [fault, *faults]
+    last, faults = with_faults(found[0], ask, kinds)
+    return last, [found[1], *faults]
+
+
+def _further(ran: Ran, ask: Ask, kinds: Sequence[type[Effect]]) -> tuple[Ran, ByTrial] | None:
+    """Return the search with a further kind of fault, and that; None where it is not the answer."""
+    kind = _likeliest(ran, kinds)
+    if kind is None:
+        return None
+    search, found, _ = other = ask(_begun(ran, kind))
+    best, fault = found.best, ByTrial(kind.of_each_trial())
+    one = fault.common(best)
+    gain = max(one.sse - best.sse, 0.0) / excess_scatter(as_parameters(best, fault.effect), one)
+    p_value = len(kinds) * float(chi2_tail(gain, more_degrees(best, one)))
+    lower = best.criterion < _on(ran[1].best, best.trials).criterion - SEPARABLE
+    named = p_value < best.level and lower and not search.was_stopped and search.models.predicts_better(best, one)
+    return (other, replace(fault, p_value=p_value)) if named else None
 
 
 def _begun(ran: Ran, kind: type[Effect]) -> Model:
@@ -155,24 +168,6 @@ def _likeliest(ran: Ran, kinds: Sequence[type[Effect]]) -> type[Effect] | None:
 def _on(fitted: LikelihoodFit, trials: Sequence[Trial]) -> LikelihoodFit:
     """Return a fit, again if it was fitted to parts of these trials."""
     return fitted if len(fitted.trials) == len(trials) else refit(fitted, trials)
-
-
-def _fault(ran: Ran, other: Ran, kind: type[Effect], count: int) -> ByTrial | None:
-    """Return a kind of fault that is the answer of a search with it; None where it is not.
-
-    Parameters
-    ----------
-    count
-        Number of kinds that were looked for.
-    """
-    (_, before, _), (search, found, _) = ran, other
-    best, fault = found.best, ByTrial(kind.of_each_trial(), 1.0)
-    one = fault.common(best)
-    gain = max(one.sse - best.sse, 0.0) / excess_scatter(as_parameters(best, fault.effect), one)
-    p_value = count * float(chi2_tail(gain, more_degrees(best, one)))
-    lower = best.criterion < _on(before.best, best.trials).criterion - SEPARABLE
-    named = p_value < best.level and lower and not search.was_stopped and search.models.predicts_better(best, one)
-    return replace(fault, p_value=p_value) if named else None
 
 
 def with_fault(

@@ -18,11 +18,11 @@ from fes_pin.identify.likelihood import LikelihoodProblem, is_simulated
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.problem import Problem, unknown_names
 from fes_pin.identify.process_noise import first_guess, spread_of_start
-from fes_pin.infer.covariance import covariance_of
+from fes_pin.infer.covariance import covariance_of, least_squares_step
 from fes_pin.infer.levels import RUNAWAY
 from fes_pin.infer.noise import NoiseModel
-from fes_pin.infer.optimum import Optimum
-from fes_pin.infer.problem import normal_equations
+from fes_pin.infer.optimum import Optimum, minimise
+from fes_pin.infer.problem import Linearized, normal_equations
 from fes_pin.infer.scatter import with_honest_intervals
 from fes_pin.models.least_squares import least_squares
 from fes_pin.models.model import Model
@@ -34,7 +34,7 @@ SEGMENTS = 4
 """Pieces of a trial. With two, a slow oscillation would have to be predicted over half a trial; many short pieces would
 share slow noise."""
 STEPS = 12
-"""Most Gauss-Newton steps; amplitudes that are nearly linear take three."""
+"""Most Gauss-Newton steps, each as long as lowers the cost most; amplitudes that are nearly linear take three."""
 
 
 def predictions(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> list[np.ndarray]:
@@ -87,9 +87,9 @@ def cross_fitted_unknowns(
 
     Without effects that have amplitudes of a trial's own, one pair holds all samples. Where the rig is simulated, the
     initial state is estimated together with them, no farther from the start than `spread_of_start`, since the other
-    half may not determine it. White noise estimates sinusoids as well as the right noise does (Grenander 1954). Of
-    a zero or a scale, which does not depend on the time since the trial began, estimates start in a filter that begins
-    again after each gap: a free simulation of a rig that falls, or turns over, has many minima.
+    half may not determine it. White noise estimates sinusoids as well as the right noise does (Grenander 1954). A zero
+    or a scale does not depend on the time since the trial began: it is begun at the estimate of a filter that begins
+    again after each gap, since a free simulation of a rig that falls, or turns over, has many minima.
 
     Parameters
     ----------
@@ -98,20 +98,28 @@ def cross_fitted_unknowns(
     """
     if not model.own_unknowns():
         return [(np.ones(len(trial), dtype=bool), {})]
-    outputs = [n for n in model.rig.outputs(trial.kind) if n in trial.columns]
-    out, spread = [], spread_of_start(model, trial)
-    followed = replace(first_guess(model, [trial]), white=noise.white)
-    cut = bool(spread) and all(e.is_fault for e in model.effects if e.each_trial)
+    outputs, values = [n for n in model.rig.outputs(trial.kind) if n in trial.columns], model.parameters()
+    out = []
     for half in halves(len(trial)):
+        cut = spread_of_start(model, trial) and all(e.is_fault for e in model.effects if e.each_trial)
+        own = _filtered(model, pieces(trial, ~half), noise) if cut else {}
+        if cut and noise.processes:
+            out.append((half, own))
+            continue
         masked = {n: np.where(half, np.nan, trial[n]) for n in outputs}
-        shown = [derived_trial(trial, columns={**trial.columns, **masked})]
-        now = {**model.initial_unknowns(trial), **(start or {})}
-        for one in (followed, noise) if cut else (noise,):
-            if one.processes and cut:
-                problem = LikelihoodProblem(model, pieces(trial, ~half), one, ())
-            else:
-                problem = LikelihoodProblem(model, shown, one, (), starts=[trial])
-            now |= _descended(problem, {n: now[n] for n in problem.unknown_names}, spread)
+        shown = derived_trial(trial, columns={**trial.columns, **masked})
+        problem = LikelihoodProblem(model, [shown], noise, (), starts=[trial])
+        now = {**(start or problem.start_unknowns()[0]), **own}
+        spread = {n: d for n, d in spread_of_start(model, trial).items() if n in problem.unknown_names}
+        reach = {n: (now[n] - d, now[n] + d) for n, d in spread.items()}
+        for _ in range(STEPS):
+            (part,) = problem.linearize(values, [now])
+            there, was = _moved(part, problem.unknown_names, now, reach), now
+            tried = [{n: v + 0.5**k * (there[n] - v) for n, v in was.items()} for k in range(problem.batch)]
+            costs = problem.costs([(values, [one]) for one in (was, *tried)])
+            now = (was, *tried)[int(np.argmin(np.nan_to_num(costs, nan=np.inf)))]
+            if now is was:
+                break
         out.append((half, {n: now[n] for n in model.own_unknowns()}))
     return out
 
@@ -122,40 +130,25 @@ def pieces(trial: Trial, rows: np.ndarray) -> list[Trial]:
     return [trial.part(slice(int(a), int(b))) for a, b in zip(ends[::2], ends[1::2], strict=True)]
 
 
-def _descended(problem: LikelihoodProblem, now: dict[str, float], spread: Mapping[str, float]) -> dict[str, float]:
-    """Return the unknowns of a trial after steps of least squares, each as long as lowers the cost most.
-
-    Pieces of a trial have the same unknowns.
-    """
-    values, count = problem.model.parameters(), len(problem.trials)
-    reach = {n: (now[n] - d, now[n] + d) for n, d in spread.items() if n in now}
-    for _ in range(STEPS):
-        parts = problem.linearize(values, [now] * count)
-        residual, local = (np.concatenate([getattr(p, n) for p in parts]) for n in ("residual", "local"))
-        there = _moved(residual, local, problem.unknown_names, now, reach)
-        tried = [now, *({n: v + 0.5**k * (there[n] - v) for n, v in now.items()} for k in range(problem.batch))]
-        costs = problem.costs([(values, [one] * count) for one in tried])
-        best = int(np.argmin(np.nan_to_num(costs, nan=np.inf)))
-        if best == 0:
-            break
-        now = tried[best]
-    return now
+def _filtered(model: Model, trials: Sequence[Trial], noise: StateSpaceNoise) -> dict[str, float]:
+    """Return the mean of unknowns that a filter estimates in pieces of one trial, weighted by their information."""
+    names, noisy = model.own_unknowns(), noise if noise.processes else first_guess(model, trials)
+    found = minimise(LikelihoodProblem(model, trials, noisy, ()), model.parameters())
+    known = [p.local.T @ p.local for p in found.parts]
+    moved = [h @ [u[n] for n in names] for h, u in zip(known, found.unknowns, strict=True)]
+    return dict(zip(names, map(float, least_squares_step(np.sum(known, axis=0), np.sum(moved, axis=0))), strict=True))
 
 
 def _moved(
-    residual: np.ndarray,
-    local: np.ndarray,
-    names: Sequence[str],
-    now: Mapping[str, float],
-    reach: Mapping[str, tuple[float, float]],
+    part: Linearized, names: Sequence[str], now: Mapping[str, float], reach: Mapping[str, tuple[float, float]]
 ) -> dict[str, float]:
     """Return unknowns after a step of least squares; where some would leave their bounds, the others are adapted."""
-    step = dict(zip(names, least_squares(local, residual, rcond=1e-6), strict=True))
+    step = dict(zip(names, least_squares(part.local, part.residual, rcond=1e-6), strict=True))
     kept = {n: float(np.clip(step[n], low - now[n], high - now[n])) for n, (low, high) in reach.items()}
     if any(kept[n] != step[n] for n in kept):
         others = [k for k, n in enumerate(names) if n not in kept]
-        left = residual - local @ [kept.get(n, 0.0) for n in names]
-        free = least_squares(local[:, others], left, rcond=1e-6)
+        left = part.residual - part.local @ [kept.get(n, 0.0) for n in names]
+        free = least_squares(part.local[:, others], left, rcond=1e-6)
         step = {**kept, **{names[k]: d for k, d in zip(others, free, strict=True)}}
     return {**now, **{n: now[n] + float(d) for n, d in step.items()}}
 
