@@ -152,17 +152,15 @@ def _likeliest(ran: Ran, kinds: Sequence[type[Effect]]) -> type[Effect] | None:
     search, found, _ = ran
     if search.was_stopped or len(found.best.trials) < 2:
         return None
-    bases = {f.names: f for f in (found.best, *found.without.values(), found.nominal)}
-    lowest = dict.fromkeys(kinds, np.inf)
-    for base in bases.values():
+    lowest = dict.fromkeys(kinds, found.best.criterion - SEPARABLE)
+    for base in {f.names: f for f in (found.best, *found.without.values(), found.nominal)}.values():
         for kind in kinds:
             bare = base.model - kind if kind.name in base.names else base.model
-            one = look(bare + kind.of_each_trial(), base)
-            single = float(chi2_tail(max(base.sse - one.sse, 0.0), more_degrees(one, base)))
-            if len(kinds) * single < base.level:
-                lowest[kind] = min(lowest[kind], maximum_from(one, one.trials).criterion)
+            one = maximum_from(look(bare + kind.of_each_trial(), base), base.trials)
+            lowest[kind] = min(lowest[kind], one.criterion)
     best = min(lowest.values(), default=np.inf)
-    return next(k for k in kinds if lowest[k] < best + SEPARABLE) if best < found.best.criterion - SEPARABLE else None
+    near = [k for k in kinds if lowest[k] < best + SEPARABLE]
+    return near[0] if best < found.best.criterion - SEPARABLE else None
 
 
 def _on(fitted: LikelihoodFit, trials: Sequence[Trial]) -> LikelihoodFit:

@@ -90,6 +90,9 @@ class Effect:
         True if its initial states depend on earlier trials of the session: `rest` reads them by `session`.
     scales
         True if it multiplies its signal. If that is a reading, it scales a filter's gains: see `LikelihoodProblem`.
+    of_record
+        True if its amplitude is a zero or a scale of an instrument. Where that differs between trials, it is a fault of
+        the record.
     each_trial
         True if its amplitudes are unknowns of each trial, estimated from that trial alone. The fields then hold their
         nulls, with which a trial that was not measured is predicted. All other parameters are common to all trials.

@@ -90,6 +90,7 @@ GENERATORS = {
     "contrast": ("contrast", "Pairs"),
     "halved": ("contrast", "Halved"),
     "misread": ("misread", "Misread"),
+    "by-trial": ("by_trial", "ByTrial"),
     "walking": ("walking", "Walks"),
 }
 """By name: module of this package, class, and what it is made with."""
