@@ -51,7 +51,7 @@ def named(diagnosis):
 def test_a_pendulum_test_of_a_knee_lacks_a_constant_torque(shared, tmp_path):
     study = study_of(shared, tmp_path, ["pendulum_test_of_a_knee.csv"], *KNEE)
     found = fp.diagnose(study)
-    assert named(found) == {"effort_offset"} and found.extended_error[0] < 1.0
+    assert "effort_offset" in named(found) <= {"effort_offset", "coulomb_friction"} and found.extended_error[0] < 1.0
     torque, damping = (found.extended.values[n] for n in ("effort_offset.offset", "damping"))
     assert torque == pytest.approx(2.3, rel=0.02) and damping == pytest.approx(0.15, rel=0.1)
 

@@ -17,6 +17,7 @@ from fes_pin.data.spikes import without_spikes
 from fes_pin.data.stuck import without_stuck
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
+from fes_pin.diagnosis.by_trial import Ask, Ran, with_fault, with_faults
 from fes_pin.diagnosis.estimators import searched
 from fes_pin.diagnosis.logged import LogFaults, likelier, with_timing_of, with_words
 from fes_pin.diagnosis.long_records import in_parts, searched_part, thinned
@@ -24,7 +25,7 @@ from fes_pin.diagnosis.misread import NAME as MISREAD
 from fes_pin.diagnosis.misread import restated_trials
 from fes_pin.diagnosis.plausibility import check_study
 from fes_pin.diagnosis.reported import diagnosis_of, unfitted
-from fes_pin.diagnosis.restate import Run, StudyConditions, with_misread
+from fes_pin.diagnosis.restate import StudyConditions, with_misread
 from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.diagnosis.search.likelihood_fits import MEASUREMENT, PROCESS
 from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodModels, LikelihoodSearch, NominalFitError
@@ -153,29 +154,39 @@ class _Work:
         effects = self.catalogue.effects_for(nominal.rig)
         ran: list[LikelihoodSearch] = []
 
-        def run(trials: Sequence[Trial]) -> tuple[LikelihoodSearch, Found]:
-            noise = PROCESS if answered or any(t.kind == IMPOSED for t in trials) else MEASUREMENT
-            own = (effects, answered, self.seed, study.horizon_s, noise)
-            ran.append(LikelihoodSearch(LikelihoodModels(nominal, in_parts(nominal.rig, trials), *own), self.tell))
-            return searched(ran[-1])
+        def asked_of(model: Model) -> Ran:
+            known = [e for e in effects if e.name not in {one.name for one in model.effects}]
+
+            def run(trials: Sequence[Trial]) -> tuple[LikelihoodSearch, Found]:
+                noise = PROCESS if answered or any(t.kind == IMPOSED for t in trials) else MEASUREMENT
+                own = (known, answered, self.seed, study.horizon_s, noise)
+                parts = trials if model.effects else in_parts(model.rig, trials)
+                ran.append(LikelihoodSearch(LikelihoodModels(model, parts, *own), self.tell))
+                return searched(ran[-1])
+
+            return StudyConditions(model, run).search(train)
 
         try:
-            found = self._judged(study, nominal, run, train, test)
+            found = self._judged(study, nominal, asked_of, train, test)
         except (ArithmeticError, np.linalg.LinAlgError) as problem:
             own = isinstance(problem, NominalFitError)
             reason = str(problem) if own else f"the search met numbers that are not finite ({problem})"
             found = unfitted(study, ran[-1].nominal(), reason, test)
         return replace(found, warnings=(*said, *found.warnings))
 
-    def _judged(self, study: Study, nominal: Model, run: Run, train: list[Trial], test: list[Trial]) -> Diagnosis:
+    def _judged(self, study: Study, nominal: Model, ask: Ask, train: list[Trial], test: list[Trial]) -> Diagnosis:
         with time_limit(self.end - time.perf_counter()):
-            search, found, again = StudyConditions(nominal, run).search(train)
+            first = ask(nominal)
+            kinds = self.catalogue.effects_for(nominal.rig) if len(train) > 1 else ()
+            (search, found, again), faults = with_faults(first, ask, kinds)
         self.tell(0.88, "held-out gain")
         whole, stated = study, train
         if again is not None:
             restated = restated_trials(nominal, study.trials, again.misread)
             train, whole = again.trials, replace(study, trials=tuple(restated))
         diagnosis = diagnosis_of(whole, search, found, (train, test))
+        for fault in faults:
+            diagnosis = with_fault(diagnosis, fault, first[1].nominal, test, self.seed)
         return diagnosis if again is None else with_misread(diagnosis, again, stated, test, self.seed)
 
 

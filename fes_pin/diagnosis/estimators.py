@@ -32,6 +32,8 @@ def searched(search: LikelihoodSearch) -> tuple[LikelihoodSearch, Found]:
     if not acting.criterion < found.best.criterion:
         return search, found
     other = LikelihoodSearch(search.models.with_noise(PROCESS), search.progress)
+    if acting.names:
+        other.models.calm = {**other.models.calm, acting.names: acting}
     return _ended(other, attempted(other.run, None, search.seconds_left)) or (search, found)
 
 

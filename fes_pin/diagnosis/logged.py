@@ -129,7 +129,7 @@ class LogFaults:
         wide = known = self._in_time(lambda: with_timing_of_readings(fitted, row_s), fitted)
         if late is not None:
             wide = self._in_time(lambda: widened(known, late.at_most), known)
-        causes = tuple(replace(c, parameters=estimates(wide, c.name)) for c in diagnosis.causes)
+        causes = tuple(c if c.words else replace(c, parameters=estimates(wide, c.name)) for c in diagnosis.causes)
         return replace(diagnosis, extended=wide, causes=causes)
 
     def _in_time(self, ask: Callable[[], T], otherwise: T) -> T:

@@ -53,7 +53,7 @@ def diagnosis_of(
     fitted, *others = verdict.errors(state)
     held = others[0] if others else None
     on = HELD_OUT if trials[1] else CROSS_VALIDATED if held else FITTED
-    causes = [_cause(verdict, state, one, best, on) for one in best.model.effects]
+    causes = [_cause(verdict, state, one, best, on) for one in best.model.effects if not one.is_fault]
     causes.sort(key=lambda c: -c.gain_held_out.percent)
     said = words_of_reading(best.noise, best.model.rig, trials[0])
     if search.models.is_far(found.nominal):

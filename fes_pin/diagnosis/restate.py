@@ -19,6 +19,7 @@ from fes_pin.identify.likelihood_fit import LikelihoodFit, maximum_from
 from fes_pin.identify.per_trial import halves
 from fes_pin.infer.held_out import Errors, held_out_gain
 from fes_pin.infer.result import Cause
+from fes_pin.infer.search import SearchResult
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Stage
 
@@ -32,7 +33,7 @@ class StudyConditions(Conditions[LikelihoodFit, LikelihoodModels]):
 
     def misread(self, trials: Sequence[Trial], searched: Found | None) -> Misread | None:
         """Return the trial that is an outlier under the causes found, or under the nominal model."""
-        return find_misread(Model(self.nominal.rig) if searched is None else searched.best.model, trials)
+        return find_misread(self.nominal if searched is None else searched.best.model, trials)
 
     def leaves_noise(self, made: Made) -> bool:
         """Return whether the restated trials have no lack of fit."""
@@ -57,19 +58,35 @@ def with_misread(
     trials, test
         Trials as stated, on which the errors of the nominal model are found.
     """
-    before, best = rough_fit(Model(made.misread.whole.model.rig), trials), made.searched.best
+    before = rough_fit(Model(made.misread.whole.model.rig), trials)
     stated = free_errors(before.model, trials, before.noise)
     removed = held_out_gain(stated, stated, free_errors(diagnosis.nominal.model, made.trials, before.noise), seed)
     cause = _cause(made, removed.percent, trials, seed)
+    nominal = maximum_from(made.searched.nominal, in_parts(before.model.rig, trials))
+    return with_first(diagnosis, cause, nominal, made.searched.best, test)
+
+
+def with_first(
+    diagnosis: Diagnosis, cause: Cause, nominal: LikelihoodFit, best: LikelihoodFit, test: Sequence[Trial]
+) -> Diagnosis:
+    """Return the diagnosis with a fault of the record as its first cause.
+
+    Parameters
+    ----------
+    nominal
+        Fit of the nominal model to the trials as they were stated and recorded, whose errors are reported.
+    best
+        Fit whose noise is the unit of the errors.
+    test
+        Trials held out, as they were stated.
+    """
     restated = replace(diagnosis, causes=(cause, *diagnosis.causes), verdict="causes_found")
     if diagnosis.ahead is None:
         return restated
-    parts = in_parts(before.model.rig, trials)
-    nominal = maximum_from(made.searched.nominal, parts)
-    alone = replace(made.searched, nominal=nominal, best=nominal, without={})
-    held = [(f.best, best, f.test) for f in make_folds(alone, parts, test, Again(refit))]
+    alone = SearchResult(nominal, nominal, {}, {}, {})
+    held = [(f.best, best, f.test) for f in make_folds(alone, nominal.trials, test, Again(refit))]
     horizon, falling = diagnosis.ahead.horizon_s, diagnosis.ahead.nominal.free is None
-    inside, outside = (errors_ahead(some, horizon, falling) for some in ([(nominal, best, parts)], held))
+    inside, outside = (errors_ahead(some, horizon, falling) for some in ([(nominal, best, nominal.trials)], held))
     ahead = replace(diagnosis.ahead, nominal=inside, nominal_held_out=outside)
     return replace(restated, nominal_error=(inside.free, outside.free), ahead=ahead)
 

@@ -21,7 +21,7 @@ from fes_pin.models.stage import Effect
 from fes_pin.models.store import model_toml
 
 EACH_TRIAL = (
-    "size and phase are each trial's own; in a held-out trial they are estimated from its other parts, and a "
+    "amplitudes are each trial's own; in a held-out trial they are estimated from its other parts, and a "
     "prediction from inputs alone leaves the effect out"
 )
 """Note for effects whose amplitudes are each trial's own."""

@@ -34,7 +34,7 @@ class LikelihoodFit(Fit):
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the causes, in alphabetical order."""
-        return tuple(sorted(e.name for e in self.model.effects))
+        return tuple(sorted(e.name for e in self.model.effects if not e.is_fault))
 
     @property
     def level(self) -> float:

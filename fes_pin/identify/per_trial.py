@@ -7,6 +7,7 @@ ones and vice versa (cross-fitting), so that no sample takes part in its own pre
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import fields, replace
 from functools import partial
 
 import numpy as np
@@ -16,10 +17,13 @@ from fes_pin.identify.fit import fit_problem, from_beginnings
 from fes_pin.identify.likelihood import LikelihoodProblem, is_simulated
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.problem import Problem, unknown_names
-from fes_pin.identify.process_noise import spread_of_start
+from fes_pin.identify.process_noise import first_guess, spread_of_start
+from fes_pin.infer.covariance import covariance_of, least_squares_step
 from fes_pin.infer.levels import RUNAWAY
 from fes_pin.infer.noise import NoiseModel
+from fes_pin.infer.optimum import Optimum, minimise
 from fes_pin.infer.problem import Linearized, normal_equations
+from fes_pin.infer.scatter import with_honest_intervals
 from fes_pin.models.least_squares import least_squares
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import StateSpaceNoise
@@ -29,8 +33,8 @@ from fes_pin.models.stage import Effect
 SEGMENTS = 4
 """Pieces of a trial. With two, a slow oscillation would have to be predicted over half a trial; many short pieces would
 share slow noise."""
-STEPS = 3
-"""Gauss-Newton steps: the amplitudes are nearly linear, but for the nonlinearity of the joint."""
+STEPS = 12
+"""Most Gauss-Newton steps, each as long as lowers the cost most; amplitudes that are nearly linear take three."""
 
 
 def predictions(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> list[np.ndarray]:
@@ -83,7 +87,9 @@ def cross_fitted_unknowns(
 
     Without effects that have amplitudes of a trial's own, one pair holds all samples. Where the rig is simulated, the
     initial state is estimated together with them, no farther from the start than `spread_of_start`, since the other
-    half may not determine it. White noise estimates sinusoids as well as the right noise does (Grenander 1954).
+    half may not determine it. White noise estimates sinusoids as well as the right noise does (Grenander 1954). A zero
+    or a scale does not depend on the time since the trial began: it is begun at the estimate of a filter that begins
+    again after each gap, since a free simulation of a rig that falls, or turns over, has many minima.
 
     Parameters
     ----------
@@ -95,17 +101,42 @@ def cross_fitted_unknowns(
     outputs, values = [n for n in model.rig.outputs(trial.kind) if n in trial.columns], model.parameters()
     out = []
     for half in halves(len(trial)):
+        cut = spread_of_start(model, trial) and all(e.is_fault for e in model.effects if e.each_trial)
+        own = _filtered(model, pieces(trial, ~half), noise) if cut else {}
+        if cut and noise.processes:
+            out.append((half, own))
+            continue
         masked = {n: np.where(half, np.nan, trial[n]) for n in outputs}
         shown = derived_trial(trial, columns={**trial.columns, **masked})
         problem = LikelihoodProblem(model, [shown], noise, (), starts=[trial])
-        (now,) = [dict(start)] if start else problem.start_unknowns()
+        now = {**(start or problem.start_unknowns()[0]), **own}
         spread = {n: d for n, d in spread_of_start(model, trial).items() if n in problem.unknown_names}
         reach = {n: (now[n] - d, now[n] + d) for n, d in spread.items()}
         for _ in range(STEPS):
             (part,) = problem.linearize(values, [now])
-            now = _moved(part, problem.unknown_names, now, reach)
+            there, was = _moved(part, problem.unknown_names, now, reach), now
+            tried = [{n: v + 0.5**k * (there[n] - v) for n, v in was.items()} for k in range(problem.batch)]
+            costs = problem.costs([(values, [one]) for one in (was, *tried)])
+            now = (was, *tried)[int(np.argmin(np.nan_to_num(costs, nan=np.inf)))]
+            if now is was:
+                break
         out.append((half, {n: now[n] for n in model.own_unknowns()}))
     return out
+
+
+def pieces(trial: Trial, rows: np.ndarray) -> list[Trial]:
+    """Return the stretches of a trial in which `rows`, shape (n,), is True."""
+    ends = np.flatnonzero(np.diff(rows, prepend=False, append=False))
+    return [trial.part(slice(int(a), int(b))) for a, b in zip(ends[::2], ends[1::2], strict=True)]
+
+
+def _filtered(model: Model, trials: Sequence[Trial], noise: StateSpaceNoise) -> dict[str, float]:
+    """Return the mean of unknowns that a filter estimates in pieces of one trial, weighted by their information."""
+    names, noisy = model.own_unknowns(), noise if noise.processes else first_guess(model, trials)
+    found = minimise(LikelihoodProblem(model, trials, noisy, ()), model.parameters())
+    known = [p.local.T @ p.local for p in found.parts]
+    moved = [h @ [u[n] for n in names] for h, u in zip(known, found.unknowns, strict=True)]
+    return dict(zip(names, map(float, least_squares_step(np.sum(known, axis=0), np.sum(moved, axis=0))), strict=True))
 
 
 def _moved(
@@ -122,27 +153,38 @@ def _moved(
     return {**now, **{n: now[n] + float(d) for n, d in step.items()}}
 
 
+def as_parameters(fitted: LikelihoodFit, effect: Effect) -> Optimum:
+    """Return the optimum of a fit with each trial's own amplitudes of an effect as parameters of all.
+
+    In order of trials they are `name@0`, `name@1` and so on.
+    """
+    names = unknown_names(fitted.model, fitted.trials, is_simulated(fitted.noise, fitted.trials))
+    at = [names.index(f"{effect.name}.{n}") for n in effect.unknowns()]
+    own = {f"{names[k]}@{i}": u[names[k]] for i, u in enumerate(fitted.unknowns) for k in at}
+    parts = [
+        replace(p, jacobian=np.c_[p.jacobian, np.kron(row, p.local[:, at])], local=np.delete(p.local, at, axis=1))
+        for p, row in zip(fitted.parts, np.eye(len(fitted.parts)), strict=True)
+    ]
+    moving = np.array([n not in fitted.at_bound for n in (*fitted.free, *own)])
+    known = {f.name: getattr(fitted, f.name) for f in fields(Optimum)}
+    known |= {"free": (*fitted.free, *own), "parameters": {**fitted.parameters, **own}, "parts": parts}
+    return Optimum(**{**known, "covariance": covariance_of(normal_equations(parts).hessian, moving)})
+
+
 def amplitude(fitted: LikelihoodFit, effect: Effect) -> tuple[float, float]:
     """Return the root mean square size of an effect with amplitudes of each trial's own, and its standard deviation.
 
     The mean is over the trials of the first kind in which the effect acts, as a motion and a force have no common unit.
     The variance of the single estimates is subtracted from their squares.
     """
-    names = unknown_names(fitted.model, fitted.trials, is_simulated(fitted.noise, fitted.trials))
-    own = np.array([names.index(f"{effect.name}.{n}") for n in effect.unknowns()])
-    slopes = [slope for _, slope in normal_equations(fitted.parts).eliminated]
-    squares, spread, kind = [], [], None
-    for trial, part, unknowns, slope in zip(fitted.trials, fitted.parts, fitted.unknowns, slopes, strict=True):
-        felt = np.flatnonzero(part.local.any(axis=0))
-        if not np.isin(own, felt).all() or (kind or trial.kind) != trial.kind:
+    whole, squares, spread, kind = with_honest_intervals(as_parameters(fitted, effect)), [], [], None
+    for i, trial in enumerate(fitted.trials):
+        own = [f"{effect.name}.{n}@{i}" for n in effect.unknowns()]
+        at = [whole.place(n) for n in own]
+        value, covariance = np.array([whole.parameters[n] for n in own]), whole.covariance[np.ix_(at, at)]
+        if not np.isfinite(covariance).all() or (kind or trial.kind) != trial.kind:
             continue
         kind = trial.kind
-        value = np.array([unknowns[names[k]] for k in own])
-        variance = np.linalg.pinv(part.local[:, felt].T @ part.local[:, felt], hermitian=True)
-        mine = np.searchsorted(felt, own)
-        free = np.isfinite(np.diag(fitted.covariance))
-        shared = slope[np.ix_(own, free)] @ fitted.covariance[np.ix_(free, free)] @ slope[np.ix_(own, free)].T
-        covariance = variance[np.ix_(mine, mine)] + shared
         squares.append(float(value @ value - np.trace(covariance)))
         spread.append(float(value @ covariance @ value))
     if not squares:

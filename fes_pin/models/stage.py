@@ -90,6 +90,9 @@ class Effect:
         True if its initial states depend on earlier trials of the session: `rest` reads them by `session`.
     scales
         True if it multiplies its signal. If that is a reading, it scales a filter's gains: see `LikelihoodProblem`.
+    of_record
+        True if its amplitude is a zero or a scale of an instrument. Where that differs between trials, it is a fault of
+        the record.
     each_trial
         True if its amplitudes are unknowns of each trial, estimated from that trial alone. The fields then hold their
         nulls, with which a trial that was not measured is predicted. All other parameters are common to all trials.
@@ -116,8 +119,14 @@ class Effect:
     screened_with: ClassVar[tuple[str, ...]] = ()
     remembers: ClassVar[bool] = False
     scales: ClassVar[bool] = False
+    of_record: ClassVar[bool] = False
 
     each_trial: bool = dataclasses.field(default=False, kw_only=True)
+
+    @property
+    def is_fault(self) -> bool:
+        """Whether it is a fault of the record: a zero or a scale of each trial's own."""
+        return self.of_record and self.each_trial
 
     def __init_subclass__(cls) -> None:
         for old, new in _RENAMED.items():

@@ -124,8 +124,9 @@ def _effect(document: Document, catalogue: Catalogue, name: str, listed: dict[st
     except InputError as problem:
         raise document.error(key, _missing(document, name, problem.message)) from None
     each_trial = document.table(key, listed).pop(EACH_TRIAL, False)
-    if not isinstance(each_trial, bool) or (each_trial and not kind.varies):
-        raise document.error(f"{key}.{EACH_TRIAL}", f"expected {'true or false' if kind.varies else 'none'}")
+    may = kind.varies or kind.of_record
+    if not isinstance(each_trial, bool) or (each_trial and not may):
+        raise document.error(f"{key}.{EACH_TRIAL}", f"expected {'true or false' if may else 'none'}")
     return kind(**_numbers(document, key, kind.parameters(), listed), each_trial=each_trial)
 
 

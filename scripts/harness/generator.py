@@ -95,6 +95,7 @@ GENERATORS = {
     "halved": ("contrast", "Halved"),
     "misread": ("misread", "Misread"),
     "large": ("large", "Large"),
+    "by-trial": ("by_trial", "ByTrial"),
     "walking": ("walking", "Walks"),
 }
 """By name: module of this package, class, and what it is made with."""

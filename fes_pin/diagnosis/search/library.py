@@ -40,7 +40,7 @@ class Library:
         answered: bool = False,
     ) -> None:
         self.effects = tuple(installed().effects_for(model.rig) if effects is None else effects)
-        self.model, self.trials = Model(model.rig), tuple(trials)
+        self.model, self.trials = model, tuple(trials)
         self.measured = (answered_columns if answered else measured_columns)(model, trials)
         self._scores: dict[int, tuple[LikelihoodFit, Scores]] = {}
         self._probing: dict[tuple, LikelihoodProblem] = {}
@@ -87,7 +87,7 @@ class Library:
         Causes of the model are left out, except those of `screened_with`: the predictor follows the readings with or
         without them.
         """
-        extended = Model(model.rig, tuple(e for e in model.effects if e.name in one.screened_with)) + one
+        extended = Model(model.rig, tuple(e for e in model.effects if e.is_fault or e.name in one.screened_with)) + one
         key = (*extended.structure(), *extended.unused_parameters().items(), is_simulated(noise, self.trials))
         if key not in self._probing:  # its columns are those of a fit, which shares the program
             self._probing[key] = LikelihoodProblem(extended, self.trials, noise)

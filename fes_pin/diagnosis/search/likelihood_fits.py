@@ -99,7 +99,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
     ) -> None:
         super().__init__()
         self.calm: dict[Names, LikelihoodFit] = {}
-        self.model, self.trials, self.answered, self.noise = Model(model.rig), tuple(trials), answered, noise
+        self.model, self.trials, self.answered, self.noise = model, tuple(trials), answered, noise
         self.seed, self.horizon_s = seed, horizon_s or default_horizon(self.trials)
         if any(t.kind == IMPOSED for t in self.trials):  # imposed motion excites a rig most, and a muscle is several
             self.most_candidates = None
@@ -392,7 +392,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         """
         fitted = self._parts(names)[0]
         for one in effects:
-            if one.name not in fitted.names:
+            if one.name not in {e.name for e in fitted.model.effects}:
                 fitted = self._maximum(fitted.model + at_null(one), fitted.noise, fitted.unknowns)
         return fitted
 

@@ -23,6 +23,7 @@ class EffortGain(Effect):
     error: float = parameter(0.1, null=0.0, lower=-11.0, upper=9.0, scale=0.05, grid=(-2.0,))
 
     name, stage, signal, rigs = "effort_gain", Stage.RIG, "effort", ("joint",)
+    of_record = True
     scales = True
 
     def apply(self, value: Scalar, s: Signals) -> Scalar:

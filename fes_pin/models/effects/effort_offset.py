@@ -21,6 +21,7 @@ class EffortOffset(Effect):
     offset: float = parameter(0.01, unit="{effort}", null=0.0, lower=-1e6, upper=1e6, scale=0.01)
 
     name, stage, signal, rigs = "effort_offset", Stage.JOINT, "effort", ("joint",)
+    of_record = True
 
     def limits(self, measured: Measured) -> Bounds:
         """Return bounds by the largest commanded effort: a larger offset is implausible."""

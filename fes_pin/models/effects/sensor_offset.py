@@ -18,6 +18,7 @@ class SensorOffset(Effect):
     offset: float = parameter(0.01, unit="{y}", null=0.0, scale=0.005)
 
     name, stage, signal, rigs = "sensor_offset", Stage.SENSOR, "reading", ("ankle", "joint", "muscle")
+    of_record = True
 
     def limits(self, measured: Measured) -> Bounds:
         """Return bounds by the range of the sensor's readings: a larger offset is implausible."""
