@@ -162,7 +162,7 @@ class _Work:
 
     def _run(self, trials: Sequence[Trial]) -> tuple[ContrastSearch, Found]:
         effects = self.catalogue.effects_for(self.nominal.rig)
-        models = ContrastModels(GroupedFits(self.nominal, in_groups(trials), self.driven), effects, self.seed)
+        models = ContrastModels(GroupedFits(self.nominal, in_groups(trials), self.driven, effects), self.seed)
         search = ContrastSearch(models, self.tell, POLICY)
         return search, search.run()
 

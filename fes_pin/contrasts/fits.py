@@ -2,12 +2,14 @@
 
 import math
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 
-from fes_pin.contrasts.grouped import Grouped, GroupedModel, GroupedProblem, Weights, by_group
+from fes_pin.contrasts.grouped import Grouped, GroupedModel, GroupedProblem, Item, Weights, by_group
 from fes_pin.data.errors import InputError
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.search.likelihood_fits import FIRST_NOISE_SCALES, MEASUREMENT, PROCESS, LikelihoodFits
 from fes_pin.diagnosis.search.likelihood_maxima import SCREEN_ITERATIONS, likeliest, process_noises
+from fes_pin.identify.afar import misfit_percent
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit, fit_of
 from fes_pin.identify.process_noise import first_guess
@@ -15,6 +17,7 @@ from fes_pin.infer.maximise import alternate
 from fes_pin.infer.optimum import minimise
 from fes_pin.infer.problem import Unknowns
 from fes_pin.models.model import Model
+from fes_pin.models.stage import Effect
 from fes_pin.workers import in_parallel
 
 ROUNDS = 6
@@ -32,11 +35,20 @@ class GroupedFits:
         Trials by group.
     driven
         Whether fits have process noise from the beginning.
+    effects
+        The causes that are searched.
     """
 
-    def __init__(self, nominal: Model, trials: Mapping[str, Sequence[Trial]], driven: bool) -> None:
-        self.nominal, self.trials, self.driven = Model(nominal.rig), dict(trials), driven
+    def __init__(
+        self,
+        nominal: Model,
+        trials: Mapping[str, Sequence[Trial]],
+        driven: bool,
+        effects: Sequence[type[Effect]] = (),
+    ) -> None:
+        self.nominal, self.trials, self.driven, self.effects = Model(nominal.rig), dict(trials), driven, effects
         self._begun: list[Weights] = []
+        self._each: dict[str, LikelihoodFits] = {}
 
     def first(self) -> Grouped:
         """Fit the nominal model to all groups; the search starts from the noise of each group fitted alone.
@@ -46,7 +58,12 @@ class GroupedFits:
         InputError
             If the nominal model predicts nothing finite.
         """
-        alone = in_parallel(self._alone, self.trials)
+        noise = PROCESS if self.driven else MEASUREMENT
+        self._each = {
+            g: LikelihoodFits(self.nominal, many, self.effects, self.driven, noise=noise)
+            for g, many in self.trials.items()
+        }
+        alone = in_parallel(LikelihoodFits.nominal, list(self._each.values()))
         if not all(math.isfinite(f.sse) for f in alone):
             raise InputError("the nominal model predicts nothing finite from its start values on")
         noises = Weights(dict(zip(self.trials, (f.noise for f in alone), strict=True)))
@@ -67,10 +84,29 @@ class GroupedFits:
         problem.noise_step(model.parameters(), unknowns)
         return problem.weights
 
-    def _alone(self, group: str) -> LikelihoodFit:
-        """Return the nominal fit of a group alone."""
-        noise = PROCESS if self.driven else MEASUREMENT
-        return LikelihoodFits(self.nominal, self.trials[group], (), self.driven, noise=noise).nominal()
+    def apart(self, one: Grouped) -> Grouped:
+        """Return the nominal model with every parameter of each group's own, from the noise of another fit."""
+        names, groups = self.nominal.fitted_parameters(), list(self.trials)
+        model = one.grouped.having({Item(n, g) for n in names for g in groups[1:]})
+        values = {model.path(n, g): self._each[g].fits[()].values[n] for n in names for g in groups}
+        return self.fitted(model.with_parameters(values), one.weights)
+
+    def nearest(self, one: Grouped) -> Grouped | None:
+        """Return a set with the causes, in all groups, that bring one group near its data; None where none does.
+
+        It is the group that the nominal model fits best, so that it has the fewest causes of its own. The likelihood of
+        a model that is far from its data is that of noise which takes up every error; see `LikelihoodFits.approach`.
+        """
+        if self.driven:
+            return None
+        near = min(self._each.values(), key=lambda f: misfit_percent(f.fits[()])).least_squares
+        found = near.fits[near.approach()]
+        if not found.names:
+            return None
+        model = one.grouped.having(one.items | {Item(n) for n in found.names}, found.model.effects)
+        noise = {g: replace(n, ar=w.ar) for g, w in one.weights.noise.items() for n in [near.fits[()].noise]}
+        values = {model.path(n, g): found.values[n] for g, m in model.models.items() for n in m.parameters()}
+        return self.fitted(model.with_parameters(values), Weights(noise))
 
     def fitted(
         self, model: GroupedModel, weights: Weights, unknowns: Unknowns | None = None, rounds: int = ROUNDS

@@ -1,6 +1,6 @@
 """Sets of common causes and changes for the search of `infer`: their fits, and the rules that judge them."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -9,10 +9,11 @@ from fes_pin.contrasts.grouped import Grouped, GroupedModel, Item
 from fes_pin.contrasts.screen import ItemScore, Screen
 from fes_pin.diagnosis.search.library import Library
 from fes_pin.diagnosis.search.likelihood_forms import demanded_form
+from fes_pin.diagnosis.search.possible import are_possible
 from fes_pin.diagnosis.search.starts import STARTS, number_of_forms, refinements
 from fes_pin.infer.distributions import chi2_tail
 from fes_pin.infer.fits import Candidate, FittedSets, Names, more_degrees
-from fes_pin.infer.levels import CLAIM_LEVEL, DRIVEN_LEVEL, MOST_ITEMS
+from fes_pin.infer.levels import CLAIM_LEVEL, DRIVEN_LEVEL, MOST_CAUSES, MOST_ITEMS, UNUSUAL_LEVEL
 from fes_pin.infer.scatter import excess_scatter
 from fes_pin.infer.search import Policy, Search, SearchResult
 from fes_pin.infer.spread import ByUnit, Spread
@@ -37,8 +38,6 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
     ----------
     maxima
         Fits of grouped models to the trials of all groups.
-    effects
-        The causes that are searched.
     seed
         Of critical values.
     """
@@ -46,19 +45,44 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
     most_candidates: int | None = MOST_ITEMS
     converged_sets = 3
 
-    def __init__(self, maxima: GroupedFits, effects: Sequence[type[Effect]], seed: int = 0) -> None:
+    def __init__(self, maxima: GroupedFits, seed: int = 0) -> None:
         super().__init__()
         self.maxima, self.seed = maxima, seed
         self.nominal_model, self.trials, self.driven = maxima.nominal, maxima.trials, maxima.driven
-        self._library = Library(self.nominal_model, [t for many in self.trials.values() for t in many], effects)
+        every = [t for many in self.trials.values() for t in many]
+        self._library = Library(self.nominal_model, every, maxima.effects)
         self.screen = Screen(self.nominal_model, self.trials, self._library)
         self._compared: dict[tuple[Names, str], Grouped] = {}
 
     def nominal(self) -> Grouped:
         """Fit the nominal model to all groups, and simulate the family of the score tests of all changes."""
         self.fits[()] = self.maxima.first()
-        self.family = self.screen.scores(self.fits[()]).family(self.seed)
+        self.family = self.screen.family(self.fits[()], self.seed)
         return self.fits[()]
+
+    def first(self) -> Names:
+        """Return the causes of all groups that are found where each group has nominal values of its own.
+
+        A change is judged in the model that has them: an error of the model in all groups can hide one. Where one
+        nominal parameter alone need differ, the set has that change; several may stand for the change of a cause.
+        """
+        apart = Search(CommonModels(self), lambda share, words: None, Policy(beam=1)).run().best
+        alike = self._without(apart, apart.changes) if apart.items - set(apart.changes) else self.fits[()]
+        while apart.changes and apart.criterion < alike.criterion:
+            less = min((self._without(apart, [i]) for i in apart.changes), key=lambda f: f.criterion)
+            if not less.criterion < apart.criterion:
+                break
+            apart = less
+        self.fits |= {tuple(sorted(map(str, f.items))): f for f in (apart, alike)}
+        begun = apart if len(apart.changes) == 1 else alike
+        self.family = self.screen.family(begun, self.seed)
+        return tuple(sorted(map(str, begun.items)))
+
+    def _without(self, one: Grouped, items: Collection[Item]) -> Grouped:
+        """Return the fit of a set without some items, from its noise or from that of the nominal model."""
+        model, noises = one.grouped.having(one.items.difference(items)), (one.weights, self.fits[()].weights)
+        fits = in_parallel(lambda w: self.maxima.fitted(model, w, one.unknowns), noises)
+        return min(fits, key=lambda f: f.criterion)
 
     def candidates(self, base: Grouped) -> dict[str, Candidate[list[ItemScore]]]:
         """Return the items of largest score, and every parameter and cause of the set with a value of one group's own.
@@ -127,6 +151,18 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
             self._compared[names, name] = whole
         return self.fits[rest]
 
+    def is_possible(self, fitted: Grouped) -> bool:
+        """Return False if the size of a cause in a group is physically impossible; see `possible.is_possible`."""
+        model, measured = fitted.grouped, self._library.measured
+        at_bound = {
+            g: {n for n in m.parameters() if model.path(n, g) in fitted.at_bound} for g, m in model.models.items()
+        }
+        return all(are_possible(m.effects, at_bound[g], measured) for g, m in model.models.items())
+
+    def is_claimed(self, name: str) -> bool:
+        """Return whether an item is a change: a cause of all groups is none."""
+        return "@" in name
+
     def excess_scatter(self, larger: Grouped, smaller: Grouped) -> float:
         """See `identify.scatter.excess_scatter`."""
         return excess_scatter(larger, smaller)
@@ -172,9 +208,7 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
         return not (fitted.repeats or fitted.is_driven)
 
     def better_form(self, fitted: Grouped) -> Grouped | None:
-        """Return the set of a driven rig with a significant refinement of a cause; None where none is."""
-        if not self.driven:
-            return None
+        """Return the set with a significant refinement of a cause; None where none is."""
         starts, tried = [], 0
         for group, effect in _causes(fitted):
             own = fitted.grouped.models[group]
@@ -190,11 +224,47 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
             return False
         kept = {k: self.fits[k] for k in ((), names)}
         self.fits = {k: self.maxima.again(f, acting.weights) for k, f in kept.items()}
-        self.family = self.screen.scores(self.fits[()]).family(self.seed)
+        self.family = self.screen.family(self.fits[names], self.seed)
         self._converged, self._begun, self._compared = set(self.fits), set(), {}
-        for name in names:
-            self.without(names, name)
         return True
+
+
+class CommonModels(ContrastModels):
+    """Sets of causes that act in all groups alike, where every nominal parameter has a value of each group's own."""
+
+    most_candidates = MOST_CAUSES
+
+    def __init__(self, models: ContrastModels) -> None:
+        super().__init__(models.maxima, models.seed)
+        self.screen, self._library, self.family = models.screen, models._library, models.family
+        self.fits[()] = self.maxima.apart(models.fits[()])
+
+    def nominal(self) -> Grouped:
+        """Return the nominal model with values of each group's own."""
+        return self.fits[()]
+
+    def first(self) -> Names:
+        """Return the causes by which one group is near its data."""
+        near = self.maxima.nearest(self.fits[()])
+        names = tuple(sorted(str(i) for i in near.items if i.group is None)) if near else ()
+        if near:
+            self.fits[names] = near
+        return names
+
+    def candidates(self, base: Grouped) -> dict[str, Candidate[list[ItemScore]]]:
+        """Return the causes of all groups of largest score, where an error of all groups is significant.
+
+        What a cause of one group explains better is no error of all groups.
+        """
+        if not (base.is_driven or self.extension_p_value(base) < UNUSUAL_LEVEL):
+            return {}
+        best = max(self.screen.scores(base).scored, key=lambda s: s.net_gain)
+        known = super().candidates(base) if best.item.group is None else {}
+        return {n: one for n, one in known.items() if not self.is_claimed(n)}
+
+    def begin_again(self, names: Names) -> bool:
+        """Return False: the kind of noise is chosen with the changes."""
+        return False
 
 
 def _causes(fitted: Grouped) -> list[tuple[str, Effect]]:

@@ -82,10 +82,6 @@ class ItemScores:
     gram: np.ndarray
     blocks: list[slice]
 
-    def family(self, seed: int) -> Family:
-        """Return the family of the tests of all changes."""
-        return Family(self.gram, self.blocks, seed)
-
     @cached_property
     def usual_spread(self) -> Spread:
         """The usual spread of the items: see `infer.spread`."""
@@ -134,6 +130,11 @@ class Screen:
         if id(base) not in self._scores:
             self._scores[id(base)] = base, self._scored(base)
         return self._scores[id(base)][1]
+
+    def family(self, base: Grouped, seed: int) -> Family:
+        """Return the family of the tests of all changes, of which a set has some."""
+        scores = self.scores(base)
+        return Family(scores.gram, scores.blocks, seed, len(base.changes))
 
     def _scored(self, base: Grouped) -> ItemScores:
         projection, made = Projection(base.parts), list(self._columns(base))

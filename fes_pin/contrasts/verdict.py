@@ -66,12 +66,13 @@ class ContrastVerdict(Verdict[Grouped, ContrastModels, ContrastWeighed]):
         return [str(i) for i in state.found.best.changes if evidence and not evidence[str(i)].low > 0.0]
 
     def _evidence(self, found: Found) -> dict[str, Evidence]:
-        """Return the evidence for each item in held-out trials; empty without these."""
+        """Return the evidence for each change in held-out trials; empty without these."""
         folds = folds_of_groups(self.search.models.trials)
-        if not found.without or not folds:
+        if not found.best.changes or not folds:
             return {}
-        costs = in_parallel(lambda one: self._cost_of_held(one, folds), [found.best, *found.without.values()])
-        return {n: Evidence.of(cost - costs[0]) for n, cost in zip(found.without, costs[1:], strict=True)}
+        without = {n: found.without[n] for n in map(str, found.best.changes)}
+        costs = in_parallel(lambda one: self._cost_of_held(one, folds), [found.best, *without.values()])
+        return {n: Evidence.of(cost - costs[0]) for n, cost in zip(without, costs[1:], strict=True)}
 
     def _cost_of_held(self, one: Grouped, folds: Sequence[Sequence[int]]) -> float:
         """Return twice the negative log-likelihood of folds by fits to the others, with the noise of all trials."""

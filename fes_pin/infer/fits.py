@@ -95,6 +95,10 @@ class Sets(ABC, Generic[F]):
         """Return whether every size of a fit is physically possible."""
         return True
 
+    def is_claimed(self, name: str) -> bool:
+        """Return whether a candidate of the best set is a claim, for which rivals are searched."""
+        return True
+
     def excess_scatter(self, larger: F, smaller: F) -> float:
         """Return the ratio of a gain's scatter between pieces of the data to that of the likelihood; at least 1."""
         return 1.0
@@ -173,7 +177,7 @@ class Sets(ABC, Generic[F]):
         ranked = [n for n in self.ranked(size) if n not in without]
         if not ranked:
             return []
-        smaller = self.fits[self.ranked(size - 1)[0]].criterion if size else math.inf
+        smaller = min((f.criterion for n, f in self.fits.items() if len(n) == size - 1), default=math.inf)
         half = 0.5 * (smaller + self.fits[ranked[0]].criterion)
         return [n for n in ranked if n == ranked[0] or self.fits[n].criterion < half]
 

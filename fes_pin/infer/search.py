@@ -253,7 +253,7 @@ class Search(Generic[F, M]):
     def _best_of_rivals(self, names: Names, rejected: Iterable[str]) -> Names:
         """Fit the rivals of a set, and return the best of all that can be the answer."""
         self.progress(0.75, "rivals")
-        for name in names:
+        for name in filter(self._sets.is_claimed, names):
             rest = tuple(n for n in names if n != name)
             self._sets.without(names, name)
             self._sets.extend(rest, None if len(names) == 1 else self.policy.fitted)

@@ -1,6 +1,6 @@
 """Sizes of causes that are physically impossible, however well they fit."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -20,11 +20,16 @@ def is_possible(fitted: Fit, measured: Mapping[str, np.ndarray]) -> bool:
     measured
         Columns of the trials; see `identify.problem.measured_columns`, and `answered_columns` for a rig in closed loop.
     """
-    for effect in fitted.model.effects:
+    return are_possible(fitted.model.effects, fitted.at_bound, measured)
+
+
+def are_possible(effects: Sequence[Effect], at_bound: Collection[str], measured: Mapping[str, np.ndarray]) -> bool:
+    """Return False if a cause of a model is impossible: see `is_possible`; `at_bound` are "cause.parameter"."""
+    for effect in effects:
         info, smallest = effect.parameters(), effect.smallest(measured)
         for n in (*effect.amplitudes(), *effect.shapes()):
             size = getattr(effect, n)
-            if f"{effect.name}.{n}" in fitted.at_bound and size != info[n].null:
+            if f"{effect.name}.{n}" in at_bound and size != info[n].null:
                 return False
             if 0.0 < abs(size) < smallest.get(n, 0.0):
                 return False
