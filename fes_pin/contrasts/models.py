@@ -64,7 +64,7 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
         """Return the causes of all groups that are found where each group has nominal values of its own.
 
         A change is judged in the model that has them: an error of the model in all groups can hide one. Where one
-        nominal parameter alone need differ, the set has that change; several may stand for the change of a cause.
+        nominal parameter alone need differ, the set has that change; several may be mistaken for the change of a cause.
         """
         apart = Search(CommonModels(self), lambda share, words: None, Policy(beam=1)).run().best
         alike = self._without(apart, apart.changes) if apart.items - set(apart.changes) else self.fits[()]
