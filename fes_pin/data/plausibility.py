@@ -151,9 +151,9 @@ def _inputs(study: Study | ToPredict) -> Iterable[str]:
     short = [t.name for t in study.trials if len(t) < FEW]
     if short:
         yield f"fewer than {FEW} samples in {trials_named(short)}"
-    names = dict.fromkeys(n for t in study.trials for n in _stimuli(study, t))
-    may_be_free = isinstance(study, ToPredict) or any(t.kind == IMPOSED for t in study.trials)
-    if not names and not may_be_free:
+    alone = isinstance(study, ToPredict)  # trials that nothing drives are then no oddity, but for a muscle at rest
+    names = dict.fromkeys(n for t in study.trials for n in _stimuli(study, t) if n in PULSES or not alone)
+    if not names and not alone and not any(t.kind == IMPOSED for t in study.trials):
         column = " or ".join(study.schema.inputs)
         yield f"no trial is driven: there is no column {column}, and the motion is taken for free"
     for name in names:
@@ -168,13 +168,12 @@ def _inputs(study: Study | ToPredict) -> Iterable[str]:
                     check_values({name: trial[name]}, study.schema, trial.error, threshold)
                 yield f"{zero} in {trials_named(idle)}"
         elif name not in PULSES:
-            if not isinstance(study, ToPredict):
-                yield f"no trial is driven: {zero}"
+            yield f"no trial is driven: {zero}"
         else:
             most = max(float(np.abs(t[name]).max()) for t in study.trials if name in t)
             unit = "ms" if threshold < 1e3 * most else "s"
             hint = f" (it reaches {most:.4g}: is it in {unit}?)" if 0.0 < most < SHORTEST_US else ""
-            if isinstance(study, ToPredict) and not hint:
+            if alone and not hint:
                 yield f"{zero}: nothing is stimulated"
                 continue
             message = f"{zero} in all trials{hint}; a muscle that is never stimulated shows nothing"

@@ -7,7 +7,6 @@ import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from types import MappingProxyType
 from typing import Any, TypeVar
 
 import numpy as np
@@ -338,18 +337,7 @@ def fit(
     names = [fixed] if isinstance(fixed, str) else list(instance(fixed, Iterable, "fixed"))
     free, narrower = _chosen(model, names, instance({} if bounds is None else bounds, Mapping, "bounds"))
     warn_of_odd_numbers(model, measured, simulated_trial)
-    return fit_accepted(model, measured, noise, max_iterations, free, narrower)
 
-
-def fit_accepted(
-    model: Model,
-    measured: Sequence[Trial],
-    noise: NoiseModel | None = None,
-    max_iterations: int = MAX_ITERATIONS,
-    free: tuple[str, ...] | None = None,
-    narrower: Mapping[str, tuple[float, float]] = MappingProxyType({}),
-) -> Fit:
-    """Return the result of `fit` for trials that are known to belong to the model's rig, without its warnings."""
     problem = Problem(model, measured, rough_noise(model, measured) if noise is None else noise, free)
     problem.limits |= narrower
     with one_thread_each():  # products this small are slower on several threads

@@ -1,8 +1,13 @@
 """Errors on trials that took no part."""
 
+import copy
+import gc
+
 import numpy as np
 from diagnosis.hidden import study_of
+from identify.rigs import as_likely
 
+from fes_pin.diagnosis import errors_ahead
 from fes_pin.diagnosis.errors_ahead import free_errors
 from fes_pin.identify.fit import fit
 from fes_pin.infer.held_out import Errors, held_out_gain
@@ -35,3 +40,16 @@ def test_a_gain_of_units_with_next_to_no_error_is_no_large_number():
     assert -30.0 < found.low < 100.0 and found.percent > 90.0 and found.high < 130.0
     nothing = held_out_gain(*(Errors(x, 10.0 * counts, counts) for x in (extended, extended + 1.0, extended)), seed=0)
     assert abs(nothing.percent) < 30.0 and max(abs(nothing.low), abs(nothing.high)) < 30.0
+
+
+def test_predictions_over_a_horizon_are_kept_as_long_as_their_fit(monkeypatch):
+    study = study_of("ankle", n_motion=1, duration_s=2.0)
+    fitted, made, kept = as_likely(fit(nominal_model(study), study.trials)), [], set(errors_ahead._PREDICTED)
+    monkeypatch.setattr(errors_ahead, "_predict", lambda *given: made.append(given[1:]) or ({}, {}))
+    for _ in range(2):
+        errors_ahead._predicted(fitted, study.trials[0], 0.1)
+    errors_ahead._predicted(copy.copy(fitted), study.trials[0], 0.1)  # equal, and another
+    assert len(made) == 2
+    del fitted
+    gc.collect()
+    assert set(errors_ahead._PREDICTED) <= kept

@@ -82,7 +82,8 @@ def test_tests_together_keep_the_level(monkeypatch):
     monkeypatch.setattr(open_set, "Projection", lambda _: None)
     monkeypatch.setattr(open_set, "under_own_noise", lambda *_: SimpleNamespace(parts=()))
 
-    monkeypatch.setattr(tests_of_fit, "fit_accepted", lambda *_: SimpleNamespace(sse=1.0))
+    monkeypatch.setattr(tests_of_fit, "rough_fit", lambda *_: SimpleNamespace(sse=1.0))
+    monkeypatch.setattr(tests_of_fit, "under_own_noise", lambda one, **_: one)
     monkeypatch.setattr(tests_of_fit, "_features_left", lambda *_: (rng.uniform(), "phase"))
     fitted = SimpleNamespace(model=None, trials=(), level=CLAIM_LEVEL, noise=SimpleNamespace(ar={"force_n": ()}))
     share = np.mean([lack_of_fit(fitted).unexplained for _ in range(20_000)])

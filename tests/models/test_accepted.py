@@ -9,7 +9,7 @@ from identify.rigs import WHITE, measured
 from models.cases import RIGS, trial
 
 import fes_pin as fp
-from fes_pin.identify.fit import fit_accepted
+from fes_pin.identify.fit import rough_fit
 from fes_pin.models.effects import SensorOffset
 from fes_pin.models.model import Model
 from fes_pin.models.predict import predicted_trial
@@ -173,7 +173,7 @@ def test_numbers_that_are_odd_are_warned_of_once_a_call_and_answered(odd, verb):
 
 def test_what_fits_and_simulates_within_warns_nobody():
     one = in_degrees(recorded("joint"))
-    assert isinstance(fit_accepted(MODELS["joint"], (one,), WHITE), fp.Fit)
+    assert isinstance(rough_fit(MODELS["joint"], (one,)), fp.Fit)
     assert isinstance(simulated_trial(MODELS["joint"], one), fp.Trial)
     assert isinstance(predicted_trial(MODELS["joint"], one), fp.Trial)
 

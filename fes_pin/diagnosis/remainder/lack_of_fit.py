@@ -10,12 +10,13 @@ import math
 import numpy as np
 
 from fes_pin.diagnosis.remainder.open_set import residual_tests
-from fes_pin.identify.fit import fit_accepted
+from fes_pin.identify.fit import rough_fit, under_own_noise
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.problem import limits_of
 from fes_pin.infer.distributions import chi2_tail
 from fes_pin.infer.levels import UNFELT
+from fes_pin.infer.optimum import MAX_ITERATIONS
 from fes_pin.infer.projection import Projection
 from fes_pin.infer.result import Remainder
 from fes_pin.models.features import EffortFeatures, ForceFeatures, ReadingFeatures, scaled_to
@@ -35,7 +36,9 @@ def lack_of_fit(fitted: LikelihoodFit) -> Remainder:
     `remainder.open_set`: process noise would take bursts and detents for its own. The p-value is that of the
     most significant test, times the number of tests.
     """
-    free = fit_accepted(fitted.model, fitted.trials) if fitted.noise.ar else None
+    free = rough_fit(fitted.model, fitted.trials) if fitted.noise.ar else None
+    if free is not None and math.isfinite(free.sse):
+        free = under_own_noise(free, max_iterations=MAX_ITERATIONS)
     others = residual_tests(free) if free is not None and math.isfinite(free.sse) else []
     found = [_features_left(fitted), *others]
     p_value, where = min(found, key=lambda f: f[0])
