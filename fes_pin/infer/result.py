@@ -142,7 +142,7 @@ class Gain:
     def is_material(self) -> bool:
         """Whether the low end of its interval is above `NOTHING_PERCENT`, or most of what other causes leave is.
 
-        Next to a large cause a smaller one removes little of the nominal model's error, but perhaps most of the others'.
+        Next to a large cause a smaller one removes little of the nominal error, but perhaps most of what remains.
         """
         return self.low > NOTHING_PERCENT or self.given > MOST_PERCENT
 
