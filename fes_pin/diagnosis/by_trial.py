@@ -150,7 +150,7 @@ def _likeliest(ran: Ran, kinds: Sequence[type[Effect]]) -> type[Effect] | None:
     Of kinds that are not distinguished, as where the effort itself is read, it is the first on the signal path.
     """
     search, found, _ = ran
-    if search.was_stopped or len(found.best.trials) < 2:
+    if search.was_stopped:
         return None
     lowest = dict.fromkeys(kinds, found.best.criterion - SEPARABLE)
     for base in {f.names: f for f in (found.best, *found.without.values(), found.nominal)}.values():

@@ -171,7 +171,8 @@ class _Work:
     def _judged(self, study: Study, nominal: Model, ask: Ask, train: list[Trial], test: list[Trial]) -> Diagnosis:
         with time_limit(self.end - time.perf_counter()):
             first = ask(nominal)
-            (search, found, again), faults = with_faults(first, ask, self.catalogue.effects_for(nominal.rig))
+            kinds = self.catalogue.effects_for(nominal.rig) if len(train) > 1 else ()
+            (search, found, again), faults = with_faults(first, ask, kinds)
         self.tell(0.88, "held-out gain")
         whole, stated = study, train
         if again is not None:
