@@ -6,7 +6,8 @@ searched again in a model that has it. That search is the answer if
 
 1. its penalised likelihood is lower,
 2. the zeros differ significantly between trials, corrected for errors of form as any further parameter is,
-3. a zero that is estimated from other parts of its trial lowers the errors of prediction.
+3. a nominal parameter that differs between trials cannot explain as much,
+4. a zero that is estimated from other parts of its trial lowers the errors of prediction.
 """
 
 import math
@@ -27,6 +28,7 @@ from fes_pin.identify.per_trial import as_parameters, cross_fitted_unknowns, hal
 from fes_pin.infer.distributions import chi2_quantile, chi2_tail
 from fes_pin.infer.fits import more_degrees
 from fes_pin.infer.levels import IDENTIFIABLE_SHARE, SEPARABLE, UNUSUAL_LEVEL
+from fes_pin.infer.projection import Projection
 from fes_pin.infer.result import Cause, ParameterEstimate
 from fes_pin.infer.scatter import excess_scatter, with_honest_intervals
 from fes_pin.infer.search import SearchResult
@@ -112,18 +114,21 @@ def with_faults(ran: Ran, ask: Ask, kinds: Sequence[type[Effect]]) -> tuple[Ran,
 
 
 def _further(ran: Ran, ask: Ask, kinds: Sequence[type[Effect]]) -> tuple[Ran, ByTrial] | None:
-    """Return the search with a further kind of fault, and that; None where it is not the answer."""
+    """Return the search with a further kind of fault, and that; None where it is not the answer.
+
+    It is not where a trial is restated as well, since that takes the place of the trial's zero.
+    """
     kind = _likeliest(ran, kinds)
     if kind is None:
         return None
-    search, found, _ = other = ask(_begun(ran, kind))
+    search, found, again = other = ask(_begun(ran, kind))
     best, fault = found.best, ByTrial(kind.of_each_trial())
     one = fault.common(best)
     gain = max(one.sse - best.sse, 0.0) / excess_scatter(as_parameters(best, fault.effect), one)
     p_value = len(kinds) * float(chi2_tail(gain, more_degrees(best, one)))
     lower = best.criterion < _on(ran[1].best, best.trials).criterion - SEPARABLE
-    named = p_value < best.level and lower and not search.was_stopped and search.models.predicts_better(best, one)
-    return (other, replace(fault, p_value=p_value)) if named else None
+    named = p_value < best.level and lower and not (search.was_stopped or again or _is_scatter(best, fault.effect))
+    return (other, replace(fault, p_value=p_value)) if named and search.models.predicts_better(best, one) else None
 
 
 def _begun(ran: Ran, kind: type[Effect]) -> Model:
@@ -149,8 +154,8 @@ def _likeliest(ran: Ran, kinds: Sequence[type[Effect]]) -> type[Effect] | None:
 
     Of kinds that are not distinguished, as where the effort itself is read, it is the first on the signal path.
     """
-    search, found, _ = ran
-    if search.was_stopped or len(found.best.trials) < 2:
+    search, found, again = ran
+    if search.was_stopped or again is not None:
         return None
     lowest = dict.fromkeys(kinds, found.best.criterion - SEPARABLE)
     for base in {f.names: f for f in (found.best, *found.without.values(), found.nominal)}.values():
@@ -161,6 +166,24 @@ def _likeliest(ran: Ran, kinds: Sequence[type[Effect]]) -> type[Effect] | None:
     best = min(lowest.values(), default=np.inf)
     near = [k for k in kinds if lowest[k] < best + SEPARABLE]
     return near[0] if best < found.best.criterion - SEPARABLE else None
+
+
+def _is_scatter(best: LikelihoodFit, effect: Effect) -> bool:
+    """Return whether a nominal parameter that differs between trials, as a muscle's strength, may explain as much.
+
+    It is fitted to first order, with one amplitude of all trials, in the place of the amplitudes of each.
+    """
+    wide, count = as_parameters(best, effect), len(best.parts)
+    own, least = list(wide.parameters.values())[-count:], sum(float(p.residual @ p.residual) for p in wide.parts)
+    for k in range(len(best.model.rig.fitted_parameters())):
+        parts = []
+        for row, p in zip(np.eye(count), wide.parts, strict=True):
+            acts = p.jacobian[:, -count:]
+            jacobian = np.c_[p.jacobian[:, :-count], acts.sum(axis=1), np.outer(p.jacobian[:, k], row)]
+            parts.append(replace(p, residual=p.residual + acts @ own, jacobian=jacobian))
+        if float(np.sum(Projection(parts).residual ** 2)) < least + SEPARABLE:
+            return True
+    return False
 
 
 def _on(fitted: LikelihoodFit, trials: Sequence[Trial]) -> LikelihoodFit:

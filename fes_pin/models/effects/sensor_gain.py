@@ -24,7 +24,6 @@ class SensorGain(FromAPlace):
     place: float = parameter(0.0, lower=0.0, upper=2.0, grid=(0.0, 1.0, 2.0), fitted=False)
 
     name, stage, signal, rigs = "sensor_gain", Stage.SENSOR, "reading", ("ankle", "joint")
-    of_record = True
     scales = True
 
     def apply(self, value: Scalar, s: Signals) -> Scalar:
