@@ -192,6 +192,7 @@ def long_noise(rng, deviation=lambda y, t: 0.0 * y, poles=(1.0,), trials=8):
     return full, Projection(full.parts)
 
 
+@pytest.mark.filterwarnings("ignore:the force is:fes_pin.InputWarning")
 @pytest.mark.parametrize("poles", COLOURED, ids=["white", "slow", "slower"])
 def test_slips_and_play_keep_their_level(poles):
     """At 5 %, more than 5 of 24 have a probability of 0.001 each."""

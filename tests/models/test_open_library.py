@@ -213,6 +213,7 @@ def test_a_file_that_is_not_whole_is_one_line(text, words, tmp_path):
     assert stays == (text is not None and "cannot be run" not in message)  # what did not run is no module
 
 
+@pytest.mark.filterwarnings("ignore::fes_pin.InputWarning")
 def test_an_error_in_its_equations_is_one_line_without_a_library_too(own):
     path = own / "mine.py"
     path.write_text(CAUSE.replace("s.v", "s.speed"))

@@ -107,7 +107,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         self._calm: StateSpaceNoise | None = None
         self._following = None if answered else following(self.model, self.trials)
         self._followed: dict[Names, LikelihoodFit] = {}
-        self._misfits: dict[LikelihoodFit, float] = {}
+        self._misfits: dict[int, tuple[LikelihoodFit, float]] = {}
         self._rough: Self | None = None
         self._compared: dict[tuple[Names, str], LikelihoodFit] = {}
 
@@ -232,9 +232,9 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
 
     def misfit(self, fitted: LikelihoodFit) -> float:
         """Return E of a fit's free simulations, percent; see `identify.afar`."""
-        if fitted not in self._misfits:
-            self._misfits[fitted] = misfit_percent(fitted)
-        return self._misfits[fitted]
+        if (key := id(fitted)) not in self._misfits:  # held as long as it is known, so that no other has its id
+            self._misfits[key] = fitted, misfit_percent(fitted)
+        return self._misfits[key][1]
 
     def scored_in(self, base: LikelihoodFit) -> LikelihoodFit:
         """Return the fit in which causes are scored: the fit itself, or far from the data a filter that follows it."""
