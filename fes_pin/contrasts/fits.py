@@ -100,12 +100,13 @@ class GroupedFits:
         if self.driven:
             return None
         near = min(self._each.values(), key=lambda f: misfit_percent(f.fits[()])).least_squares
-        found = near.fits[near.approach()]
-        if not found.names:
+        found = near.fits[near.approach()].model
+        effects = [e for e in found.effects if not e.each_trial]
+        if not effects:
             return None
-        model = one.grouped.having(one.items | {Item(n) for n in found.names}, found.model.effects)
+        model = one.grouped.having(one.items | {Item(e.name) for e in effects}, effects)
         noise = {g: replace(n, ar=w.ar) for g, w in one.weights.noise.items() for n in [near.fits[()].noise]}
-        values = {model.path(n, g): found.values[n] for g, m in model.models.items() for n in m.parameters()}
+        values = {model.path(n, g): found.parameters()[n] for g, m in model.models.items() for n in m.parameters()}
         return self.fitted(model.with_parameters(values), Weights(noise))
 
     def fitted(
@@ -141,15 +142,15 @@ class GroupedFits:
         problem = LikelihoodProblem(one.grouped.models[group], trials, one.weights.noise[group])
         return fit_of(problem, minimise(problem, one.grouped.models[group].parameters(), unknowns, SCREEN_ITERATIONS))
 
-    def with_process_noise(self, one: Grouped) -> Grouped | None:
-        """Return a set fitted with process noise; None where that does not lower the criterion."""
+    def with_process_noise(self, one: Grouped, least: float) -> Grouped | None:
+        """Return a set fitted with process noise; None where that does not lower the criterion by more than `least`."""
         parts = {g: self.part(one, g) for g in self.trials}
         begun = {g: process_noises(f, FIRST_NOISE_SCALES) for g, f in parts.items()}
         if not all(begun.values()):
             return None
         weights = Weights({g: likeliest(f, begun[g]) for g, f in parts.items()})
         found = self.again(one, weights)
-        if not found.criterion < one.criterion:
+        if not found.criterion < one.criterion - least:
             return None
         self._begun = [weights]
         return found

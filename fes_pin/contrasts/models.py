@@ -75,8 +75,9 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
             apart = less
         self.fits |= {tuple(sorted(map(str, f.items))): f for f in (apart, alike)}
         begun = apart if len(apart.changes) == 1 else alike
-        self.family = self.screen.family(begun, self.seed)
-        return tuple(sorted(map(str, begun.items)))
+        self.family, names = self.screen.family(begun, self.seed), tuple(sorted(map(str, begun.items)))
+        self._act(names, max((s.net_gain for s in self.screen.scores(begun).scored), default=0.0))
+        return names
 
     def _without(self, one: Grouped, items: Collection[Item]) -> Grouped:
         """Return the fit of a set without some items, from its noise or from that of the nominal model."""
@@ -93,7 +94,7 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
         for one in sorted(self.screen.scores(base).scored, key=lambda s: -s.net_gain):
             if one.gain > 1.0:
                 by_item.setdefault(one.item, []).append(one)
-        most = FITTED_DRIVEN if self.driven else FITTED
+        most = FITTED_DRIVEN if base.is_driven else FITTED
         chosen = [many for k, many in enumerate(by_item.values()) if k < most or many[0].effect is None]
         return {str(many[0].item): Candidate(many[0].net_gain, many[:STARTS]) for many in chosen}
 
@@ -208,18 +209,26 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
         return not (fitted.repeats or fitted.is_driven)
 
     def better_form(self, fitted: Grouped) -> Grouped | None:
-        """Return the set with a significant refinement of a cause; None where none is."""
+        """Return the set with a significant refinement of a cause; None without process noise, or where none is."""
+        if not fitted.is_driven:
+            return None
         starts, tried = [], 0
         for group, effect in _causes(fitted):
             own = fitted.grouped.models[group]
             tried += number_of_forms(own, [effect])
-            starts += [_moved(fitted.grouped, group, m) for m in refinements(own, effect, self._library.measured)]
+            forms = refinements(own, effect, self._library.measured)
+            starts += [_moved(fitted.grouped, group, m) for m in forms if not m.own_unknowns()]
         looks = in_parallel(lambda start: self.maxima.fitted(start, fitted.weights, fitted.unknowns, 0), starts)
         return demanded_form(fitted, looks, DRIVEN_LEVEL / max(tried, 1), self.converged)
 
     def begin_again(self, names: Names) -> bool:
         """Fit a set and the nominal model with process noise where that improves the set's penalised likelihood."""
-        acting = None if self.driven else self.maxima.with_process_noise(self.fits[names])
+        return self._act(names)
+
+    def _act(self, names: Names, least: float = 0.0) -> bool:
+        """Fit a set and the nominal model with process noise where that gains more than an item is expected to gain."""
+        fitted = self.fits[names]
+        acting = None if fitted.is_driven else self.maxima.with_process_noise(fitted, max(least, 0.0))
         if acting is None:
             return False
         kept = {k: self.fits[k] for k in ((), names)}
