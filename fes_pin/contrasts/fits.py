@@ -9,7 +9,6 @@ from fes_pin.data.errors import InputError
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.search.likelihood_fits import FIRST_NOISE_SCALES, MEASUREMENT, PROCESS, LikelihoodFits
 from fes_pin.diagnosis.search.likelihood_maxima import SCREEN_ITERATIONS, likeliest, process_noises
-from fes_pin.identify.afar import misfit_percent
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit, fit_of
 from fes_pin.identify.process_noise import first_guess
@@ -97,9 +96,10 @@ class GroupedFits:
         It is the group that the nominal model fits best, so that it has the fewest causes of its own. The likelihood of
         a model that is far from its data is that of noise which takes up every error; see `LikelihoodFits.approach`.
         """
-        if self.driven:
+        best = min(self._each.values(), key=lambda f: f.misfit(f.fits[()]))
+        if not best.is_far(best.fits[()]):
             return None
-        near = min(self._each.values(), key=lambda f: misfit_percent(f.fits[()])).least_squares
+        near = best.least_squares
         found = near.fits[near.approach()].model
         effects = [e for e in found.effects if not e.each_trial]
         if not effects:
