@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import replace
 
 from fes_pin.contrasts.grouped import Grouped, GroupedModel, GroupedProblem, Item, Weights, by_group
 from fes_pin.data.errors import InputError
@@ -99,15 +98,16 @@ class GroupedFits:
         best = min(self._each.values(), key=lambda f: f.misfit(f.fits[()]))
         if not best.is_far(best.fits[()]):
             return None
-        near = best.least_squares
-        found = near.fits[near.approach()].model
+        found = best.least_squares.fits[best.least_squares.approach()].model
         effects = [e for e in found.effects if not e.each_trial]
         if not effects:
             return None
+        begun = Model(found.rig, tuple(effects))
+        own = in_parallel(lambda f: f.from_least_squares(begun), list(self._each.values()))
+        near = dict(zip(self._each, own, strict=True))
         model = one.grouped.having(one.items | {Item(e.name) for e in effects}, effects)
-        noise = {g: replace(n, ar=w.ar) for g, w in one.weights.noise.items() for n in [near.fits[()].noise]}
-        values = {model.path(n, g): found.parameters()[n] for g, m in model.models.items() for n in m.parameters()}
-        return self.fitted(model.with_parameters(values), Weights(noise))
+        values = {model.path(n, g): near[g].values[n] for g, m in model.models.items() for n in m.parameters()}
+        return self.fitted(model.with_parameters(values), Weights({g: f.noise for g, f in near.items()}))
 
     def fitted(
         self, model: GroupedModel, weights: Weights, unknowns: Unknowns | None = None, rounds: int = ROUNDS

@@ -108,7 +108,11 @@ class Contrast(Result):
             return super().advice()
         if self.verdict == "unexplained":
             return "look at the trials of the group that differs, or write the cause that you suspect as your own"
-        return "take each group's own values" if self.changes else "use one model for all groups"
+        if self.changes:
+            return "take each group's own values"
+        if self.untestable:
+            return f"record trials that show {listed(list(self.untestable))}; one model for all groups fits these"
+        return "use one model for all groups"
 
 
 def _shares(shares: Mapping[str, float]) -> str:

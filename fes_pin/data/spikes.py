@@ -1,9 +1,10 @@
 """Spikes: samples far off their neighbours on both sides, as a loose plug or a lost packet makes them.
 
 A sample (or two in a row) is a spike if it leaves the cubic through two neighbours on either side by `FAR` deviations,
-and the straight lines through three neighbours before and after it, continued, by `OFF_LINE` to the same side. A step,
-the kink of a contact and the onset of a stimulus each lie on the line of one side; hum, vibration and pulses are in the
-deviation, which is the robust one of the surroundings. In white noise of deviation 1 a spike must be about 9 high.
+and the straight lines through three neighbours before and after it, continued, by `OFF_LINE` to the same side; and if
+those lines are nearer each other than the sample. A step, the kink of a contact, the onset of a stimulus and a twitch
+lie near the line of one side; hum, vibration and pulses are in the deviation, which is the robust one of the
+surroundings. In white noise of deviation 1 a spike must be about 9 high.
 """
 
 from collections.abc import Sequence
@@ -83,6 +84,7 @@ def _spikes(x: np.ndarray, length: int) -> np.ndarray:
         )
         hit &= np.sign(here) * np.sign(before) > 0
         hit &= np.sign(here) * np.sign(after) > 0
+        hit &= np.abs(before - after) < np.minimum(np.abs(before), np.abs(after))
         off.append(np.abs(here))
         off_line.append(np.minimum(np.abs(before), np.abs(after)))
         if inside == LINE:

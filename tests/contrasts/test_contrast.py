@@ -8,6 +8,7 @@ import pytest
 from contrast_pairs.driven import driven_pair
 from contrast_pairs.free import free_pair
 from contrast_pairs.practice import practice_pair
+from contrast_pairs.twitch import twitch_pair
 from data import studies
 
 import fes_pin as fp
@@ -24,6 +25,30 @@ def test_nothing_changed(tmp_path):
     assert not found.changes
     assert "nothing changed between before and after" in str(found)
     assert 0.0 < found.unchanged["gain"] < 0.05
+    assert found.advice() == "use one model for all groups"
+    assert replace(found, untestable=("gain",)).advice().startswith("record trials that show gain")
+
+
+def stronger_with_zeros(offset_n, folder):
+    """A muscle that became stronger by 67 %, with a delay in both groups, and the zero of the force differs."""
+    study, rng = twitch_pair("delay", 1.67, 0.0005, 8, folder), np.random.default_rng(4)
+    moved = [t.with_columns(force_n=t["force_n"] + offset_n * rng.standard_normal()) for t in study.trials]
+    return replace(study, trials=tuple(moved))
+
+
+@pytest.mark.parametrize("offset_n", [0.0, 0.01])
+def test_a_stronger_muscle_of_which_the_model_lacks_a_delay(offset_n, tmp_path):
+    """An error that all groups share hides no change, nor do zeros that differ between trials."""
+    found = fp.contrast(stronger_with_zeros(offset_n, tmp_path))
+    (change,) = found.changes
+    assert change.name == "gain" and "electromechanical_delay" in found.common
+    before, after = (p.value for p in change.parameters["gain"].values())
+    assert after / before == pytest.approx(1.67, abs=0.02)
+
+
+def test_zeros_of_half_a_twitch_hide_its_strength_and_that_is_said(tmp_path):
+    found = fp.contrast(stronger_with_zeros(0.1, tmp_path))
+    assert "gain" in found.untestable and "gain" in found.advice()
 
 
 @pytest.mark.long

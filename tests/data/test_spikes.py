@@ -55,6 +55,7 @@ STEEP = {
     * np.sin(2 * np.pi * 31.0 * TIME)
     * np.exp(-8.0 * np.maximum(TIME - 5.0, 0))
     * (TIME > 5.0),
+    "one twitch": np.select([TIME > 4.0, TIME == 4.0], [np.exp(-7.0 * (TIME - 4.005)), 0.56]),
     "twitches": np.exp(-(TIME % 0.125) / 0.03),
     "at rest": np.zeros_like(TIME),
 }

@@ -312,6 +312,11 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
 
         return dict(zip(starts, in_parallel(begun, list(starts)), strict=True))
 
+    def from_least_squares(self, model: Model) -> LikelihoodFit:
+        """Return the fit of a model from its values, by least squares and then with the noise of these fits."""
+        rough = self.least_squares
+        return self._from_least_squares(rough._maximum(model, rough.nominal().noise))
+
     def _from_least_squares(self, fitted: LikelihoodFit) -> LikelihoodFit:
         """Return a fit by least squares again with the noise of these fits."""
         if self.noise == MEASUREMENT or not self.fits[()].noise.acting:
