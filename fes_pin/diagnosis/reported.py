@@ -14,6 +14,7 @@ from fes_pin.diagnosis.errors_ahead import AheadErrors, free_errors, noise_that_
 from fes_pin.diagnosis.estimators import WHITE_PROCESS_NOISE
 from fes_pin.diagnosis.rejected import UNMOVED, is_moved_by_what_is_recorded
 from fes_pin.diagnosis.result import Diagnosis
+from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
 from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodSearch
 from fes_pin.diagnosis.verdict import RigState, RigVerdict
 from fes_pin.identify.afar import misfit_percent
@@ -55,10 +56,7 @@ def diagnosis_of(
     on = HELD_OUT if trials[1] else CROSS_VALIDATED if held else FITTED
     causes = [_cause(verdict, state, one, best, on) for one in best.model.effects if not one.is_fault]
     causes.sort(key=lambda c: -c.gain_held_out.percent)
-    said = words_of_reading(best.noise, best.model.rig, trials[0])
-    if search.models.is_far(found.nominal):
-        far = f"E {percent(misfit_percent(found.nominal))}"
-        said = (*said, f"the nominal model does not follow the data ({far}): causes were fitted from least squares")
+    said = (*words_of_reading(best.noise, best.model.rig, trials[0]), *_words_of_far(search.models, found.nominal))
     reached = [e for e in (fitted[1].free, held and held[1].free) if e is not None]
     return Diagnosis(
         study=study,
@@ -80,6 +78,12 @@ def diagnosis_of(
         reason=left.reason if not left.unexplained or is_moved_by_what_is_recorded(found.best) else UNMOVED,
         ahead=AheadErrors(search.models.horizon_s, *fitted, *(held or (None, None))),
     )
+
+
+def _words_of_far(models: LikelihoodFits, nominal: LikelihoodFit) -> list[str]:
+    """Return a warning where the nominal model does not follow the data."""
+    far = f"the nominal model does not follow the data (E {percent(misfit_percent(nominal))})"
+    return [f"{far}: causes were fitted from least squares"] if models.is_far(nominal) else []
 
 
 def unfitted(study: Study, nominal: LikelihoodFit, reason: str, test: Sequence[Trial]) -> Diagnosis:

@@ -98,30 +98,35 @@ def cross_fitted_unknowns(
     """
     if not model.own_unknowns():
         return [(np.ones(len(trial), dtype=bool), {})]
-    outputs, values = [n for n in model.rig.outputs(trial.kind) if n in trial.columns], model.parameters()
+    cut = spread_of_start(model, trial) and all(e.is_fault for e in model.effects if e.each_trial)
     out = []
     for half in halves(len(trial)):
-        cut = spread_of_start(model, trial) and all(e.is_fault for e in model.effects if e.each_trial)
         own = _filtered(model, pieces(trial, ~half), noise) if cut else {}
-        if cut and noise.processes:
-            out.append((half, own))
-            continue
-        masked = {n: np.where(half, np.nan, trial[n]) for n in outputs}
-        shown = derived_trial(trial, columns={**trial.columns, **masked})
-        problem = LikelihoodProblem(model, [shown], noise, (), starts=[trial])
-        now = {**(start or problem.start_unknowns()[0]), **own}
-        spread = {n: d for n, d in spread_of_start(model, trial).items() if n in problem.unknown_names}
-        reach = {n: (now[n] - d, now[n] + d) for n, d in spread.items()}
-        for _ in range(STEPS):
-            (part,) = problem.linearize(values, [now])
-            there, was = _moved(part, problem.unknown_names, now, reach), now
-            tried = [{n: v + 0.5**k * (there[n] - v) for n, v in was.items()} for k in range(problem.batch)]
-            costs = problem.costs([(values, [one]) for one in (was, *tried)])
-            now = (was, *tried)[int(np.argmin(np.nan_to_num(costs, nan=np.inf)))]
-            if now is was:
-                break
-        out.append((half, {n: now[n] for n in model.own_unknowns()}))
+        known = cut and noise.processes
+        out.append((half, own if known else _fitted_without(half, model, trial, noise, {**(start or {}), **own})))
     return out
+
+
+def _fitted_without(
+    half: np.ndarray, model: Model, trial: Trial, noise: StateSpaceNoise, start: Mapping[str, float]
+) -> dict[str, float]:
+    """Return unknowns of effects, estimated from the samples of a trial that are not in a half."""
+    outputs, values = [n for n in model.rig.outputs(trial.kind) if n in trial.columns], model.parameters()
+    masked = {n: np.where(half, np.nan, trial[n]) for n in outputs}
+    shown = derived_trial(trial, columns={**trial.columns, **masked})
+    problem = LikelihoodProblem(model, [shown], noise, (), starts=[trial])
+    now = {**problem.start_unknowns()[0], **start}
+    spread = {n: d for n, d in spread_of_start(model, trial).items() if n in problem.unknown_names}
+    reach = {n: (now[n] - d, now[n] + d) for n, d in spread.items()}
+    for _ in range(STEPS):
+        (part,) = problem.linearize(values, [now])
+        there, was = _moved(part, problem.unknown_names, now, reach), now
+        tried = [{n: v + 0.5**k * (there[n] - v) for n, v in was.items()} for k in range(problem.batch)]
+        costs = problem.costs([(values, [one]) for one in (was, *tried)])
+        now = (was, *tried)[int(np.argmin(np.nan_to_num(costs, nan=np.inf)))]
+        if now is was:
+            break
+    return {n: now[n] for n in model.own_unknowns()}
 
 
 def pieces(trial: Trial, rows: np.ndarray) -> list[Trial]:

@@ -107,7 +107,7 @@ def plates_of(
         feet[side] = _at(at, time, smooth)
         level = level_in_the_air(force[:, 2], total)
         loaded[side] = _at(at, time, force[:, 2:]).ravel() > LOADED_N + level
-        pressure[side] = _held(_at(at, time, point), loaded[side] | (abs(level) > 0.5 * LOADED_N))
+        pressure[side] = _held(_at(at, time, point), loaded[side] | (2.0 * abs(level) > LOADED_N))
     return Plates(np.asarray(at, dtype=float), session.way(at), feet, pressure, loaded)
 
 
@@ -121,7 +121,7 @@ def level_in_the_air(up: np.ndarray, total: np.ndarray) -> float:
     """
     least = up < np.quantile(up, LEAST) + LOADED_N
     level = float(np.median(up[least]))
-    return level if np.mean(least) > SWINGS and np.max(up) - level > 0.5 * np.mean(total) else 0.0
+    return level if np.mean(least) > SWINGS and 2.0 * (np.max(up) - level) > np.mean(total) else 0.0
 
 
 def _at(at: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarray:
