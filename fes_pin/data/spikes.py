@@ -104,14 +104,20 @@ def _deviation(absolute: np.ndarray) -> float:
 
 
 def _first_spikes(x: np.ndarray) -> np.ndarray:
-    """The same of the first samples, which have neighbours on one side alone: off the parabola through those after."""
+    """The same of the first samples, which have neighbours on one side alone: off the parabola through those after.
+
+    It is none if it is nearer the straight line or the parabola through the nearest than these are to each other: the
+    signal bends there.
+    """
     mask = np.zeros(len(x), dtype=bool)
     if len(x) < AROUND:
         return mask
     weights = _weights(np.arange(1.0, AFTER + 1), 0.0, 2)
     rows = np.lib.stride_tricks.sliding_window_view(x, AFTER + 1)
     off = np.abs(rows[:, 0] - rows[:, 1:] @ weights)
-    for k in range(LINE):
+    line, bent = (rows[:, 0] - rows[:, 1 : LINE + 1] @ _weights(np.arange(1.0, LINE + 1), 0.0, d) for d in (1, 2))
+    agree = np.abs(line - bent) < np.minimum(np.abs(line), np.abs(bent))
+    for k in np.flatnonzero(agree[:LINE]):
         scale = max(_deviation(off), _deviation(off[: k + AROUND]), _quantum(x))
         mask[k] = off[k] > FAR * scale and off[k] > 2.0 * off[LINE:AROUND].max()
     return mask

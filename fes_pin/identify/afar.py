@@ -69,14 +69,11 @@ def with_beliefs(fitted: LikelihoodFit, believed: Model) -> LikelihoodFit:
 
     A parameter is not identified if half its interval is above twice its value and twice its believed value, and the
     interval holds the latter; or if it ended at a bound and E is the same without. Its estimate would depend on where
-    the fit began.
+    the fit began. They are held one after another: of two whose ratio is identified, one stays free.
     """
-    known, vague, ended = believed.parameters(), set[str](), at_a_bound(fitted, believed)
-    for n in set(fitted.free) & set(known):
-        value, reach = fitted.values[n], fitted.reach(n)
-        if reach > CONFIDENCE_95 * max(abs(value), abs(known[n])) and abs(value - known[n]) < reach:
-            vague.add(n)
-    held = {n: known[n] for n in vague | ended}
+    known, ended = believed.parameters(), at_a_bound(fitted, believed)
+    vague = [n for n in fitted.free if n in known and _is_vague(fitted, n, known[n])]
+    held = {n: known[n] for n in {*vague[:1], *ended}}
     if not held:
         return fitted
     rig = replace(fitted.model.rig, fitted=tuple(n for n in fitted.model.rig.fitted_parameters() if n not in held))
@@ -84,7 +81,12 @@ def with_beliefs(fitted: LikelihoodFit, believed: Model) -> LikelihoodFit:
     again = maximise(LikelihoodProblem(model, fitted.trials, fitted.noise), fitted.unknowns)
     if ended and misfit_percent(again) > misfit_percent(fitted) + NOTHING_PERCENT:
         return fitted
-    return again
+    return with_beliefs(again, believed)
+
+
+def _is_vague(fitted: LikelihoodFit, name: str, known: float) -> bool:
+    value, reach = fitted.values[name], fitted.reach(name)
+    return reach > CONFIDENCE_95 * max(abs(value), abs(known)) and abs(value - known) < reach
 
 
 def at_a_bound(fitted: Fit, believed: Model) -> set[str]:

@@ -56,6 +56,7 @@ STEEP = {
     * np.exp(-8.0 * np.maximum(TIME - 5.0, 0))
     * (TIME > 5.0),
     "one twitch": np.select([TIME > 4.0, TIME == 4.0], [np.exp(-7.0 * (TIME - 4.005)), 0.56]),
+    "begins to fall at the end": 1.8 - 400.0 * np.maximum(TIME - TIME[-5], 0.0) ** 2,
     "twitches": np.exp(-(TIME % 0.125) / 0.03),
     "at rest": np.zeros_like(TIME),
 }

@@ -10,6 +10,7 @@ import math
 import numpy as np
 
 from fes_pin.diagnosis.remainder.open_set import residual_tests
+from fes_pin.identify.afar import misfit_percent
 from fes_pin.identify.fit import rough_fit, under_own_noise
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit
@@ -34,8 +35,11 @@ def lack_of_fit(fitted: LikelihoodFit) -> Remainder:
 
     Where measurement noise may be autoregressive, the residuals of a free simulation are tested too, see
     `remainder.open_set`: process noise would take bursts and detents for its own. The p-value is that of the
-    most significant test, times the number of tests.
+    most significant test, times the number of tests. Errors of free simulations that are those of arithmetic are not
+    tested.
     """
+    if misfit_percent(fitted) < 100.0 * UNFELT**2:
+        return Remainder(False, 1.0, None)
     free = rough_fit(fitted.model, fitted.trials) if fitted.noise.ar else None
     if free is not None and math.isfinite(free.sse):
         free = under_own_noise(free, max_iterations=MAX_ITERATIONS)
