@@ -7,7 +7,7 @@ process noise. Source: Abarbanel, Creveling, Farsian and Kostuk, Dynamical state
 Applied Dynamical Systems 8 (2009), who couple the model to the data.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,12 +17,13 @@ from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit, maximise
-from fes_pin.identify.problem import Problem
+from fes_pin.identify.problem import Problem, limits_of
 from fes_pin.identify.process_noise import first_guess
+from fes_pin.infer.covariance import least_squares_step
 from fes_pin.infer.held_out import percent_of_spread
 from fes_pin.infer.levels import CONFIDENCE_95, NOTHING_PERCENT, RUNAWAY
 from fes_pin.infer.noise import Noise
-from fes_pin.infer.problem import completed
+from fes_pin.infer.problem import completed, normal_equations
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import StateSpaceNoise
 
@@ -77,11 +78,26 @@ def with_beliefs(fitted: LikelihoodFit, believed: Model) -> LikelihoodFit:
     if not held:
         return fitted
     rig = replace(fitted.model.rig, fitted=tuple(n for n in fitted.model.rig.fitted_parameters() if n not in held))
-    model = Model(rig, fitted.model.effects).with_parameters(held)
+    model = Model(rig, fitted.model.effects).with_parameters({**_with_others(fitted, held), **held})
     again = maximise(LikelihoodProblem(model, fitted.trials, fitted.noise), fitted.unknowns)
     if ended and misfit_percent(again) > misfit_percent(fitted) + NOTHING_PERCENT:
         return fitted
     return with_beliefs(again, believed)
+
+
+def _with_others(fitted: LikelihoodFit, held: Mapping[str, float]) -> dict[str, float]:
+    """Return the other parameters, moved along the direction that the data do not identify.
+
+    These minimise the cost, to second order, where some parameters are held.
+    """
+    hessian, free = normal_equations(fitted.parts).hessian, fitted.free
+    out, others = [free.index(n) for n in held], [k for k, n in enumerate(free) if n not in held]
+    moved = np.array([v - fitted.values[n] for n, v in held.items()])
+    step = least_squares_step(hessian[np.ix_(others, others)], -hessian[np.ix_(others, out)] @ moved)
+    limits = limits_of(fitted.model, fitted.trials)
+    return {
+        free[k]: float(np.clip(fitted.values[free[k]] + d, *limits[free[k]])) for k, d in zip(others, step, strict=True)
+    }
 
 
 def _is_vague(fitted: LikelihoodFit, name: str, known: float) -> bool:
