@@ -3,14 +3,18 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.errors_ahead import squared_errors
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit, fit_of, maximise
+from fes_pin.infer.covariance import covariance_of
 from fes_pin.infer.held_out import FOLDS, Errors, deal, held_out_gain, marginal_cost
+from fes_pin.infer.levels import IDENTIFIABLE_SHARE
 from fes_pin.infer.maximise import together
 from fes_pin.infer.optimum import minimise
-from fes_pin.infer.problem import Unknowns
+from fes_pin.infer.problem import Unknowns, normal_equations
 from fes_pin.infer.result import CROSS_VALIDATED, FITTED, Evidence, Gain
 from fes_pin.infer.search import SearchResult
 from fes_pin.workers import in_parallel
@@ -31,8 +35,8 @@ class Fold:
 
     Attributes
     ----------
-    within
-        False if the study itself holds the trials out, so that they are in no fit.
+    out
+        Numbers of the trials in the fit to all; none if the study itself holds them out, so that they are in no fit.
     chosen
         The set that is chosen again without the trials, fitted to the others; None where no choice is made again.
     """
@@ -41,8 +45,13 @@ class Fold:
     best: LikelihoodFit
     without: dict[str, LikelihoodFit]
     test: tuple[Trial, ...]
-    within: bool = True
+    out: tuple[int, ...] = ()
     chosen: LikelihoodFit | None = None
+
+    @property
+    def within(self) -> bool:
+        """Whether the trials are in the fit to all."""
+        return bool(self.out)
 
 
 class Again:
@@ -67,20 +76,37 @@ class Again:
 
 
 def make_folds(found: Found, train: Sequence[Trial], test: Sequence[Trial], refitted: Again) -> list[Fold]:
-    """Return the trials that the study holds out as one fold, or folds to cross-validate; none of one trial."""
+    """Return the trials that the study holds out as one fold, or folds to cross-validate; none of one trial.
+
+    Each is one of `identified_folds`.
+    """
     if test:
-        return [Fold(found.nominal, found.best, found.without, tuple(test), within=False)]
+        return [Fold(found.nominal, found.best, found.without, tuple(test))]
     if len(train) < 2:
         return []
-    held = folds_of(train)
+    held = identified_folds(found.best)
     fits = {"": found.nominal, "+": found.best, **found.without}
     others = [[t for i, t in enumerate(found.best.trials) if i not in out] for out in held]
     wanted = [(k, n) for k in range(len(held)) for n in fits]
     again = dict(zip(wanted, refitted([(fits[n], others[k]) for k, n in wanted]), strict=True))
-    return [
-        Fold(again[k, ""], again[k, "+"], {n: again[k, n] for n in found.without}, tuple(train[i] for i in out))
-        for k, out in enumerate(held)
-    ]
+    each = [(again[k, ""], again[k, "+"], {n: again[k, n] for n in found.without}) for k in range(len(held))]
+    return [Fold(*fitted, tuple(train[i] for i in out), tuple(out)) for fitted, out in zip(each, held, strict=True)]
+
+
+def identified_folds(fitted: LikelihoodFit) -> list[list[int]]:
+    """Return the trials of each fold, without which no standard deviation grows by more than 1 / `IDENTIFIABLE_SHARE`.
+
+    A prediction from trials that do not identify the model, as of a joint at rest, says nothing about its causes.
+    """
+    moving = np.array([n not in fitted.at_bound for n in fitted.free])
+
+    def deviations(out: Sequence[int]) -> np.ndarray:
+        parts = [p for k, p in enumerate(fitted.parts) if k not in out]
+        return np.sqrt(np.diag(covariance_of(normal_equations(parts).hessian, moving)))
+
+    whole = deviations(())
+    known, folds = np.isfinite(whole), folds_of(fitted.trials)
+    return [out for out in folds if np.all(IDENTIFIABLE_SHARE * deviations(out)[known] <= whole[known])]
 
 
 def refit(fitted: LikelihoodFit, trials: Sequence[Trial]) -> LikelihoodFit:

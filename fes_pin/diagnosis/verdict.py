@@ -19,7 +19,6 @@ from fes_pin.diagnosis.held_out import (
     Fold,
     as_random_as_in_all,
     evidence_of,
-    folds_of,
     gains_of,
     make_folds,
     refit,
@@ -165,7 +164,7 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
             return []
         if id(found) not in self._chosen:
             choose = ChosenAgain({**state.search.possible(), found.best.names: found.best}, state.search.improves)
-            self._chosen[id(found)] = found, [choose.without(out) for out in folds_of(self.models.trials)]
+            self._chosen[id(found)] = found, [choose.without(fold.out) for fold in folds]
         return self._chosen[id(found)][1]
 
     def folds(self, state: RigState) -> Sequence[Fold]:

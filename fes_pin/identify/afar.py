@@ -7,11 +7,13 @@ process noise. Source: Abarbanel, Creveling, Farsian and Kostuk, Dynamical state
 Applied Dynamical Systems 8 (2009), who couple the model to the data.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from fes_pin.data.counts import count_of
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit
@@ -53,11 +55,14 @@ def following(model: Model, trials: Sequence[Trial]) -> StateSpaceNoise | None:
     """Return noise with which a filter of the model follows the trials; None where none can, or none is needed.
 
     Process noise must drive the rig. No filter includes a low pass of trials, and an imposed motion is followed anyway.
+    Readings in counts have the standard deviation of a uniform error at least, else the filter follows each count.
     """
     guess = first_guess(model, trials)
     if not guess.std or any(t.low_pass_hz or t.kind == IMPOSED for t in trials):
         return None
-    return replace(guess, std={n: FOLLOWING * v for n, v in guess.std.items()})
+    counts = {n: max(count_of(t[n]) for t in trials if n in t) for n in guess.white}
+    white = {n: max(v, counts[n] / math.sqrt(12.0)) for n, v in guess.white.items()}
+    return replace(guess, white=white, std={n: FOLLOWING * v for n, v in guess.std.items()})
 
 
 def followed(models: Sequence[Model], trials: Sequence[Trial], noise: StateSpaceNoise) -> LikelihoodFit:

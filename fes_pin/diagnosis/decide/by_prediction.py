@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.held_out import folds_of
+from fes_pin.diagnosis.held_out import identified_folds
 from fes_pin.diagnosis.search.likelihood_models import LikelihoodSearch
 from fes_pin.identify.ahead import free_residuals
 from fes_pin.identify.likelihood import LikelihoodProblem
@@ -35,8 +35,8 @@ FEWEST = 3
 def best_predicting(search: LikelihoodSearch, names: Names) -> Names:
     """Return the smallest set whose error on trials left out exceeds the least by no more than an error of form.
 
-    A set is not tried if its error on the trials that it is fitted to is larger than that of another on trials left
-    out.
+    It is the set that was found where none can be left out. A set is not tried if its error on the trials that it is
+    fitted to is larger than that of another on trials left out.
 
     Parameters
     ----------
@@ -46,6 +46,9 @@ def best_predicting(search: LikelihoodSearch, names: Names) -> Names:
         The set that it found.
     """
     models = search.models
+    folds = identified_folds(models.fits[names])
+    if not folds:
+        return names
     ranked = [n for k in sorted({len(n) for n in models.fits}) for n in models.ranked(k)[:POOL]]
     pool = [n for n in dict.fromkeys([names, *ranked]) if models.is_possible(models.fits[n])]
     noise = models.fits[()].noise
@@ -55,12 +58,12 @@ def best_predicting(search: LikelihoodSearch, names: Names) -> Names:
     for one in sorted(pool, key=lambda n: (inside[n], n)):
         if errors and inside[one] > min(errors.values()) + FORM_SHARE:
             break
-        errors[one] = prediction_error(models.fits[one], noise)
+        errors[one] = prediction_error(models.fits[one], noise, folds)
     good = [n for n in errors if errors[n] <= min(errors.values()) + FORM_SHARE]
     return min(good, key=lambda n: (len(n), errors[n], n))
 
 
-def prediction_error(fitted: LikelihoodFit, noise: StateSpaceNoise) -> float:
+def prediction_error(fitted: LikelihoodFit, noise: StateSpaceNoise, folds: Sequence[Sequence[int]]) -> float:
     """Return the logarithm of the mean squared error of simulations of trials left out in turn, averaged over trials.
 
     The logarithm keeps one large motion from deciding alone. The fit without some trials is approximated by one
@@ -71,12 +74,14 @@ def prediction_error(fitted: LikelihoodFit, noise: StateSpaceNoise) -> float:
     ----------
     noise
         Its standard deviations are the unit of errors.
+    folds
+        Numbers of the trials that are left out together.
     """
 
     def left_out(held: Sequence[int]) -> tuple[float, int]:
         return _error(_without(fitted, held), [fitted.trials[i] for i in held], noise), len(held)
 
-    means, counts = zip(*in_parallel(left_out, folds_of(fitted.trials)), strict=True)
+    means, counts = zip(*in_parallel(left_out, folds), strict=True)
     return float(np.average(means, weights=counts))
 
 

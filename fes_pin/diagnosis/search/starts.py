@@ -15,7 +15,7 @@ STARTS = 2
 """Shapes from which a fit of a set starts, largest score first, if their score is `STARTED` of the largest."""
 STARTED = 0.5
 """Share of the largest score from which a shape is fitted, and of the gain that a form needs, from which it is."""
-TINY = 0.02
+TINY = 1e-6
 """Share of an amplitude's scale at which a one-sided effect is linearized: next to its null, on its own side."""
 
 
