@@ -8,6 +8,7 @@ from typing import Generic, Protocol, Self, TypeVar
 
 from fes_pin.infer.family import Family
 from fes_pin.infer.levels import CLAIM_LEVEL, MOST_CAUSES
+from fes_pin.infer.optimize import WORTH
 
 Names = tuple[str, ...]
 """Names of the candidates of a set, in alphabetical order."""
@@ -149,15 +150,20 @@ class Sets(ABC, Generic[F]):
         """Converge the sets that another candidate in the place of one brings near, by a further step under one noise.
 
         Near is half of what the candidate itself explains. A first fit of a set is made under the noise of a smaller
-        set, which takes up what a candidate would explain: rivals of a converged set are compared under its noise.
+        set, which takes up what a candidate would explain: rivals of a converged set are compared under its noise, and
+        begin with that where their own is less likely.
         """
         rest, whole = tuple(n for n in names if n != name), self.fits[names]
-        rivals = [k for k in self.fits if len(k) == len(names) and set(rest) < set(k) and k not in self._converged]
+        rivals = [k for k in self.fits if len(k) == len(names) and set(rest) < set(k) and k != names]
         if not rivals:
             return
         less, *fits = self.under_noise_of(whole, [self.fits[rest], *(self.fits[k] for k in rivals)])
-        half = 0.5 * (less.criterion + whole.criterion)
-        self._converge([k for k, f in zip(rivals, fits, strict=True) if f.criterion - self.step_gain(f) < half])
+        under = dict(zip(rivals, fits, strict=True))
+        likelier = {k: f for k, f in under.items() if f.criterion < self.fits[k].criterion - WORTH}
+        self.fits.update(likelier)
+        self._converged -= set(likelier)
+        half, slow = 0.5 * (less.criterion + whole.criterion), [k for k in rivals if k not in self._converged]
+        self._converge([k for k in slow if under[k].criterion - self.step_gain(under[k]) < half])
 
     def _converge(self, slow: Sequence[Names]) -> None:
         self.fits.update(zip(slow, self.converged([self.fits[n] for n in slow]), strict=True))
