@@ -15,7 +15,7 @@ from fes_pin.diagnosis.search.likelihood_maxima import less, likeliest, look, ma
 from fes_pin.diagnosis.search.possible import is_possible
 from fes_pin.diagnosis.search.score import Scored, best_by_effect
 from fes_pin.diagnosis.search.starts import STARTED, STARTS, at_null, from_afar, refinements, started
-from fes_pin.identify.afar import followed, following, freed, misfit_percent, with_beliefs
+from fes_pin.identify.afar import at_a_bound, followed, following, freed, misfit_percent, with_beliefs
 from fes_pin.identify.ahead import default_horizon
 from fes_pin.identify.correlation_time import with_new_noise
 from fes_pin.identify.likelihood import LikelihoodProblem
@@ -23,7 +23,7 @@ from fes_pin.identify.likelihood_fit import LikelihoodFit, at_noise, fit_of, max
 from fes_pin.identify.process_noise import first_guess, stilled, without_memory
 from fes_pin.infer.covariance import step_gain
 from fes_pin.infer.fits import Candidate, FittedSets, Names
-from fes_pin.infer.levels import FAR_PERCENT, MOST_CAUSES, SMALL_PERCENT, SMALL_SHARE
+from fes_pin.infer.levels import FAR_PERCENT, MOST_CAUSES, NOTHING_PERCENT, SMALL_SHARE
 from fes_pin.infer.maximise import ROUNDS
 from fes_pin.infer.optimize import WORTH
 from fes_pin.infer.optimum import minimise
@@ -222,13 +222,14 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         return {n: min((*fits, restarted.get(n, fits[0])), key=lambda f: f.criterion) for n, fits in each}
 
     def is_far(self, fitted: LikelihoodFit) -> bool:
-        """Return whether E of a fit's free simulations is more than `FAR_PERCENT`, or small by least squares.
+        """Return whether E of a fit's free simulations is more than `FAR_PERCENT`, or negligible by least squares.
 
-        In closed loop it is not: a filter follows the data there.
+        So is a fit that ended at a bound. In closed loop none is: a filter follows the data there.
         """
         if self.answered:
             return False
-        return self.misfit(fitted) > (SMALL_PERCENT if self.noise == WHITE else FAR_PERCENT)
+        most = NOTHING_PERCENT if self.noise == WHITE else FAR_PERCENT
+        return self.misfit(fitted) > most or bool(at_a_bound(fitted, self.model))
 
     def misfit(self, fitted: LikelihoodFit) -> float:
         """Return E of a fit's free simulations, percent; see `identify.afar`."""
@@ -277,7 +278,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         best: Names = ()
         fits = self.fits
         self.nominal()
-        while self.misfit(fits[best]) > SMALL_PERCENT and len(best) < MOST_CAUSES:
+        while self.misfit(fits[best]) > NOTHING_PERCENT and len(best) < MOST_CAUSES:
             for names in self.ranked(len(best))[:NEAREST]:
                 self.extend(names, FITTED if names else None)
             larger = [n for n in self.ranked(len(best) + 1) if self.is_possible(fits[n])]
