@@ -301,17 +301,25 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
             found = {k: rough.fits[k] if k in rough.fits else made[k] for k in starts}
             return dict(zip(found, in_parallel(self._from_least_squares, list(found.values())), strict=True))
 
-        def begun(names: Names) -> LikelihoodFit:
-            effects = [started(s.effect, s.amplitudes) for s in starts[names]]
-            effects += from_afar(effects[0], self.library.measured) if not base.names else []
-            looks = [look(base.model + e, base) for e in effects]
-            if self._following is not None:
-                near = self._follow(base).model
-                self._followed[names] = first = self._first_followed([near + e for e in effects])
-                looks.append(self._maximum(first.model, base.noise, first.unknowns, RESTART_ROUNDS))
-            return min(looks, key=lambda f: f.criterion)
+        return dict(zip(starts, in_parallel(lambda n: self._first_far(base, n, starts[n]), list(starts)), strict=True))
 
-        return dict(zip(starts, in_parallel(begun, list(starts)), strict=True))
+    def _first_far(self, base: LikelihoodFit, names: Names, starts: Starts) -> LikelihoodFit:
+        """Return the first fit of a set from its scores; from far sizes too where no descent from there leads on."""
+        effects = [started(s.effect, s.amplitudes) for s in starts]
+        found = self._looked_far(base, names, effects)
+        if base.names and found.sse < base.sse - WORTH:
+            return found
+        far = from_afar(effects[0], self.library.measured)
+        return min(found, self._looked_far(base, names, far), key=lambda f: f.criterion) if far else found
+
+    def _looked_far(self, base: LikelihoodFit, names: Names, effects: Sequence[Effect]) -> LikelihoodFit:
+        looks = [look(base.model + e, base) for e in effects]
+        if self._following is not None:
+            near = self._follow(base).model
+            first = self._first_followed([near + e for e in effects])
+            self._followed[names] = min(self._followed.get(names, first), first, key=lambda f: f.sse)
+            looks.append(self._maximum(first.model, base.noise, first.unknowns, RESTART_ROUNDS))
+        return min(looks, key=lambda f: f.criterion)
 
     def from_least_squares(self, model: Model) -> LikelihoodFit:
         """Return the fit of a model from its values, by least squares and then with the noise of these fits."""

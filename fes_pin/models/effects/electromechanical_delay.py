@@ -15,7 +15,7 @@ class ElectromechanicalDelay(Effect):
     Source: Cavanagh and Komi, Eur. J. Appl. Physiol. 42 (1979): 10 to 50 ms.
     """
 
-    delay_s: float = parameter(0.01, unit="s", null=0.0, lower=0.0, upper=0.3, scale=0.005)
+    delay_s: float = parameter(0.01, unit="s", null=0.0, lower=0.0, upper=0.3, scale=0.005, grid=(0.01, 0.02, 0.05))
 
     name, stage, signal, rigs = "electromechanical_delay", Stage.MUSCLE, "delay", ("ankle", "muscle")
 
