@@ -75,8 +75,11 @@ def with_beliefs(fitted: LikelihoodFit, believed: Model) -> LikelihoodFit:
 
     A parameter is not identified if half its interval is above twice its value and twice its believed value, and the
     interval holds the latter; or if it ended at a bound and E is the same without. Its estimate would depend on where
-    the fit began. They are held one after another: of two whose ratio is identified, one stays free.
+    the fit began. They are held one after another: of two whose ratio is identified, one stays free. A fit that diverges
+    is returned as it is.
     """
+    if not np.isfinite(normal_equations(fitted.parts).hessian).all():
+        return fitted
     known, ended = believed.parameters(), at_a_bound(fitted, believed)
     vague = [n for n in fitted.free if n in known and _is_vague(fitted, n, known[n])]
     held = {n: known[n] for n in {*vague[:1], *ended}}
