@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from fes_pin.data.counts import WHOLE as OFF_COUNT
 from fes_pin.data.counts import count_of
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
@@ -23,9 +24,10 @@ from fes_pin.identify.problem import Problem, limits_of
 from fes_pin.identify.process_noise import first_guess
 from fes_pin.infer.covariance import least_squares_step
 from fes_pin.infer.held_out import percent_of_spread
-from fes_pin.infer.levels import CONFIDENCE_95, NOTHING_PERCENT, RUNAWAY
+from fes_pin.infer.levels import CONFIDENCE_95, NOTHING_PERCENT, RUNAWAY, UNFELT
 from fes_pin.infer.noise import Noise
 from fes_pin.infer.problem import completed, normal_equations
+from fes_pin.infer.text import WHOLE
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import StateSpaceNoise
 
@@ -35,20 +37,37 @@ FOLLOWING = 30.0
 
 def misfit_percent(fitted: Fit) -> float:
     """Return E of a fit's free simulations of its trials from their fitted initial states, percent."""
-    trials, rig = fitted.trials, fitted.model.rig
-    outputs = dict.fromkeys(n for t in trials for n in rig.outputs(t.kind) if n in t)
-    around = {n: [np.nansum((t[n] - np.nanmean(t[n])) ** 2) for t in trials if n in t] for n in outputs}
-    units = {n: Noise(1.0, (), max(float(np.sqrt(np.sum(a))), 1e-300)) for n, a in around.items()}
-    problem = Problem(fitted.model, trials, units, ())
-    run = problem.innovations(fitted.values, completed(problem.start_unknowns(), fitted.unknowns))
+    trials, squares = fitted.trials, []
+    around = {n: [np.nansum((t[n] - np.nanmean(t[n])) ** 2) for t in trials if n in t] for n in _outputs(fitted)}
+    spread = {n: max(float(np.sum(a)), 1e-300) for n, a in around.items()}
     with np.errstate(all="ignore"):
-        squares = [
-            float(np.sum((v / units[n].std) ** 2))
-            for one in run
-            for n, v in zip(one.outputs, one.values.T, strict=True)
-        ]
-    most = RUNAWAY**2 * len(outputs)
-    return percent_of_spread(np.clip(np.nan_to_num(squares, nan=most, posinf=most), 0.0, most), float(len(outputs)))
+        squares = [float(np.sum(v**2 / spread[n])) for one in _free_errors(fitted) for n, v in one.items()]
+    most = RUNAWAY**2 * len(spread)
+    return percent_of_spread(np.clip(np.nan_to_num(squares, nan=most, posinf=most), 0.0, most), float(len(spread)))
+
+
+def is_rounding(fitted: Fit) -> bool:
+    """Return whether the errors of free simulations are those of arithmetic, or all less than half a count."""
+    if misfit_percent(fitted) < WHOLE * UNFELT**2:
+        return True
+    counts = {n: min(count_of(t[n]) for t in fitted.trials if n in t) for n in _outputs(fitted)}
+    if not all(counts.values()):
+        return False
+    half = {n: (0.5 + OFF_COUNT) * count for n, count in counts.items()}
+    return all(bool(np.all(np.abs(v) <= half[n])) for one in _free_errors(fitted) for n, v in one.items())
+
+
+def _outputs(fitted: Fit) -> list[str]:
+    rig = fitted.model.rig
+    return list(dict.fromkeys(n for t in fitted.trials for n in rig.outputs(t.kind) if n in t))
+
+
+def _free_errors(fitted: Fit) -> list[dict[str, np.ndarray]]:
+    """Return for each trial the errors of its free simulation, by output."""
+    units = {n: Noise(1.0) for n in _outputs(fitted)}
+    problem = Problem(fitted.model, fitted.trials, units, ())
+    run = problem.innovations(fitted.values, completed(problem.start_unknowns(), fitted.unknowns))
+    return [dict(zip(one.outputs, one.values.T, strict=True)) for one in run]
 
 
 def following(model: Model, trials: Sequence[Trial]) -> StateSpaceNoise | None:
@@ -75,8 +94,8 @@ def with_beliefs(fitted: LikelihoodFit, believed: Model) -> LikelihoodFit:
 
     A parameter is not identified if half its interval is above twice its value and twice its believed value, and the
     interval holds the latter; or if it ended at a bound and E is the same without. Its estimate would depend on where
-    the fit began. They are held one after another: of two whose ratio is identified, one stays free. A fit that diverges
-    is returned as it is.
+    the fit began. They are held one after another: of two whose ratio is identified, one stays free. A fit that
+    diverges is returned as it is.
     """
     if not np.isfinite(normal_equations(fitted.parts).hessian).all():
         return fitted

@@ -82,7 +82,7 @@ def test_tests_together_keep_the_level(monkeypatch):
     monkeypatch.setattr(open_set, "Projection", lambda _: None)
     monkeypatch.setattr(open_set, "under_own_noise", lambda *_: SimpleNamespace(parts=()))
 
-    monkeypatch.setattr(tests_of_fit, "misfit_percent", lambda _: 1.0)
+    monkeypatch.setattr(tests_of_fit, "is_rounding", lambda _: False)
     monkeypatch.setattr(tests_of_fit, "rough_fit", lambda *_: SimpleNamespace(sse=1.0))
     monkeypatch.setattr(tests_of_fit, "under_own_noise", lambda one, **_: one)
     monkeypatch.setattr(tests_of_fit, "_features_left", lambda *_: (rng.uniform(), "phase"))

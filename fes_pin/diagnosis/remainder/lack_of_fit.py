@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from fes_pin.diagnosis.remainder.open_set import residual_tests
-from fes_pin.identify.afar import misfit_percent
+from fes_pin.identify.afar import is_rounding
 from fes_pin.identify.fit import rough_fit, under_own_noise
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit
@@ -35,10 +35,10 @@ def lack_of_fit(fitted: LikelihoodFit) -> Remainder:
 
     Where measurement noise may be autoregressive, the residuals of a free simulation are tested too, see
     `remainder.open_set`: process noise would take bursts and detents for its own. The p-value is that of the
-    most significant test, times the number of tests. Errors of free simulations that are those of arithmetic are not
+    most significant test, times the number of tests. Errors of free simulations that are those of rounding are not
     tested.
     """
-    if misfit_percent(fitted) < 100.0 * UNFELT**2:
+    if is_rounding(fitted):
         return Remainder(False, 1.0, None)
     free = rough_fit(fitted.model, fitted.trials) if fitted.noise.ar else None
     if free is not None and math.isfinite(free.sse):
