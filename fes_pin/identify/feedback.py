@@ -72,8 +72,13 @@ def _when_given(drive: np.ndarray, reading: np.ndarray) -> tuple[np.ndarray, np.
 
 
 def _granger(effort: np.ndarray, reading: np.ndarray, order: int) -> tuple[float, float]:
-    """Return the p-value of the readings as predictors of the effort, and their share of its unpredicted variance."""
-    u, y = (_without_jumps(np.diff(x, order)) for x in (effort, reading))
+    """Return the p-value of the readings as predictors of the effort, and their share of its unpredicted variance.
+
+    Pulses that last one sample are not differenced: the differences of each would be as regular as no noise is.
+    """
+    is_held = np.any((effort[1:] != 0.0) & (effort[:-1] != 0.0))
+    u = _without_jumps(np.diff(effort, order) if is_held else effort[order:])
+    y = _without_jumps(np.diff(reading, order))
     n = len(u) - LAGS
     if n < SHORTEST * LAGS or not u.any() or not y.any():
         return 1.0, 0.0

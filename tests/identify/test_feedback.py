@@ -8,7 +8,7 @@ from fes_pin.data.trial import Trial
 from fes_pin.identify import feedback
 from fes_pin.identify.feedback import is_fed_back, is_stimulus_fed_back
 from fes_pin.models.nominal import nominal_model
-from fes_pin.models.rigs import Joint
+from fes_pin.models.rigs import Joint, Muscle
 
 RIG = Joint(constants={"inertia": 0.05, "gravity_cos": 0.0, "gravity_sin": 1.0, "revolute": 1.0}, damping=0.05)
 DT = 0.005
@@ -85,3 +85,15 @@ def test_no_stimulus_that_a_script_wrote_seems_to_answer(shared):
         for _, share in feedback._answers(nominal_model(one).rig, one.trials, feedback.OF_STIMULUS)
     ]
     assert (round(float(np.median(shares)), 2), round(max(shares), 2)) == (0.01, 0.10)
+
+
+@pytest.mark.parametrize("every", [40, 1000])
+def test_pulses_of_one_sample_are_not_taken_for_answers(every):
+    """Readings without noise say how long ago a pulse was, but a muscle that was stimulated chooses none."""
+    stim = (np.arange(750) % every == 54 % every).astype(float)
+    force = np.zeros(750)
+    for k in range(749):
+        force[k + 1] = 0.95 * force[k] + stim[k]
+    rig = Muscle(gain=1.0, time_constant_s=0.05)
+    trials = [Trial("a", "isometric", {"stim": stim, "force_n": force}, np.arange(750) * 0.002)]
+    assert not is_stimulus_fed_back(rig, trials)

@@ -6,6 +6,7 @@ from fes_pin.data.study import Study
 from fes_pin.diagnosis.experiment import NextExperiment, next_experiment
 from fes_pin.diagnosis.held_out import Found
 from fes_pin.diagnosis.search.score import Scored, best_by_effect
+from fes_pin.identify.afar import is_rounding
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.per_trial import amplitude
 from fes_pin.infer.levels import IDENTIFIABLE_SHARE
@@ -39,8 +40,16 @@ def alike_in(found: Found, name: str) -> tuple[str, ...]:
 
 
 def not_excluded(best: LikelihoodFit, rivals: Sequence[LikelihoodFit]) -> list[LikelihoodFit]:
-    """Return the rivals whose criterion or cost is not significantly larger than that of the best set."""
-    return [f for f in rivals if min(f.criterion - best.criterion, f.sse - best.sse) < least_apart(best, f)]
+    """Return the rivals whose criterion or cost is not significantly larger than that of the best set.
+
+    One that predicts the readings to their rounding is none either.
+    """
+
+    def is_near(rival: LikelihoodFit) -> bool:
+        apart = min(rival.criterion - best.criterion, rival.sse - best.sse)
+        return apart < least_apart(best, rival) or is_rounding(rival)
+
+    return [f for f in rivals if is_near(f)]
 
 
 def not_identifiable(best: LikelihoodFit, scored: Sequence[Scored], not_excited: Sequence[str]) -> tuple[str, ...]:

@@ -371,6 +371,20 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         """Return fits, with their parameters, under the noise of another fit of the same trials."""
         return in_parallel(lambda f: at_noise(f, other.noise), fits)
 
+    def converge_rivals(self, names: Names, name: str) -> None:
+        """Converge the rivals of a candidate; where a set without it is far from the data, they begin at its place.
+
+        First fits of rivals extend the set without the candidate. From far off they may end elsewhere.
+        """
+        whole, rest = self.fits[names], tuple(n for n in names if n != name)
+        others = [k for k in self.fits if len(k) == len(names) and set(rest) < set(k) and k != names]
+        if self.is_far(self.fits[rest]) and not self.is_far(whole):
+            less_one = Model(whole.model.rig, tuple(e for e in whole.model.effects if e.name != name))
+            own = [next(e for e in self.fits[k].model.effects if e.name in {*k} - {*rest}) for k in others]
+            looks = in_parallel(lambda e: look(less_one + at_null(e), whole), own)
+            self.fits |= {k: f for k, f in zip(others, looks, strict=True) if f.criterion < self.fits[k].criterion}
+        super().converge_rivals(names, name)
+
     def step_gain(self, fitted: LikelihoodFit) -> float:
         """Return the gain of a further step of a fit by its slope and curvature; 0 where it has converged."""
         if fitted.gradient_norm < LITTLE or not math.isfinite(fitted.sse):

@@ -17,12 +17,15 @@ STARTED = 0.5
 """Share of the largest score from which a shape is fitted, and of the gain that a form needs, from which it is."""
 TINY = 1e-6
 """Share of an amplitude's scale at which a one-sided effect is linearized: next to its null, on its own side."""
+LATE = 0.02
+"""The same of a lag, s, which must not vanish within a sample."""
 
 
 def near_null(effect: type[Effect], name: str) -> float:
     """Return the null of an amplitude, or a value next to it where the null is a bound."""
     info, null = effect.parameters()[name], effect.nulls()[name]
-    return null + (TINY * info.scale if null in {info.lower, info.upper} else 0.0)
+    share = LATE if info.unit == "s" else TINY
+    return null + (share * info.scale if null in {info.lower, info.upper} else 0.0)
 
 
 def from_afar(effect: Effect, measured: Mapping[str, np.ndarray]) -> list[Effect]:
