@@ -282,13 +282,21 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
             for names in self.ranked(len(best))[:NEAREST]:
                 self.extend(names, FITTED if names else None)
             larger = [n for n in self.ranked(len(best) + 1) if self.is_possible(fits[n])]
+            if best and larger and self.is_far(fits[larger[0]]):
+                in_parallel(self._refine, larger[:NEAREST])
+                larger.sort(key=lambda n: fits[n].criterion)
             if not larger or self.misfit(fits[larger[0]]) > (1.0 - SMALL_SHARE) * self.misfit(fits[best]):
                 break
             best = larger[0]
-        refined = refined_form(fits[best], self.library.measured) if best else None
-        if refined is not None and MORE * self.misfit(refined) < self.misfit(fits[best]):
-            fits[best] = refined
+        if best:
+            self._refine(best)
         return best
+
+    def _refine(self, names: Names) -> None:
+        """Replace the fit of a set by that of a refined form where E is half as large."""
+        refined = refined_form(self.fits[names], self.library.measured)
+        if refined is not None and MORE * self.misfit(refined) < self.misfit(self.fits[names]):
+            self.fits[names] = refined
 
     def _begin_far(self, base: LikelihoodFit, starts: Mapping[Names, Starts]) -> dict[Names, LikelihoodFit]:
         """Return first fits of sets that extend one far from the data: by least squares, begun by a filter."""
