@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -12,10 +12,7 @@ from fes_pin.allocation.problem import AllocationProblem, OfProblem
 from fes_pin.data.named import NamedArray
 from fes_pin.data.numbers import known_word
 from fes_pin.data.read_only import ReadOnly
-from fes_pin.data.show import frame, table_html
-
-if TYPE_CHECKING:
-    import pandas
+from fes_pin.data.show import DataFrame, frame, table_html
 
 REPORTED_NM = 0.5
 """A shortfall is put in words from this size on, N m."""
@@ -39,7 +36,7 @@ class ByName(OfProblem):
         """Achieved torque of a joint, N m: a number, or (samples,)."""
         return NamedArray(self.achieved, self.joints)[known_word(joint, self.joints, "joint")]
 
-    def to_frame(self) -> pandas.DataFrame:
+    def to_frame(self) -> DataFrame:
         """Pulse widths, us, a row each sample, a column each channel, as a frame of pandas; see `data.show.frame`."""
         return frame(dict(NamedArray(self.pulse_width_us, self.names).items()))
 
@@ -177,12 +174,12 @@ class Allocation(ByName, ReadOnly):
             return f"more {by_name[i]} is not worth its effort"
         return f"more {by_name[i]} would spoil {self.joints[k].replace('_', ' ')}"
 
-    def to_frame(self) -> pandas.DataFrame:
+    def to_frame(self) -> DataFrame:
         """Pulse width, us, recruitment and what holds it at a limit, a row each channel, as a frame of pandas."""
         columns = {"channel": self.names, "pulse_width_us": self.pulse_width_us, "recruitment": self.recruitment}
         return frame({**columns, "limit": [self.limit(i) for i in range(len(self.names))]}, "channel")
 
-    def torques(self) -> pandas.DataFrame:
+    def torques(self) -> DataFrame:
         """Torque wanted, achieved, and achieved by the weakest and strongest muscles likely, N m, a row each joint."""
         least, most = np.sort(self.achieved_band, axis=0)
         columns = {"joint": self.joints, "wanted": self.wanted, "achieved": self.achieved}

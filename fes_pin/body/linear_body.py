@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy.linalg import eigh, null_space
@@ -21,11 +21,8 @@ from fes_pin.body.modes import Mode, ModeSet, mode_name
 from fes_pin.data.errors import InputError
 from fes_pin.data.named import NamedArray
 from fes_pin.data.numbers import known_word
-from fes_pin.data.show import frame
+from fes_pin.data.show import DataFrame, frame
 from fes_pin.data.tabulated import Tabulated
-
-if TYPE_CHECKING:
-    import pandas
 
 _RANK = 1e-9
 """Singular values below this part of the largest are rounding: the second foot's rows are of order 1."""
@@ -147,7 +144,7 @@ class LinearBody(Tabulated):
     def _table(self) -> dict[str, Any]:
         return {"joint": list(self.joint_names), "angle_rad": self.q.tolist(), "holding_nm": (-self.C).tolist()}
 
-    def to_frame(self, matrix: str | None = None) -> pandas.DataFrame:
+    def to_frame(self, matrix: str | None = None) -> DataFrame:
         """Angles and holding torques by joint as a frame of pandas, or one of the matrices with its names.
 
         Parameters

@@ -14,7 +14,6 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.linalg
@@ -23,11 +22,8 @@ from fes_pin.control.dynamics import PULSE_S, AnkleDynamics
 from fes_pin.control.given import GivenAnkle, Sampled, held
 from fes_pin.control.observer import JointObserver
 from fes_pin.data.errors import InputError
-from fes_pin.data.show import frame
+from fes_pin.data.show import DataFrame, frame
 from fes_pin.data.tabulated import Tabulated
-
-if TYPE_CHECKING:
-    import pandas
 
 DEGREE = math.pi / 180.0
 LADDER = (0.5, 0.35, 0.25, 0.18, 0.12, 0.08, 0.05, 0.03)
@@ -73,7 +69,7 @@ class Gains(Tabulated):
         if self.table.shape[1:] != (3,) or len(self.angles) < 2 or not (np.diff(self.angles) > 0.0).all():
             raise InputError("expected two or more rising angles, and three gains for each", column="table")
 
-    def to_frame(self) -> pandas.DataFrame:
+    def to_frame(self) -> DataFrame:
         """The gains by angle as a frame of pandas, a row an angle."""
         names = ("of_activation", "of_angle_per_rad", "of_rate_s_per_rad")
         columns = {n: self.table[:, k] for k, n in enumerate(names)}

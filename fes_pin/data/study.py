@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path, PurePosixPath
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import tomli_w
 
@@ -42,14 +42,11 @@ from fes_pin.data.schema import (
     positive,
     schema_of,
 )
-from fes_pin.data.show import by_columns, frame, table_html
+from fes_pin.data.show import DataFrame, by_columns, frame, table_html
 from fes_pin.data.study_tables import HORIZON, StudyTables, check_files
 from fes_pin.data.table import format_csv
 from fes_pin.data.toml import Document, document_of, read_toml
 from fes_pin.data.trial import LOW_PASS, POSITIVE_HZ, Trial, check_trial, read_body_trial, read_trial, trial_csv
-
-if TYPE_CHECKING:
-    import pandas
 
 EDITED = "edited after it was read"
 """What stands in the place of a hash of a file that is no longer what its study holds."""
@@ -289,7 +286,7 @@ class Study(ReadOnly):
         ]
         return table_html(repr(self), head, rows)
 
-    def to_frame(self) -> pandas.DataFrame:
+    def to_frame(self) -> DataFrame:
         """One row a trial, with its conditions, as a frame of pandas; see `data.show.frame`."""
         conditions = dict.fromkeys(n for t in self.trials for n in t.conditions)
         head = ("trial", "kind", "role", "group", "samples", "duration_s", *conditions)

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import numbers
 from fes_pin.data.read_only import ReadOnly
-from fes_pin.data.show import frame, table_html
-
-if TYPE_CHECKING:
-    import pandas
+from fes_pin.data.show import DataFrame, frame, table_html
 
 
 class Tabulated(ReadOnly):
@@ -55,7 +52,7 @@ class Tabulated(ReadOnly):
             return {n: getattr(self, n) for n in self.along}
         return {n: [v] for n, v in self._values().items() if isinstance(v, int | float)}
 
-    def to_frame(self) -> pandas.DataFrame:
+    def to_frame(self) -> DataFrame:
         """The columns that share their first axis, or without any the numbers, as a frame of pandas.
 
         Raises

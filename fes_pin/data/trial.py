@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -29,12 +29,8 @@ from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.recorded.columns import Columns
 from fes_pin.data.recorded.sniff import NEW_STUDY, read_csv_or_hint
 from fes_pin.data.schema import NumberKey, RigSchema, check_conditions, checked_numbers, number_or_none, schema_of
-from fes_pin.data.show import frame
+from fes_pin.data.show import DataFrame, frame
 from fes_pin.data.table import MIN_ROWS, Table, check_time, check_times, format_csv
-
-if TYPE_CHECKING:
-    import pandas
-
 
 LOW_PASS = "low_pass_hz"
 POSITIVE_HZ = NumberKey("Hz", 0.0, required=False)
@@ -270,7 +266,7 @@ class Trial(ReadOnly):
             raise error("time_s", "missing; expected a column of times or an index of them")
         return cls(name, kind, columns, time, **labels)
 
-    def to_frame(self) -> pandas.DataFrame:
+    def to_frame(self) -> DataFrame:
         """Every column against `time_s` as a frame of pandas; see `data.show.frame`."""
         return frame({"time_s": self.time, **self.columns}, index="time_s")
 
