@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from functools import partial
 from typing import Any
@@ -180,6 +180,28 @@ class RigSchema(ReadOnly):
             free = (n for one, n in self.outputs.items() if one != IMPOSED)
             named = (*self.inputs, *free, *self.optional)
         return ("time_s", *dict.fromkeys(named))
+
+    def kind_of(self, kind: object, error: KeyFault) -> str:
+        """The kind of a trial of this rig; the rig's default if it names none.
+
+        Raises
+        ------
+        InputError
+            Made by `error` from the key and a message, for a kind that the rig does not have.
+        """
+        if kind is None:
+            return self.default_kind
+        if not isinstance(kind, str) or kind not in self.outputs:
+            found = f"{kind[:40]!r}" if isinstance(kind, str) else f"a {type(kind).__name__}"
+            expected = f"{'one of ' if len(self.outputs) > 1 else ''}{', '.join(self.outputs)}"
+            raise error("kind", f"expected {expected} for rig {self.name}, found {found}")
+        return kind
+
+    @property
+    def known_constants(self) -> dict[str, NumberKey]:
+        """The keys of a study's [rig]: the rig's constants, and where it may be so its start values that are known."""
+        start = self.start if self.start_may_be_known else {}
+        return {**self.constants, **{key: replace(number, required=False) for key, number in start.items()}}
 
 
 START_S = {"start_s": any_number("s", required=False)}
