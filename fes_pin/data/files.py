@@ -7,6 +7,7 @@ import shutil
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from itertools import takewhile
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -338,14 +339,10 @@ def _target(folder: Path, name: str) -> Path:
 
 def _make_folder(folder: Path) -> Path | None:
     """Make a folder; the topmost one that had to be made, to remove it again."""
-    made = None
-    for parent in (folder, *folder.parents):
-        if parent.exists():
-            break
-        made = parent
-    if made is not None:
+    new = list(takewhile(lambda one: not one.exists(), (folder, *folder.parents)))
+    if new:
         folder.mkdir(parents=True, exist_ok=True)
-    return made
+    return new[-1] if new else None
 
 
 def _stage(path: Path, content: bytes, mode: int = 0o666) -> Path:

@@ -202,11 +202,9 @@ def _units(study: Study | ToPredict) -> Iterable[str]:
 def _imposed(study: Study | ToPredict) -> Iterable[str]:
     """Remarks on imposed motions; a motion that never moves is an InputError."""
     trials = [t for t in study.trials if t.kind == IMPOSED]
-    if not trials:
+    if not trials or isinstance(study, ToPredict):
         return
     name = study.schema.imposed[0]
-    if isinstance(study, ToPredict):
-        return
     motions = [imposed_motion(t, study.schema.imposed) for t in trials]
     ends = [(float(m.values[0].min()), float(m.values[0].max())) for m in motions]
     moved = max(high for _, high in ends) - min(low for low, _ in ends)
