@@ -214,10 +214,9 @@ class Body:
         outside = (q < low - _LIMIT_SLACK) | (q > high + _LIMIT_SLACK)
         if check and outside.any():
             i = int(np.argmax(outside))
-            raise InputError(
-                f"{self.joint_names[i]} = {np.degrees(q[i]):.1f} deg is outside its limits "
-                f"{np.degrees(low[i]):.0f} to {np.degrees(high[i]):.0f} deg"
-            )
+            angle, least, most = np.degrees([q[i], low[i], high[i]])
+            found = f"{self.joint_names[i]} = {angle:.1f} deg"
+            raise InputError(f"{found} is outside its limits {least:.0f} to {most:.0f} deg")
         return q
 
     def rates(self, values: Mapping[str, float] | Sequence[float] | np.ndarray | None) -> NamedArray:

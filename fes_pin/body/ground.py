@@ -228,10 +228,8 @@ def second_foot(body: Body, model: pin.Model, q: np.ndarray) -> SecondFoot:
     first, second = (_foot(body, q, each) for each in (body.stance, side))
     tilt, height = np.degrees(np.arccos(np.clip(second.turn[2, 2], -1.0, 1.0))), second.place[2]
     if tilt > FLAT_DEG or abs(height) > LEVEL_M:
-        raise InputError(
-            f"the {side} forefoot is not on the ground: it is tilted by {tilt:.1f} deg and {100 * height:+.1f} cm high",
-            column="both_feet",
-        )
+        lies = f"it is tilted by {tilt:.1f} deg and {100 * height:+.1f} cm high"
+        raise InputError(f"the {side} forefoot is not on the ground: {lies}", column="both_feet")
     data = model.createData()
     com = pin.centerOfMass(model, data, q).copy()
     pin.computeJointJacobians(model, data, q)

@@ -21,17 +21,12 @@ from fes_pin.body.modes import Mode, ModeSet, mode_name
 from fes_pin.data.errors import InputError
 from fes_pin.data.named import NamedArray
 from fes_pin.data.numbers import known_word
+from fes_pin.data.read_only import held
 from fes_pin.data.show import DataFrame, frame
 from fes_pin.data.tabulated import Tabulated
 
 _RANK = 1e-9
 """Singular values below this part of the largest are rounding: the second foot's rows are of order 1."""
-
-
-def _fixed(array: np.ndarray) -> np.ndarray:
-    """An array that cannot be changed."""
-    array.setflags(write=False)
-    return array
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,12 +92,12 @@ class LinearBody(Tabulated):
     @cached_property
     def basis(self) -> np.ndarray:
         """Columns that span the deviations that the ground allows: (n, r), orthonormal."""
-        return _fixed(np.eye(self.n) if self.closure is None else null_space(self.closure, rcond=_RANK))
+        return held(np.eye(self.n) if self.closure is None else null_space(self.closure, rcond=_RANK))
 
     @cached_property
     def mobility(self) -> np.ndarray:
         """Acceleration of each joint per torque at each: (n, n), 1/(kg m2); A^-1 on one foot."""
-        return _fixed(self.basis @ np.linalg.solve(self.basis.T @ self.A @ self.basis, self.basis.T))
+        return held(self.basis @ np.linalg.solve(self.basis.T @ self.A @ self.basis, self.basis.T))
 
     @property
     def conservative(self) -> bool:
@@ -117,12 +112,12 @@ class LinearBody(Tabulated):
         F[:n, n:] = np.eye(n)
         F[n:, :n] = self.mobility @ self.B
         F[n:, n:] = -self.mobility @ self.E
-        return _fixed(F)
+        return held(F)
 
     @cached_property
     def R(self) -> np.ndarray:
         """Input matrix of equation (11) for u = C + D: (2n, n)."""
-        return _fixed(np.vstack([np.zeros((self.n, self.n)), self.mobility]))
+        return held(np.vstack([np.zeros((self.n, self.n)), self.mobility]))
 
     @property
     def holding_torque(self) -> dict[str, float]:

@@ -163,10 +163,8 @@ def fewest_goniometers(
     whole = observability(linear, names)
     rows = [i for i, mode in enumerate(whole.modes) if mode.kind == "fall"]
     if whole.worst_deg > within_deg or not np.all(whole.observable[rows]):
-        raise InputError(
-            f"these joints leave a fall uncertain by {whole.worst_deg:.2g} degrees, more than {within_deg:g}: "
-            "they do not see every falling mode"
-        )
+        found = f"these joints leave a fall uncertain by {whole.worst_deg:.2g} degrees, more than {within_deg:g}"
+        raise InputError(f"{found}: they do not see every falling mode")
     for size in range(1, len(names) + 1):
         sets: list[ModalObservability] = []
         combinations = itertools.combinations(range(len(names)), size)

@@ -84,9 +84,8 @@ def plant(dynamics: AnkleDynamics, q: float) -> tuple[np.ndarray, np.ndarray, fl
     """The joint held at an angle, from pulse to pulse, its frame at rest: transition (4, 4) of (activation, angle,
     rate, torque), input (4,), and torque that full activation makes.
     """
-    a, b = held(
-        dynamics.linear(q, dynamics.activation_for(q), 1.0)[:4, :4], np.eye(4)[0] / dynamics.time_constant, PULSE_S
-    )
+    f = dynamics.linear(q, dynamics.activation_for(q), 1.0)[:4, :4]
+    a, b = held(f, np.eye(4)[0] / dynamics.time_constant, PULSE_S)
     return a, b, dynamics.pull_nm * math.sin(q)
 
 

@@ -110,9 +110,8 @@ class Trial(ReadOnly):
         return self.error(message, key)
 
     def __hash__(self) -> int:
-        return hash(
-            (self.name, self.kind, len(self), frozenset(self.columns), float(self.time[0]), float(self.time[-1]))
-        )
+        ends = float(self.time[0]), float(self.time[-1])
+        return hash((self.name, self.kind, len(self), frozenset(self.columns), *ends))
 
     def __len__(self) -> int:
         return len(self.time)
