@@ -187,10 +187,8 @@ class Allocation(ByName, ReadOnly):
 
     def _repr_html_(self) -> str:
         held = self.active
-        rows = [
-            (name, f"{width:.0f} us", f"{r:.3f}", held.get(name, ""))
-            for name, width, r in zip(self.names, self.pulse_width_us, self.recruitment, strict=True)
-        ]
+        each = zip(self.names, self.pulse_width_us, self.recruitment, strict=True)
+        rows = [(name, f"{width:.0f} us", f"{r:.3f}", held.get(name, "")) for name, width, r in each]
         return table_html("Allocation", ("channel", "pulse width", "recruitment", ""), rows, str(self).splitlines()[1:])
 
     def as_dict(self) -> dict[str, Any]:
@@ -229,18 +227,12 @@ class Allocation(ByName, ReadOnly):
         return [f"with {weak:.2g} to {strong:.2g} of the strength assumed: {', '.join(parts)}"]
 
     def __str__(self) -> str:
-        on = [
-            f"{name.replace('_', ' ')} {width:.0f} us"
-            for name, width in zip(self.names, self.pulse_width_us, strict=True)
-            if width > 0.0
-        ]
+        each = zip(self.names, self.pulse_width_us, strict=True)
+        on = [f"{name.replace('_', ' ')} {width:.0f} us" for name, width in each if width > 0.0]
         lines = [", ".join(on) or "nothing stimulated", *(self.reasons or ["every torque within 0.5 N m"])]
         lines += [*self.band_lines(), *self.held]
-        proof = (
-            f"optimal to {max(self.certificate.residual, 0.0):.0e}"
-            if self.problem.least is None
-            else f"gap {self.gap:.0e}"
-        )
+        residual, is_exact = max(self.certificate.residual, 0.0), self.problem.least is None
+        proof = f"optimal to {residual:.0e}" if is_exact else f"gap {self.gap:.0e}"
         return "\n".join([*lines, f"{proof}{'; ' + self.note if self.note else ''}"])
 
 

@@ -106,9 +106,8 @@ class AttainableTorques:
             return np.inf
         n, size = self.columns.shape[1], float(np.abs(wanted).max())
         equal = np.column_stack([self.columns, -wanted / size])
-        result = linprog(
-            np.r_[np.zeros(n), -1.0], A_eq=equal, b_eq=np.zeros(len(wanted)), bounds=[(0, 1)] * n + [(0, None)]
-        )
+        bounds = [(0, 1)] * n + [(0, None)]
+        result = linprog(np.r_[np.zeros(n), -1.0], A_eq=equal, b_eq=np.zeros(len(wanted)), bounds=bounds)
         return float(result.x[-1] / size) if result.success else 0.0
 
     def outline(self, first: str, second: str) -> np.ndarray:

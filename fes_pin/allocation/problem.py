@@ -303,8 +303,7 @@ def recruitment_limits(options: Options, names: tuple[str, ...]) -> tuple[np.nda
     never = (lower > 0.0) & (least > upper)
     if never.any():
         i = int(np.argmax(never))
-        raise InputError(
-            f"{names[i]} may not be off, for its lower limit is {lower[i]:g}, and not on, for its upper limit "
-            f"{upper[i]:g} lies below its least recruitment {least[i]:g}"
-        )
+        off = f"may not be off, for its lower limit is {lower[i]:g}"
+        on = f"not on, for its upper limit {upper[i]:g} lies below its least recruitment {least[i]:g}"
+        raise InputError(f"{names[i]} {off}, and {on}")
     return lower, upper, least

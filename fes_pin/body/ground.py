@@ -85,9 +85,8 @@ class Wrench(ReadOnly):
 
     def on(self, places: Sequence[int]) -> Wrench:
         """With these of the joints alone."""
-        return Wrench(
-            self.at_rest, self.per_angle[:, places], self.per_acceleration[:, places], self.per_torque[:, places]
-        )
+        moving = (self.per_angle, self.per_acceleration, self.per_torque)
+        return Wrench(self.at_rest, *(part[:, places] for part in moving))
 
     def __sub__(self, other: Wrench) -> Wrench:
         """Return this wrench minus another one."""
@@ -113,12 +112,8 @@ def ground_wrench(body: Body, model: pin.Model, q: np.ndarray) -> Wrench:
     force, moment = -(mass + foot.mass) * g, np.cross(data.com[0], weight) - np.cross(foot.lever, foot.mass * g)
     along = np.cross(jacobian.T, weight).T
     turning = momentum[3:] + mass * np.cross(data.com[0], jacobian.T).T
-    return Wrench(
-        np.concatenate([force, moment]),
-        np.vstack([np.zeros((3, model.nv)), along]),
-        np.vstack([mass * jacobian, turning]),
-        np.zeros((6, model.nv)),
-    )
+    per_angle, per_acceleration = np.vstack([np.zeros_like(jacobian), along]), np.vstack([mass * jacobian, turning])
+    return Wrench(np.concatenate([force, moment]), per_angle, per_acceleration, np.zeros((6, model.nv)))
 
 
 def centre_of_pressure(wrench: np.ndarray) -> np.ndarray:

@@ -174,10 +174,8 @@ class LinearBody(Tabulated):
         shares = np.abs(shapes * (self.A @ shapes))
         shares /= shares.sum(axis=0)
         names, stance = self.joint_names, self.body.stance
-        named = tuple(
-            Mode(float(value), shape, names, share, mode_name(float(value), share, names, stance))
-            for value, shape, share in zip(values, shapes.T, shares.T, strict=True)
-        )
+        each = zip(values.tolist(), shapes.T, shares.T, strict=True)
+        named = tuple(Mode(v, shape, names, share, mode_name(v, share, names, stance)) for v, shape, share in each)
         return ModeSet(named, values, shapes, self.conservative)
 
     def poles(self) -> np.ndarray:
@@ -230,7 +228,5 @@ class LinearBody(Tabulated):
         if self.both_feet:
             return f"Linearized {self.body}, both feet on the ground{slope}{held}: {self.n} joints"
         worst = int(np.argmax(np.abs(self.C)))
-        return (
-            f"Linearized {self.body}{slope}{held}: {self.n} joints; "
-            f"largest torque to hold it {-self.C[worst]:+.1f} N m at {self.joint_names[worst]}"
-        )
+        largest = f"{-self.C[worst]:+.1f} N m at {self.joint_names[worst]}"
+        return f"Linearized {self.body}{slope}{held}: {self.n} joints; largest torque to hold it {largest}"

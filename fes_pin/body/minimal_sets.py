@@ -92,10 +92,8 @@ class MinimalSet:
         price = f"; energy {self.energy:.2g} s, condition {self.condition:.1e}" if self.falls else ""
         if self.equals > 1:
             price += f"; {'at least ' * (self.equals == MOST_SETS)}{self.equals} sets of this size do"
-        return (
-            f"{len(self.inputs):2d} nerves ({self.locked_joints} joints locked, {self.falls} falls): "
-            f"{', '.join(self.inputs) or '-'}; {further}; {able}{price}"
-        )
+        count = f"{len(self.inputs):2d} nerves ({self.locked_joints} joints locked, {self.falls} falls)"
+        return f"{count}: {', '.join(self.inputs) or '-'}; {further}; {able}{price}"
 
 
 def minimal_sets(
@@ -158,9 +156,8 @@ def minimal_sets(
     InputError
         Unknown brace, joint or stimulation, negative number, a lean that is not positive and finite.
     """
-    asked = _Question(
-        positive_number(lean_deg, "lean_deg"), together, gravity, settle_deg, stimulation, balance, strength_factor
-    )
+    lean_deg = positive_number(lean_deg, "lean_deg")
+    asked = _Question(lean_deg, together, gravity, settle_deg, stimulation, balance, strength_factor)
     max_braces, alternatives = whole(max_braces, "max_braces"), whole(alternatives, "alternatives", 1)
     inputs = Inputs.of(inputs, linear)
     orthoses = _orthoses(braces)

@@ -88,9 +88,8 @@ def observability(linear: LinearBody, sensors: Iterable[str]) -> ModalObservabil
         if name not in linear.joint_names:
             raise InputError(f"{name!r} is braced: nothing moves there")
     rows = _angles(linear, found, names)
-    return ModalObservability(
-        found, names, rows, independent(found.values, rows), _posteriors(found.modes, rows[None])[0]
-    )
+    (left,) = _posteriors(found.modes, rows[None])
+    return ModalObservability(found, names, rows, independent(found.values, rows), left)
 
 
 def _angles(linear: LinearBody, found: ModeSet, names: Sequence[str]) -> np.ndarray:

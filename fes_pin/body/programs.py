@@ -70,14 +70,9 @@ class LinearProgram:
         if not len(self.cost):
             kept = np.all(self.b_ub >= -FEASIBLE) and np.all(np.abs(self.b_eq) <= FEASIBLE)
             return ProgramAnswer(np.zeros(0) if kept else None, 0.0)
-        found = linprog(
-            self.cost,
-            A_ub=sparse.csr_array(self.A_ub),
-            b_ub=self.b_ub,
-            A_eq=sparse.csr_array(self.A_eq),
-            b_eq=self.b_eq,
-            bounds=np.column_stack([self.lower, self.upper]),
-        )
+        most, equal = (sparse.csr_array(rows) for rows in (self.A_ub, self.A_eq))
+        bounds = np.column_stack([self.lower, self.upper])
+        found = linprog(self.cost, most, self.b_ub, equal, self.b_eq, bounds)
         if found.status != 0:
             return ProgramAnswer(None, np.inf, unbounded=found.status == 3)
         return ProgramAnswer(found.x, self._error(found))

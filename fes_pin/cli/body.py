@@ -43,9 +43,8 @@ def _body_options(
     elif segments is not None:
         body = Body.from_segments(segments, stance or "right")
     else:
-        body = Body.from_subject(
-            72.6 if mass is None else mass, 1.80 if height is None else height, sex or "male", stance or "right"
-        )
+        kg, m = 72.6 if mass is None else mass, 1.80 if height is None else height
+        body = Body.from_subject(kg, m, sex or "male", stance or "right")
     legs = PassiveLegs(passive) if between(passive, 0.0, 10.0, "--passive") else None
     linear = linearize(body, posture, slope, passive=legs)
     joints = [joint for name in brace or [] for joint in ORTHOSES.get(name, (name,))]
@@ -166,10 +165,8 @@ def _fewest(linear, inputs, lean: float, max_braces: int, stimulation: str, sett
     found = pareto(found) if max_braces else found
     what = "catch, over time," if stimulation == "over_time" else "hold, stimulated constantly,"
     none = "none of these nerves' sets does; brace more joints (--brace corset ...)"
-    return [
-        f"\nFewest nerves that keep the posture and {what} a lean of {lean:g} degrees in every fall:",
-        *(map(str, found) if found else [none]),
-    ]
+    title = f"\nFewest nerves that keep the posture and {what} a lean of {lean:g} degrees in every fall:"
+    return [title, *(map(str, found) if found else [none])]
 
 
 @app.command()

@@ -174,12 +174,8 @@ def _run_by_group(command: Callable[..., Any]) -> Callable[..., Any]:
 
 def _check_needs(ctx: typer.Context, words: Mapping[str, str], rules: Mapping[str, str]) -> None:
     """Refuse options that another one, or its absence, leaves no meaning."""
-    given = {
-        name
-        for name in words
-        if getattr(ctx.get_parameter_source(name), "name", "DEFAULT") != "DEFAULT"
-        and ctx.params.get(name) not in (None, (), [])
-    }
+    said = [name for name in words if getattr(ctx.get_parameter_source(name), "name", "DEFAULT") != "DEFAULT"]
+    given = {name for name in said if ctx.params.get(name) not in (None, (), [])}
     for name, rule in rules.items():
         others = rule.removeprefix("not ").split()
         there = [n for n in others if n in given]

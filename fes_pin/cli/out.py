@@ -76,9 +76,8 @@ def _stimulated(path: Path) -> Trial:
     from fes_pin.data.trial import read_trial
 
     names = set(read_csv_or_hint(path).names)
-    kinds = [
-        (one, kind) for one in known_rigs().values() for kind in one.outputs if set(PULSES) & set(one.stimuli(kind))
-    ]
-    fits = [(one, kind) for one, kind in kinds if names <= set(one.columns_of(kind))]
+    kinds = [(one, kind) for one in known_rigs().values() for kind in one.outputs]
+    pulsed = [(one, kind) for one, kind in kinds if set(PULSES) & set(one.stimuli(kind))]
+    fits = [(one, kind) for one, kind in pulsed if names <= set(one.columns_of(kind))]
     schema, kind = fits[0] if fits else (schema_of("muscle"), None)
     return read_trial(path, rig=replace(schema, needed={}), kind=kind, inputs_only=True)

@@ -85,11 +85,8 @@ def _cause(study: str, cause: Mapping[str, Any]) -> list[Row]:
 def nominal_rows(one: Kept) -> list[Row]:
     """Return every parameter of an extended model but those of its causes: what all studies have."""
     known = one.record.get("extended", {}).get("parameters", {})
-    return [
-        {"cause": "", "parameter": n, "value": _number(v["value"]), "std": _number(v["std"])}
-        for n, v in known.items()
-        if "." not in n
-    ]
+    nominal = ((n, {k: _number(v[k]) for k in ("value", "std")}) for n, v in known.items() if "." not in n)
+    return [{"cause": "", "parameter": name, **value} for name, value in nominal]
 
 
 def by_parameter(rows: Iterable[Row]) -> dict[tuple[str, str], list[Row]]:

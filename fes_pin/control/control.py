@@ -380,17 +380,15 @@ class PositionController:
         """
         lines = [self.watch.warning] if self.watch is not None and self.watch.warning else []
         if self.beyond_rad > FARTHEST_BEYOND_RAD:
-            lines.append(
-                f"the reference lies up to {math.degrees(self.beyond_rad):.1f} degrees beyond what the muscle is asked "
-                f"for with this load, {self.lowest:.2f} to {self.highest:.2f} rad: the joint is held within that"
-            )
+            beyond = f"the reference lies up to {math.degrees(self.beyond_rad):.1f} degrees beyond"
+            asked = f"what the muscle is asked for with this load, {self.lowest:.2f} to {self.highest:.2f} rad"
+            lines.append(f"{beyond} {asked}: the joint is held within that")
         if self.paused_s:
             lines.append(f"the calls paused for {self.paused_s:.3g} s: stimulation begins again with the joint at rest")
         if self.calm < 1.0:
-            lines.append(
-                f"the loop swung by itself at {self.swings.frequency_hz:.1f} Hz and was calmed to "
-                f"{100 * self.calm:.0f} %: the model lacks something, such as the frame; diagnose trials of this rig"
-            )
+            swung = f"the loop swung by itself at {self.swings.frequency_hz:.1f} Hz and was calmed to"
+            why = "the model lacks something, such as the frame; diagnose trials of this rig"
+            lines.append(f"{swung} {100 * self.calm:.0f} %: {why}")
         return "; ".join(lines)
 
     def _reach(self) -> None:

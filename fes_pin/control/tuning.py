@@ -211,11 +211,8 @@ def tune(dynamics: AnkleDynamics, observer: JointObserver, given: GivenAnkle | N
         observer.torque_wander = share * quickest
         steady = [observer.steady_gain(believed[0]) for _, believed in places]
         for boldness, table in zip(LADDER, tables, strict=True):
-            loops = [
-                Loop.of(truth, believed, k, see)
-                for (truths, believed), k, see in zip(places, table[::2], steady, strict=True)
-                for truth in truths
-            ]
+            each = zip(places, table[::2], steady, strict=True)
+            loops = (Loop.of(truth, at, k, see) for (truths, at), k, see in each for truth in truths)
             worst = max(loop.radius() for loop in loops)
             tried.append(Gains(angles, table, boldness, worst, observer.torque_wander))
         if min(g.radius for g in tried) < 1.0 and not dynamics.frame_coupling:
@@ -227,10 +224,9 @@ def tune(dynamics: AnkleDynamics, observer: JointObserver, given: GivenAnkle | N
         return best
     frame = f" with its frame at {dynamics.frame_hz:.3g} Hz" if dynamics.frame_coupling else ""
     frame += f" with {', '.join(given.names)}" if given is not None else ""
-    raise InputError(
-        f"no gains hold this ankle{frame} over +-{100 * UNCERTAINTY:.0f} % in gain, time constant and stiffness: "
-        f"at best its swing grows by {100 * (least - 1.0):.2g} % a pulse"
-    )
+    wide = f"over +-{100 * UNCERTAINTY:.0f} % in gain, time constant and stiffness"
+    grows = f"at best its swing grows by {100 * (least - 1.0):.2g} % a pulse"
+    raise InputError(f"no gains hold this ankle{frame} {wide}: {grows}")
 
 
 def _truths(dynamics: AnkleDynamics, q: float, given: GivenAnkle | None) -> list[Sampled]:

@@ -89,9 +89,8 @@ def implausible(study: Study | ToPredict) -> list[str]:
     done = [(t, remark) for t in study.trials for remark in t.remarks]  # to samples, when they were read
     warnings = [*_each("", done), *_inputs(study), *_units(study), *_imposed(study)]
     outputs = tuple(dict.fromkeys((*study.schema.outputs.values(), "velocity")))
-    measured = [
-        (t, n) for t in study.trials for n in outputs if n in t and n not in study.schema.driving(t.kind, t.columns)
-    ]
+    driving = study.schema.driving
+    measured = [(t, n) for t in study.trials for n in outputs if n in t and n not in driving(t.kind, t.columns)]
     constant = [(t, n) for t, n in measured if not np.ptp(t[n]) > 0.0]
     _check_counts(study, [one for one in measured if one not in constant])
     if len(constant) == len(measured) and not isinstance(study, ToPredict):

@@ -78,10 +78,8 @@ def _spikes(x: np.ndarray, length: int) -> np.ndarray:
         middle = slice(LINE - CUBIC, LINE + CUBIC)
         weights = [_weights(at[middle], inside, 3), _weights(at[:LINE], inside, 1), _weights(at[LINE:], inside, 1)]
         sample = x[inside : inside + count]
-        here, before, after = (
-            sample - sum(w * s for w, s in zip(ws, part, strict=True))
-            for ws, part in zip(weights, (sides[middle], sides[:LINE], sides[LINE:]), strict=True)
-        )
+        parts = zip(weights, (sides[middle], sides[:LINE], sides[LINE:]), strict=True)
+        here, before, after = (sample - sum(w * s for w, s in zip(*part, strict=True)) for part in parts)
         hit &= np.sign(here) * np.sign(before) > 0
         hit &= np.sign(here) * np.sign(after) > 0
         hit &= np.abs(before - after) < np.minimum(np.abs(before), np.abs(after))

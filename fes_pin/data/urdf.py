@@ -49,11 +49,8 @@ def moving_joints(path: str | Path) -> list[tuple[str, str]]:
         Not XML, XML with a document type or entities, not a URDF, links that make no tree, a joint without a usable
         axis or limits, a mass that is not positive, an inertia that no body can have.
     """
-    return [
-        (joint.get("name", ""), joint.get("type", ""))
-        for joint in _Urdf(path).joints
-        if joint.get("type") in MOVING and joint.find("mimic") is None
-    ]
+    moving = [one for one in _Urdf(path).joints if one.get("type") in MOVING and one.find("mimic") is None]
+    return [(joint.get("name", ""), joint.get("type", "")) for joint in moving]
 
 
 def is_revolute(path: str | Path | None) -> bool | None:
