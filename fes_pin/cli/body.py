@@ -12,6 +12,7 @@ from fes_pin.cli.group import App, needs, python_names, release_output
 from fes_pin.cli.options import Force, output
 from fes_pin.data.errors import InputError, errors_of
 from fes_pin.data.numbers import between
+from fes_pin.data.outputs import Outputs
 
 app = App(help="The walking body: modes, nerves, view.")
 
@@ -118,7 +119,6 @@ def nerves(
     from fes_pin.body.catchable import catchable
     from fes_pin.body.controllability import modal_controllability
     from fes_pin.body.inputs import Inputs
-    from fes_pin.data.outputs import Outputs
     from fes_pin.muscles.nerve_inputs import subject_nerves, whose_strength
     from fes_pin.view.influence import check_image, influence_image, influence_table
 
@@ -183,7 +183,6 @@ def view(
     force: Force = False,
 ) -> None:
     """A page with the body, or a live one: a posture, a mode in motion, a nerve's influence, or measured walking."""
-    from fes_pin.data.outputs import Outputs
     from fes_pin.muscles.nerve_inputs import subject_nerves
     from fes_pin.view.viewer import show_influence, show_mode, show_posture
 

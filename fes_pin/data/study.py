@@ -358,7 +358,7 @@ class _Reader(StudyTables):
         each = enumerate(zip(tables, self._trial_names(tables), strict=True))
         trials = [self._trial(f"trial[{index}]", table, name, own) for index, (table, name) in each]
         check_same_inputs([(t.kind, t.columns) for t in trials], self.schema, constants, self._fault_of)
-        horizon = self.horizon()
+        horizon = checked_horizon(self.document.table("study").get(HORIZON), self.document.under("study"))
         folder = self.folder.absolute()
         return Study(self.name, self.rig, constants, start, tuple(trials), folder, files, self.schema, horizon)
 

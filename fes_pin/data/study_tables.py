@@ -56,10 +56,6 @@ class StudyTables:
         self.name, self.rig = self._study_table()
         self.schema = rigs[self.rig]
 
-    def horizon(self) -> float | None:
-        """How far ahead errors over a horizon look, s, where the study says so."""
-        return checked_horizon(self.document.table("study").get(HORIZON), self.document.under("study"))
-
     def _study_table(self) -> tuple[str, str]:
         if "study" not in self.document.data:
             raise self.error("study", "missing; expected a table [study] with name and rig")

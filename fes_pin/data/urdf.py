@@ -188,13 +188,10 @@ class _Urdf:
             raise self.error(f"expected a mass between {SMALLEST:g} and {LARGEST:g} kg, found {value:g}", name)
         if "inertia" not in numbers:
             raise self.error("expected an <inertia> together with the mass", name)
-        self._check_inertia(numbers["inertia"], name)
-        return value
-
-    def _check_inertia(self, inertia: Mapping[str, tuple[float, ...]], name: str) -> None:
-        principal = np.linalg.eigvalsh(inertia_matrix(value for (value,) in inertia.values()))
+        principal = np.linalg.eigvalsh(inertia_matrix(moment for (moment,) in numbers["inertia"].values()))
         if not is_possible(principal):
             raise self.error(f"expected an inertia that is positive, found a principal one of {principal[0]:g}", name)
+        return value
 
     def _check_joint(self, joint: Element) -> None:
         name, kind = joint.get("name", ""), joint.get("type")

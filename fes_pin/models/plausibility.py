@@ -83,9 +83,8 @@ def _steps(study: Study | ToPredict, model: Model) -> Iterable[str]:
         # a constant that a fit found may be short, and that is no slip of units
         is_fitted = isinstance(study, ToPredict)
         if slowest.dt > COARSE * constant and not (is_fitted and slowest.dt < SLOW_S):
-            raise InputError(
-                f"{said}: is time_s in ms, or the value in [start] wrong?", file=study.folder, column="time_s"
-            )
+            message = f"{said}: is time_s in ms, or the value in [start] wrong?"
+            raise InputError(message, file=study.folder, column="time_s")
         if slowest.dt > constant:
             yield f"{said}: what happens between samples is lost; is time_s in another unit?"
         if longest < constant and name != RUN_OUT:

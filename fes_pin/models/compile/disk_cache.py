@@ -28,9 +28,8 @@ def cache_folder() -> Path:
     chosen = os.environ.get("FES_PIN_CACHE")
     if chosen:
         return Path(chosen)
-    base = os.environ.get("XDG_CACHE_HOME") or (
-        Path.home() / ("Library/Caches" if sys.platform == "darwin" else ".cache")
-    )
+    usual = Path.home() / ("Library/Caches" if sys.platform == "darwin" else ".cache")
+    base = os.environ.get("XDG_CACHE_HOME") or usual
     return Path(base) / "fes_pin"
 
 
