@@ -88,17 +88,17 @@ class Options:
         return cls(**given)
 
     def __post_init__(self) -> None:
-        for name in ("lexicographic", "rounding"):
-            truth(getattr(self, name), name)
+        vars(self).update({name: truth(getattr(self, name), name) for name in ("lexicographic", "rounding")})
         known_word(self.effort_kind, ("squares", "cubes", "fatigue"), "effort_kind")
         if self.effort_kind == "cubes" and self.lexicographic:
             raise InputError("lexicographic goes with effort squares or fatigue, not with cubes")
         if self.least is not None and (self.effort_kind == "cubes" or self.lexicographic):
             raise InputError("least recruitments go with effort squares or fatigue, not with cubes or lexicographic")
-        if positive_number(self.rate, "rate", infinite=True) < np.inf:
-            between(self.rate, 0.0, 1.0, "rate (of recruitment, not of pulse width)")
-        positive_number(self.seconds, "seconds", infinite=True)
-        between(self.change, 0.0, LARGEST_PRICE, "change")
+        rate = positive_number(self.rate, "rate", infinite=True)
+        if rate < np.inf:
+            between(rate, 0.0, 1.0, "rate (of recruitment, not of pulse width)")
+        seconds = positive_number(self.seconds, "seconds", infinite=True)
+        vars(self).update(rate=rate, seconds=seconds, change=between(self.change, 0.0, LARGEST_PRICE, "change"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,12 +230,8 @@ def problem_of(nerves: Any, q: Any, v: Any, options: Options) -> AllocationProbl
     scale = float(np.einsum("ji,j,ji->i", matrix, weights, matrix).max()) or 1.0
     return AllocationProblem(
         *(names, joints, nominal, matrix, ChannelRecruitment(curve, n), weights, prices, lower, upper, least),
-        change=float(options.change),
-        rate=float(options.rate),
+        **{name: getattr(options, name) for name in ("change", "rate", "lexicographic", "rounding", "seconds")},
         cubes=options.effort_kind == "cubes",
-        lexicographic=bool(options.lexicographic),
-        rounding=bool(options.rounding),
-        seconds=float(options.seconds),
         scale=scale,
         held=tuple(nerves.held(q)) if named else (),
         band=nerves.strength_band if named else (1.0, 1.0),

@@ -142,18 +142,9 @@ def modal_controllability(linear: LinearBody, inputs, horizon: float = 0.3) -> M
     controllable = independent(found.values, gains)
     with np.errstate(divide="ignore"):
         energy = np.where(controllable, price / squared, np.inf)
-    return ModalControllability(
-        linear=linear,
-        modes=found,
-        inputs=inputs,
-        horizon=float(horizon),
-        gains=gains,
-        controllable=controllable,
-        both_ways=np.logical_and(*(push.any(axis=1) for push in inputs.pushes(gains))),
-        energy=energy,
-        mode_influence=gains * (np.radians(1.0) / found.degree)[:, None],
-        joint_influence=linear.mobility @ torque,
-    )
+    both_ways = np.logical_and(*(push.any(axis=1) for push in inputs.pushes(gains)))
+    influence = gains * (np.radians(1.0) / found.degree)[:, None], linear.mobility @ torque
+    return ModalControllability(linear, found, inputs, horizon, gains, controllable, both_ways, energy, *influence)
 
 
 def independent(values: np.ndarray, gains: np.ndarray) -> np.ndarray:

@@ -85,15 +85,9 @@ class AnkleDynamics(Tabulated):
             message = f"expected a load that rests between {low} and {high} rad, found {load_kg:g}"
             raise InputError(message, column="load_kg")
         frame = next((e for e in model.effects if isinstance(e, FrameVibration)), None)
-        return cls(
-            rig.inertia_kgm2,
-            rig.damping_nms,
-            rig.time_constant_s,
-            c["moment_arm_m"] * rig.gain * c["force_scale_n"],
-            c,
-            float(load_kg),
-            *(() if frame is None else map(float, (frame.coupling, frame.frequency_hz, frame.damping_ratio))),
-        )
+        swings = () if frame is None else map(float, (frame.coupling, frame.frequency_hz, frame.damping_ratio))
+        pull_nm = c["moment_arm_m"] * rig.gain * c["force_scale_n"]
+        return cls(rig.inertia_kgm2, rig.damping_nms, rig.time_constant_s, pull_nm, c, float(load_kg), *swings)
 
     @cached_property
     def pieces(self) -> int:

@@ -37,9 +37,8 @@ class Tabulated(ReadOnly):
             value = getattr(self, item.name)
             if item.name in self.along or (type(value) is np.ndarray and value.dtype != bool):
                 vars(self)[item.name] = numbers(value, item.name)
-        if len({getattr(self, name).shape[:1] for name in self.along} | {()}) > 2 or any(
-            not getattr(self, name).ndim for name in self.along
-        ):
+        lengths = [getattr(self, name).shape[:1] for name in self.along]
+        if len(set(lengths)) > 1 or () in lengths:
             raise InputError(f"expected arrays of one length, found others: {', '.join(self.along)}")
         self._freeze()
 

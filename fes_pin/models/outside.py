@@ -141,15 +141,9 @@ def classes_of(module: ModuleType) -> tuple[type[Effect] | type[Rig], ...]:
     InputError
         If there is none.
     """
-    inside = (module.__name__, f"{module.__name__}.")
-    found = [
-        one
-        for one in vars(module).values()
-        if isinstance(one, type)
-        and issubclass(one, Effect | Rig)
-        and (one.__module__ == inside[0] or one.__module__.startswith(inside[1]))
-        and not one.__name__.startswith("_")
-    ]
+    parts = [one for one in vars(module).values() if isinstance(one, type) and issubclass(one, Effect | Rig)]
+    own = [one for one in parts if f"{one.__module__}.".startswith(f"{module.__name__}.")]
+    found = [one for one in own if not one.__name__.startswith("_")]
     if not found:
         raise InputError("holds no cause and no rig; expected a class of Effect or Rig", file=_where(module.__name__))
     return tuple(dict.fromkeys(found))

@@ -61,11 +61,8 @@ def guard(one: type[Effect] | type[Rig]) -> None:
     for name in [n for n in dir(one) if n == "__post_init__" or not n.startswith("__")]:
         found, base = inspect.getattr_static(one, name), getattr(Effect if issubclass(one, Effect) else Rig, name, None)
         function = getattr(found, "__func__", found)
-        if (
-            not inspect.isfunction(function)
-            or function.__module__.startswith(PACKAGE)
-            or hasattr(function, "is_guarded")
-        ):
+        is_theirs = inspect.isfunction(function) and not function.__module__.startswith(PACKAGE)
+        if not is_theirs or hasattr(function, "is_guarded"):
             continue
         arguments = inspect.signature(base).parameters if callable(base) else {}
         try:
