@@ -180,9 +180,8 @@ def minimal_sets(
 
 def pareto(sets: Iterable[MinimalSet]) -> list[MinimalSet]:
     """Return the sets that no other beats in both nerves and braces; of equal ones the cheapest."""
-    best: dict[int, MinimalSet] = {}
-    for found in sorted(sets, key=lambda s: (len(s.braces), len(s.inputs), s.energy)):
-        best.setdefault(len(found.braces), found)
+    order = sorted(sets, key=lambda s: (len(s.braces), len(s.inputs), s.energy))
+    best = {len(found.braces): found for found in reversed(order)}
     front: list[MinimalSet] = []
     for count in sorted(best):
         if not front or len(best[count].inputs) < len(front[-1].inputs):

@@ -117,8 +117,7 @@ def _first_spikes(x: np.ndarray) -> np.ndarray:
 
 def _weights(at: np.ndarray, to: float, degree: int) -> np.ndarray:
     """Weights with which values at some places give the value at another of a least-squares polynomial."""
-    basis = np.vander(at - to, degree + 1)
-    return np.linalg.pinv(basis)[-1]
+    return np.linalg.pinv(np.vander(at - to, degree + 1))[-1]
 
 
 def _quantum(x: np.ndarray) -> float:

@@ -127,8 +127,7 @@ def unit_in_name(name: str, column: str, revolute: bool | None = None) -> str:
 
 def own_unit(column: str, revolute: bool | None = None) -> str:
     """The unit that the study format has in a column; "" where it has none."""
-    quantities = quantities_of(column, revolute)
-    units = [next(iter(UNITS[q])) for q in quantities]
+    units = [next(iter(UNITS[q])) for q in quantities_of(column, revolute)]
     return " or ".join(u for u in units if u != "1")
 
 

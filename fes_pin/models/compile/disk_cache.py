@@ -29,8 +29,7 @@ def cache_folder() -> Path:
     if chosen:
         return Path(chosen)
     usual = Path.home() / ("Library/Caches" if sys.platform == "darwin" else ".cache")
-    base = os.environ.get("XDG_CACHE_HOME") or usual
-    return Path(base) / "fes_pin"
+    return Path(os.environ.get("XDG_CACHE_HOME") or usual) / "fes_pin"
 
 
 def read_cached(key: str) -> bytes | None:
