@@ -26,6 +26,7 @@ LEAST_LEFT = 0.05
 SECONDS = 1.0
 """Default limit on the search for the best channels to switch off, s: thirty channels take a few hundredths."""
 EPSILON = float(np.finfo(float).eps)
+Limits = tuple[np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,7 +176,7 @@ class AllocationProblem(ReadOnly):
         """Whether the program is one of squares within limits, so that torques may be allocated many at a time."""
         return self.least is None and not self.cubes and not self.lexicographic
 
-    def limits(self, before: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def limits(self, before: np.ndarray) -> Limits:
         """Limits of recruitment under the rate limit, from the recruitments in force."""
         if self.rate == np.inf:
             return self.lower, self.upper

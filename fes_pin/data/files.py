@@ -6,7 +6,7 @@ import os
 import shutil
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from itertools import takewhile
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -92,6 +92,14 @@ def read_json(path: str | Path) -> Any:
         return json.loads(text)
     except (ValueError, RecursionError) as error:
         raise InputError(f"expected JSON: {error}", file=path, row=getattr(error, "lineno", None)) from None
+
+
+def own_json(path: Path) -> dict[str, Any]:
+    """A table that fes_pin wrote itself; empty where there is none, or where it is no longer one."""
+    with suppress(OSError, ValueError):
+        found = json.loads(path.read_bytes())
+        return found if isinstance(found, dict) else {}
+    return {}
 
 
 def hold(path: str | Path) -> HeldFile:
