@@ -27,6 +27,7 @@ SECONDS = 1.0
 """Default limit on the search for the best channels to switch off, s: thirty channels take a few hundredths."""
 EPSILON = float(np.finfo(float).eps)
 Limits = tuple[np.ndarray, np.ndarray]
+"""Least and greatest recruitment of each channel."""
 
 
 @dataclass(frozen=True, eq=False)
