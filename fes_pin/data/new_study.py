@@ -139,8 +139,7 @@ class _Making:
         return tuple(dict.fromkeys(n for p in self.proposals for n in p.candidates[column]))
 
     def _source(self, column: str, is_needed: bool) -> dict[str, Any] | None:
-        option = self.wanted.columns.get(column)
-        if option is not None:
+        if (option := self.wanted.columns.get(column)) is not None:
             return self._stated(column, option)
         candidates = self._candidates(column)
         if len(candidates) != 1:
@@ -158,8 +157,7 @@ class _Making:
         if name == column or not quantities or quantities == ("pulses",):
             return {"name": name}
         if unit:
-            found = known_unit(unit, quantities)
-            if found is not None:
+            if (found := known_unit(unit, quantities)) is not None:
                 return {"name": name, "unit": found[1]}
             return self._asked(column, f"--column {column}={name},scale=NUMBER ({own_unit(column)} for each {unit})")
         units = own_unit(column, self.wanted.revolute)

@@ -147,8 +147,7 @@ def _check_rows(study: Study | ToPredict) -> None:
 
 def _inputs(study: Study | ToPredict) -> Iterable[str]:
     """Remarks on inputs; a muscle that is never stimulated is an InputError."""
-    short = [t.name for t in study.trials if len(t) < FEW]
-    if short:
+    if short := [t.name for t in study.trials if len(t) < FEW]:
         yield f"fewer than {FEW} samples in {trials_named(short)}"
     alone = isinstance(study, ToPredict)  # trials that nothing drives are then no oddity, but for a muscle at rest
     names = dict.fromkeys(n for t in study.trials for n in _stimuli(study, t) if n in PULSES or not alone)

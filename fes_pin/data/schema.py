@@ -346,11 +346,9 @@ def check_known(names: Iterable[str], known: Collection[str], error: KeyFault, a
 def unknown(name: str, known: Iterable[str]) -> str:
     """What to say of an unknown name: another unit, a likely typo, or what is known."""
     known = list(known)
-    same = [candidate for candidate in known if without_unit(candidate) == without_unit(name)]
-    if same:
+    if same := [candidate for candidate in known if without_unit(candidate) == without_unit(name)]:
         return f"wrong unit or none; expected {same[0]}"
-    close = get_close_matches(name.lower(), known, n=1, cutoff=0.75)
-    if close:
+    if close := get_close_matches(name.lower(), known, n=1, cutoff=0.75):
         return f"unknown; did you mean {close[0]}?"
     return f"unknown; expected {'one of ' if len(known) > 1 else ''}{', '.join(known)}" if known else "unknown"
 

@@ -109,8 +109,7 @@ def factor_of(
         What `error` makes of a message, for a unit that is none of what this column holds.
     """
     quantities = quantities_of(column, revolute)
-    found = known_unit(unit, quantities)
-    if found is not None:
+    if (found := known_unit(unit, quantities)) is not None:
         return UNITS[found[0]][found[1]]
     expected = [u for q in quantities for u in UNITS[q]]
     if not expected:

@@ -121,8 +121,7 @@ def _swings(study: Study | ToPredict, model: Model) -> Iterable[str]:
     if not c.get("revolute") or not weight > 0.0 or model.parameters().get("gravity_scale", 1.0) == 0.0:
         return
     free = [t for t in study.trials if "position" in t and ("effort" not in t or not t["effort"].any())]
-    wide = [t.name for t in free if _widest_swing(t["position"]) > SWING]
-    if wide:
+    if wide := [t.name for t in free if _widest_swing(t["position"]) > SWING]:
         yield f"position swings back by more than a turn, and nothing drives it, in trial {wide[0]}: is it in degrees?"
         return
     hangs = math.atan2(-c["gravity_cos"], c["gravity_sin"])

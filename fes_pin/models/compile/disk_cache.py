@@ -25,8 +25,7 @@ def cache_folder() -> Path:
     RuntimeError
         The user has no home.
     """
-    chosen = os.environ.get("FES_PIN_CACHE")
-    if chosen:
+    if chosen := os.environ.get("FES_PIN_CACHE"):
         return Path(chosen)
     usual = Path.home() / ("Library/Caches" if sys.platform == "darwin" else ".cache")
     return Path(os.environ.get("XDG_CACHE_HOME") or usual) / "fes_pin"
