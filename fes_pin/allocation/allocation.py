@@ -196,19 +196,12 @@ class Allocation(ByName, ReadOnly):
 
         `strength_band` holds the factors on the strength assumed that the bands of the torques belong to.
         """
-        low, high = self.achieved_band
+        bands = np.sort(self.achieved_band, axis=0).T.tolist()
+        torques = zip(self.joints, self.wanted.tolist(), self.achieved.tolist(), bands, strict=True)
         return {
             "pulse_width_us": self.pulse_widths_us,
             "recruitment": dict(zip(self.names, self.recruitment.tolist(), strict=True)),
-            "torque_nm": {
-                joint: {
-                    "wanted": float(self.wanted[j]),
-                    "achieved": float(self.achieved[j]),
-                    "band": sorted((float(low[j]), float(high[j]))),
-                }
-                for j, joint in enumerate(self.joints)
-                if self.wanted[j] or self.achieved[j]
-            },
+            "torque_nm": {n: {"wanted": w, "achieved": a, "band": band} for n, w, a, band in torques if w or a},
             "strength_band": list(self.problem.band),
             "reasons": self.reasons,
             "held": list(self.held),

@@ -264,16 +264,7 @@ def _priced(linear: LinearBody, inputs: Inputs, chosen: tuple[str, ...], asked: 
         )
         leans.append(able.least_lean_deg)
         error = max(error, float(able.error_deg.max(initial=0.0)))
-    return MinimalSet(
-        inputs=inputs.names,
-        braces=tuple(chosen),
-        free_joints=linear.n,
-        locked_joints=len(linear.braced),
-        falls=len(energies),
-        energy=float(energies.max(initial=0.0)),
-        condition=condition,
-        stimulation=asked.stimulation if asked.together else "constant",
-        lean_deg=leans[1],
-        lean_band_deg=(leans[0], leans[2]),
-        error_deg=error,
-    )
+    low, lean, high = leans
+    counts = linear.n, len(linear.braced), len(energies)
+    energy, stimulation = float(energies.max(initial=0.0)), asked.stimulation if asked.together else "constant"
+    return MinimalSet(inputs.names, chosen, *counts, energy, condition, stimulation, lean, (low, high), error)

@@ -52,14 +52,9 @@ class LinearProgram:
 
     def widened(self, cost: Sequence[float] | np.ndarray, A_ub: np.ndarray, A_eq: np.ndarray) -> LinearProgram:
         """The same with further variables, each 0 or more: their costs (v,), and their columns, (rows, v) each."""
-        return replace(
-            self,
-            cost=np.append(self.cost, cost),
-            A_ub=np.column_stack([self.A_ub, A_ub]),
-            A_eq=np.column_stack([self.A_eq, A_eq]),
-            lower=np.append(self.lower, np.zeros(len(cost))),
-            upper=np.append(self.upper, np.full(len(cost), np.inf)),
-        )
+        lower, upper = np.append(self.lower, np.zeros(len(cost))), np.append(self.upper, np.full(len(cost), np.inf))
+        A_ub, A_eq = np.column_stack([self.A_ub, A_ub]), np.column_stack([self.A_eq, A_eq])
+        return replace(self, cost=np.append(self.cost, cost), A_ub=A_ub, A_eq=A_eq, lower=lower, upper=upper)
 
     def towards(self, other: LinearProgram) -> LinearProgram:
         """The program whose last variable says how far from these limits to those of another, 1 there, an answer is."""
