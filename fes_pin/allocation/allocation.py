@@ -188,7 +188,7 @@ class Allocation(ByName, ReadOnly):
     def _repr_html_(self) -> str:
         held = self.active
         each = zip(self.names, self.pulse_width_us, self.recruitment, strict=True)
-        rows = [(name, f"{width:.0f} us", f"{r:.3f}", held.get(name, "")) for name, width, r in each]
+        rows = [(name, f"{us:.0f} us", f"{r:.3f}", held.get(name, "")) for name, us, r in each]
         return table_html("Allocation", ("channel", "pulse width", "recruitment", ""), rows, str(self).splitlines()[1:])
 
     def as_dict(self) -> dict[str, Any]:

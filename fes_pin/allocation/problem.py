@@ -90,7 +90,7 @@ class Options:
         return cls(**given)
 
     def __post_init__(self) -> None:
-        vars(self).update({name: truth(getattr(self, name), name) for name in ("lexicographic", "rounding")})
+        vars(self).update({n: truth(getattr(self, n), n) for n in ("lexicographic", "rounding")})
         known_word(self.effort_kind, ("squares", "cubes", "fatigue"), "effort_kind")
         if self.effort_kind == "cubes" and self.lexicographic:
             raise InputError("lexicographic goes with effort squares or fatigue, not with cubes")

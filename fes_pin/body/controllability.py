@@ -108,7 +108,7 @@ class ModalControllability(Tabulated):
             out.append("(of the modes without damping and rates: see pbh)")
         out.append(f"{'mode':70s} PBH  both ways  {f'1 deg, {self.inputs.price_unit}':>15s}  strongest input")
         for i, mode in enumerate(self.modes):
-            pbh, both = ("yes" if known[i] else "no" for known in (self.controllable, self.both_ways))
+            pbh, both = ("yes" if one[i] else "no" for one in (self.controllable, self.both_ways))
             out.append(f"{i + 1:3d} {mode.name:66s} {pbh:4s} {both:10s} {self.energy[i]:15.3g}  {self._strongest[i]}")
         return "\n".join(out)
 

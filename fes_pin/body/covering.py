@@ -113,6 +113,6 @@ def _cover(count: int, rows: list[np.ndarray], excluded: list[np.ndarray]) -> np
     if excluded:
         apart = np.array(excluded, dtype=float)
         constraints.append(optimize.LinearConstraint(apart, ub=apart.sum(axis=1) - 1.0))
-    ones = np.ones(count)
-    answer = optimize.milp(ones, constraints=constraints, integrality=ones, bounds=optimize.Bounds(0, 1))
+    ones, off_or_on = np.ones(count), optimize.Bounds(0, 1)
+    answer = optimize.milp(ones, constraints=constraints, integrality=ones, bounds=off_or_on)
     return np.round(answer.x).astype(bool) if answer.status == 0 else None

@@ -112,8 +112,8 @@ def ground_wrench(body: Body, model: pin.Model, q: np.ndarray) -> Wrench:
     force, moment = -(mass + foot.mass) * g, np.cross(data.com[0], weight) - np.cross(foot.lever, foot.mass * g)
     along = np.cross(jacobian.T, weight).T
     turning = momentum[3:] + mass * np.cross(data.com[0], jacobian.T).T
-    per_angle, per_acceleration = np.vstack([np.zeros_like(jacobian), along]), np.vstack([mass * jacobian, turning])
-    return Wrench(np.concatenate([force, moment]), per_angle, per_acceleration, np.zeros((6, model.nv)))
+    angle, rise = np.vstack([np.zeros_like(jacobian), along]), np.vstack([mass * jacobian, turning])
+    return Wrench(np.concatenate([force, moment]), angle, rise, np.zeros((6, model.nv)))
 
 
 def centre_of_pressure(wrench: np.ndarray) -> np.ndarray:

@@ -156,8 +156,8 @@ def minimal_sets(
     InputError
         Unknown brace, joint or stimulation, negative number, a lean that is not positive and finite.
     """
-    lean_deg = positive_number(lean_deg, "lean_deg")
-    asked = _Question(lean_deg, together, gravity, settle_deg, stimulation, balance, strength_factor)
+    lean = positive_number(lean_deg, "lean_deg")
+    asked = _Question(lean, together, gravity, settle_deg, stimulation, balance, strength_factor)
     max_braces, alternatives = whole(max_braces, "max_braces"), whole(alternatives, "alternatives", 1)
     inputs = Inputs.of(inputs, linear)
     orthoses = _orthoses(braces)

@@ -145,7 +145,7 @@ def run_cohort(
     if all(errors.values()):
         raise InputError(f"none of {len(found)} studies could be diagnosed; the first: {min(errors.items())[1]}")
 
-    made = Cohort(**tables_of(map(store.get, found), len(catalogue.effects)))  # no more than one record is held
+    made = Cohort(**tables_of(map(store.get, found), len(catalogue.effects)))  # one is held at a time
     outputs.write(out, _files(made, seed, command))
     return made
 

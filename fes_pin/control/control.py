@@ -141,15 +141,15 @@ class PositionController:
         self.pulse = PulseWidth(curve, play[0] if play else 0.0, self.limits)
         self.dynamics = dynamics
         self.lowest, self.fade = dynamics.rest_angle(), math.exp(-PULSE_S / dynamics.time_constant)
-        low, high = self.limits.range_of_motion_rad
+        low, high = ends = self.limits.range_of_motion_rad
         if not low < self.lowest < high:
-            expected = f"expected a range that holds the {self.lowest:.3g} rad at which the joint rests"
-            raise InputError(f"{expected}, found {low:g} to {high:g} rad", column="range_of_motion_rad")
+            want = f"expected a range that holds the {self.lowest:.3g} rad at which the joint rests"
+            raise InputError(f"{want}, found {low:g} to {high:g} rad", column="range_of_motion_rad")
         self.observer = copy.deepcopy(observer) if observer is not None else JointObserver(dynamics)
         given = GivenAnkle(model, dynamics)
         with np.errstate(all="ignore"):  # a model that is not finite has no gains, and is an input error
             self.gains = tune(dynamics, self.observer, given if given.names else None)
-        self.monitor = FaultMonitor(dynamics, (low, high), self.observer.angle_std_rad, resolution_rad)
+        self.monitor = FaultMonitor(dynamics, ends, self.observer.angle_std_rad, resolution_rad)
         angles = np.linspace(self.lowest, 2.8, REACH_ANGLES)
         # from the first angle on that needs more than those before
         self.reachable = angles, np.maximum.accumulate([dynamics.activation_for(q) for q in angles.tolist()])
@@ -386,9 +386,9 @@ class PositionController:
         if self.paused_s:
             lines.append(f"the calls paused for {self.paused_s:.3g} s: stimulation begins again with the joint at rest")
         if self.calm < 1.0:
-            swung = f"the loop swung by itself at {self.swings.frequency_hz:.1f} Hz and was calmed to"
+            swung = f"the loop swung by itself at {self.swings.frequency_hz:.1f} Hz and was calmed"
             why = "the model lacks something, such as the frame; diagnose trials of this rig"
-            lines.append(f"{swung} {100 * self.calm:.0f} %: {why}")
+            lines.append(f"{swung} to {100 * self.calm:.0f} %: {why}")
         return "; ".join(lines)
 
     def _reach(self) -> None:

@@ -212,7 +212,7 @@ def tune(dynamics: AnkleDynamics, observer: JointObserver, given: GivenAnkle | N
         steady = [observer.steady_gain(believed[0]) for _, believed in places]
         for boldness, table in zip(LADDER, tables, strict=True):
             each = zip(places, table[::2], steady, strict=True)
-            loops = (Loop.of(truth, at, k, see) for (truths, at), k, see in each for truth in truths)
+            loops = (Loop.of(one, at, k, see) for (truths, at), k, see in each for one in truths)
             worst = max(loop.radius() for loop in loops)
             tried.append(Gains(angles, table, boldness, worst, observer.torque_wander))
         if min(g.radius for g in tried) < 1.0 and not dynamics.frame_coupling:

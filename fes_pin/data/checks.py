@@ -74,7 +74,7 @@ def checked_labels(name: object, said: Mapping[str, Any], error: KeyFault) -> di
         checked_label(labels["group"], error)
     if not isinstance(labels["remarks"], Sequence) or isinstance(labels["remarks"], str):
         raise error("remarks", "expected texts, one for each remark")
-    labels["remarks"] = tuple(checked_label(one, error, "remarks", "a remark") for one in labels["remarks"])
+    labels["remarks"] = tuple(checked_label(r, error, "remarks", "a remark") for r in labels["remarks"])
     labels[LOW_PASS] = number_or_none(labels[LOW_PASS], positive("Hz", False), LOW_PASS, error)
     return {"name": name, **labels}
 

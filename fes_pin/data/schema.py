@@ -201,7 +201,7 @@ class RigSchema(ReadOnly):
     def known_constants(self) -> dict[str, NumberKey]:
         """The keys of a study's [rig]: the rig's constants, and where it may be so its start values that are known."""
         start = self.start if self.start_may_be_known else {}
-        return {**self.constants, **{key: replace(number, required=False) for key, number in start.items()}}
+        return {**self.constants, **{k: replace(n, required=False) for k, n in start.items()}}
 
 
 START_S = {"start_s": any_number("s", required=False)}

@@ -79,7 +79,7 @@ def _spikes(x: np.ndarray, length: int) -> np.ndarray:
         weights = [_weights(at[middle], inside, 3), _weights(at[:LINE], inside, 1), _weights(at[LINE:], inside, 1)]
         sample = x[inside : inside + count]
         parts = zip(weights, (sides[middle], sides[:LINE], sides[LINE:]), strict=True)
-        here, before, after = (sample - sum(w * s for w, s in zip(*part, strict=True)) for part in parts)
+        here, before, after = (sample - sum(w * s for w, s in zip(*p, strict=True)) for p in parts)
         hit &= np.sign(here) * np.sign(before) > 0
         hit &= np.sign(here) * np.sign(after) > 0
         hit &= np.abs(before - after) < np.minimum(np.abs(before), np.abs(after))

@@ -49,7 +49,7 @@ def moving_joints(path: str | Path) -> list[tuple[str, str]]:
         Not XML, XML with a document type or entities, not a URDF, links that make no tree, a joint without a usable
         axis or limits, a mass that is not positive, an inertia that no body can have.
     """
-    moving = [one for one in _Urdf(path).joints if one.get("type") in MOVING and one.find("mimic") is None]
+    moving = [j for j in _Urdf(path).joints if j.get("type") in MOVING and j.find("mimic") is None]
     return [(joint.get("name", ""), joint.get("type", "")) for joint in moving]
 
 
@@ -188,7 +188,7 @@ class _Urdf:
             raise self.error(f"expected a mass between {SMALLEST:g} and {LARGEST:g} kg, found {value:g}", name)
         if "inertia" not in numbers:
             raise self.error("expected an <inertia> together with the mass", name)
-        principal = np.linalg.eigvalsh(inertia_matrix(moment for (moment,) in numbers["inertia"].values()))
+        principal = np.linalg.eigvalsh(inertia_matrix(m for (m,) in numbers["inertia"].values()))
         if not is_possible(principal):
             raise self.error(f"expected an inertia that is positive, found a principal one of {principal[0]:g}", name)
         return value

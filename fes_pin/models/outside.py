@@ -133,7 +133,7 @@ def classes_of(module: ModuleType) -> tuple[type[Effect] | type[Rig], ...]:
     InputError
         If there is none.
     """
-    parts = [one for one in vars(module).values() if isinstance(one, type) and issubclass(one, Effect | Rig)]
+    parts = [c for c in vars(module).values() if isinstance(c, type) and issubclass(c, Effect | Rig)]
     own = [one for one in parts if f"{one.__module__}.".startswith(f"{module.__name__}.")]
     found = [one for one in own if not one.__name__.startswith("_")]
     if not found:

@@ -49,8 +49,8 @@ def odd_numbers(study: Study | ToPredict, model: Model, simulated: Simulation) -
         For data that allow no verdict, see `data.plausibility`; and for a time step much longer than the time constants
         of the model's start values.
     """
-    odd = [*implausible(study), *_steps(study, model), *_range(study, model), *_swings(study, model)]
-    return [*odd, *_turned(study, model, simulated), *_at_rest(study, model)]
+    odd = [*implausible(study), *_steps(study, model), *_range(study, model)]
+    return [*odd, *_swings(study, model), *_turned(study, model, simulated), *_at_rest(study, model)]
 
 
 def warn_of_odd_numbers(model: Model, trials: Sequence[Trial], simulated: Simulation) -> None:

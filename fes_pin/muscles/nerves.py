@@ -104,7 +104,7 @@ class Nerves(ReadOnly):
                 raise InputError(f"fatigue names {name!r}, which is not among the nerves")
             between(left, 0.0, 1.0, f"fatigue of {name} (0: nothing left, 1: fresh)")
         each = zip(table.nerves, table.names, strict=True)
-        members = np.array([[n in (nerve, muscle) for n in names] for nerve, muscle in each], dtype=float)
+        members = np.array([[n in (nerve, m) for n in names] for nerve, m in each], dtype=float)
         vars(self).update(names=names, members=members)
         truth(self.force_length, "force_length")
         self._freeze()

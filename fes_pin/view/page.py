@@ -120,5 +120,5 @@ def unit_text(unit: str) -> str:
 
 def key(*entries: tuple[str, str]) -> Markup:
     """A legend for the figures beneath it: colour names of `style.COLOURS`, and their meanings."""
-    marks = [(Markup(f'<i style="background: var(--{colour})"></i>'), words) for colour, words in entries]
+    marks = [(Markup(f'<i style="background: var(--{name})"></i>'), said) for name, said in entries]
     return element("p", joined([element("span", *one, class_="entry") for one in marks], " "), class_="key")

@@ -66,8 +66,8 @@ def _parameters(diagnosis: Diagnosis) -> list[Markup]:
         [element("code", n), f"{m.std:.3g}", quantity(n, unit)[1] or "-", str(len(m.ar)) if m.ar else "white"]
         for n, m in diagnosis.extended.noise.items()
     ]
-    orders = html_table(("noise of", "standard deviation", "unit", "autoregressive order"), noise, (1,))
-    return [html_table(head[: 3 + 2 * len(fits)], rows, range(2, 7)), orders]
+    kinds = html_table(("noise of", "standard deviation", "unit", "autoregressive order"), noise, (1,))
+    return [html_table(head[: 3 + 2 * len(fits)], rows, range(2, 7)), kinds]
 
 
 def _use(diagnosis: Diagnosis) -> list[Markup]:

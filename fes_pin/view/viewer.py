@@ -152,7 +152,7 @@ class BodyScene:
         import umsgpack  # noqa: PLC0415
 
         script = (Path(import_meshcat().__file__).parent / "viewer/dist/main.min.js").read_text()
-        texts = (base64.b64encode(umsgpack.packb(command.lower())).decode() for command in self.commands())
+        texts = (base64.b64encode(umsgpack.packb(one.lower())).decode() for one in self.commands())
         packed = ",\n".join(f'"{text}"' for text in texts)
         page = Template(resources.files("fes_pin.view").joinpath("viewer.html").read_text(encoding="utf-8"))
         return page.substitute(script=script, commands=packed, caption=html.escape(self.caption))

@@ -24,7 +24,7 @@ _NAMED = (
     *("exp", "log", "sin", "cos", "tanh", "sqrt", "fabs", "floor", "ceil", "copysign", "tan", "asin", "acos", "atan"),
     *("atan2", "sinh", "cosh", "erf", "pow", "fmod", "remainder", "hypot", "log1p", "expm1", "asinh", "acosh", "atanh"),
 )
-_LANE_FUNCTIONS = {getattr(ca, f"OP_{name.upper()}"): name for name in _NAMED} | {ca.OP_CONSTPOW: "pow"}
+_LANE_FUNCTIONS = {getattr(ca, f"OP_{n.upper()}"): n for n in _NAMED} | {ca.OP_CONSTPOW: "pow"}
 
 
 @dataclass(frozen=True)
