@@ -98,12 +98,8 @@ def _written_above() -> dict[str, str]:
 _CHAPTERS = {name: f"{module}.{name}" for name, module in _written_above().items() if module == "fes_pin.models"}
 _WHERE = {name: module for name, module in _written_above().items() if name not in _CHAPTERS}
 
-
-def _rigs() -> Any:
-    return import_module("fes_pin.models.catalogue").known_schemas()
-
-
-rigs_from(_rigs)  # whoever reads a study asks for the rigs that the models bring; `data` itself imports no models
+# whoever reads a study asks for the rigs that the models bring; `data` itself imports no models
+rigs_from(lambda: import_module("fes_pin.models.catalogue").known_schemas())
 
 __all__ = ["__version__", *_WHERE, *_CHAPTERS]  # noqa: PLE0604
 

@@ -2,10 +2,15 @@
 
 import os
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from datetime import UTC, datetime
+from typing import Any, TypeVar
 
 from fes_pin.data.errors import InputError
 
+Value = TypeVar("Value")
 ENGINES = ("llvm", "casadi")
 PROCESSORS = ("native", "generic")
 
@@ -86,6 +91,16 @@ def check_settings() -> None:
     processor()
     threads()
     source_date()
+
+
+@contextmanager
+def while_set(variable: ContextVar[Any], value: Value) -> Iterator[Value]:
+    """A context variable has the value, which is given, for what is done within."""
+    token = variable.set(value)
+    try:
+        yield value
+    finally:
+        variable.reset(token)
 
 
 def _one_of(variable: str, known: tuple[str, ...]) -> str:

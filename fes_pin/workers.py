@@ -3,16 +3,16 @@
 import math
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from contextvars import ContextVar, copy_context
 from typing import TypeVar
 
 from numpy.linalg import LinAlgError
 from threadpoolctl import OpenBLASController, threadpool_limits
 
-from fes_pin.settings import threads
+from fes_pin.settings import threads, while_set
 
 Progress = Callable[[float, str], None]
 """Report of a long search: the share that is done, and what is being done."""
@@ -20,7 +20,7 @@ In = TypeVar("In")
 Out = TypeVar("Out")
 
 
-class _Limit:
+class _Limit(AbstractContextManager[None]):
     """The limit on the threads of linear algebra, which is one for the whole process, while somebody needs it.
 
     Any thread may be the first user or the last. Newer releases of threadpoolctl let one thread alone set OpenBLAS's
@@ -31,7 +31,7 @@ class _Limit:
         self._lock, self._users = threading.Lock(), 0
         self._limits: threadpool_limits | None = None
 
-    def take(self) -> None:
+    def __enter__(self) -> None:
         """Linear algebra on one thread from the first user on."""
         with self._lock:
             if self._users == 0:
@@ -39,7 +39,7 @@ class _Limit:
                 self._limits = threadpool_limits(1)
             self._users += 1
 
-    def give_back(self) -> None:
+    def __exit__(self, *_: object) -> None:
         """As it was before the first user, after the last."""
         with self._lock:
             self._users -= 1
@@ -58,17 +58,12 @@ def _claim_pool() -> None:
 _LIMIT = _Limit()
 
 
-@contextmanager
-def one_thread_each() -> Iterator[None]:
+def one_thread_each() -> AbstractContextManager[None]:
     """Linear algebra on one thread: the fits are what runs in parallel, and sums keep their order.
 
     Where several threads ask for it, it holds until the last has ended.
     """
-    _LIMIT.take()
-    try:
-        yield
-    finally:
-        _LIMIT.give_back()
+    return _LIMIT
 
 
 _IS_ONE_OF_MANY: ContextVar[bool] = ContextVar("is_one_of_many", default=False)
@@ -107,28 +102,17 @@ class OutOfTime(Exception):
             stops.append(time.monotonic())
 
 
-@contextmanager
-def noting_stops() -> Iterator[list[float]]:
+def noting_stops() -> AbstractContextManager[list[float]]:
     """The times at which a limit of time ended work that is done within, in a list that grows; empty where none did."""
-    stops: list[float] = []
-    token = _STOPS.set(stops)
-    try:
-        yield stops
-    finally:
-        _STOPS.reset(token)
+    return while_set(_STOPS, list[float]())
 
 
 _END: ContextVar[float] = ContextVar("end", default=math.inf)
 
 
-@contextmanager
-def time_limit(seconds: float) -> Iterator[None]:
+def time_limit(seconds: float) -> AbstractContextManager[float]:
     """Let what calls `check_time` go on for so long; infinity for as long as it takes."""
-    token = _END.set(time.monotonic() + seconds)
-    try:
-        yield
-    finally:
-        _END.reset(token)
+    return while_set(_END, time.monotonic() + seconds)
 
 
 def seconds_left() -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -12,10 +12,7 @@ from fes_pin.allocation.problem import AllocationProblem, OfProblem
 from fes_pin.data.named import NamedArray
 from fes_pin.data.numbers import known_word
 from fes_pin.data.read_only import ReadOnly
-from fes_pin.data.show import frame, table_html
-
-if TYPE_CHECKING:
-    import pandas
+from fes_pin.data.show import DataFrame, frame, table_html
 
 REPORTED_NM = 0.5
 """A shortfall is put in words from this size on, N m."""
@@ -39,7 +36,7 @@ class ByName(OfProblem):
         """Achieved torque of a joint, N m: a number, or (samples,)."""
         return NamedArray(self.achieved, self.joints)[known_word(joint, self.joints, "joint")]
 
-    def to_frame(self) -> pandas.DataFrame:
+    def to_frame(self) -> DataFrame:
         """Pulse widths, us, a row each sample, a column each channel, as a frame of pandas; see `data.show.frame`."""
         return frame(dict(NamedArray(self.pulse_width_us, self.names).items()))
 
@@ -177,12 +174,12 @@ class Allocation(ByName, ReadOnly):
             return f"more {by_name[i]} is not worth its effort"
         return f"more {by_name[i]} would spoil {self.joints[k].replace('_', ' ')}"
 
-    def to_frame(self) -> pandas.DataFrame:
+    def to_frame(self) -> DataFrame:
         """Pulse width, us, recruitment and what holds it at a limit, a row each channel, as a frame of pandas."""
         columns = {"channel": self.names, "pulse_width_us": self.pulse_width_us, "recruitment": self.recruitment}
         return frame({**columns, "limit": [self.limit(i) for i in range(len(self.names))]}, "channel")
 
-    def torques(self) -> pandas.DataFrame:
+    def torques(self) -> DataFrame:
         """Torque wanted, achieved, and achieved by the weakest and strongest muscles likely, N m, a row each joint."""
         least, most = np.sort(self.achieved_band, axis=0)
         columns = {"joint": self.joints, "wanted": self.wanted, "achieved": self.achieved}
@@ -190,10 +187,8 @@ class Allocation(ByName, ReadOnly):
 
     def _repr_html_(self) -> str:
         held = self.active
-        rows = [
-            (name, f"{width:.0f} us", f"{r:.3f}", held.get(name, ""))
-            for name, width, r in zip(self.names, self.pulse_width_us, self.recruitment, strict=True)
-        ]
+        each = zip(self.names, self.pulse_width_us, self.recruitment, strict=True)
+        rows = [(name, f"{us:.0f} us", f"{r:.3f}", held.get(name, "")) for name, us, r in each]
         return table_html("Allocation", ("channel", "pulse width", "recruitment", ""), rows, str(self).splitlines()[1:])
 
     def as_dict(self) -> dict[str, Any]:
@@ -201,19 +196,12 @@ class Allocation(ByName, ReadOnly):
 
         `strength_band` holds the factors on the strength assumed that the bands of the torques belong to.
         """
-        low, high = self.achieved_band
+        bands = np.sort(self.achieved_band, axis=0).T.tolist()
+        torques = zip(self.joints, self.wanted.tolist(), self.achieved.tolist(), bands, strict=True)
         return {
             "pulse_width_us": self.pulse_widths_us,
             "recruitment": dict(zip(self.names, self.recruitment.tolist(), strict=True)),
-            "torque_nm": {
-                joint: {
-                    "wanted": float(self.wanted[j]),
-                    "achieved": float(self.achieved[j]),
-                    "band": sorted((float(low[j]), float(high[j]))),
-                }
-                for j, joint in enumerate(self.joints)
-                if self.wanted[j] or self.achieved[j]
-            },
+            "torque_nm": {n: {"wanted": w, "achieved": a, "band": band} for n, w, a, band in torques if w or a},
             "strength_band": list(self.problem.band),
             "reasons": self.reasons,
             "held": list(self.held),
@@ -232,18 +220,12 @@ class Allocation(ByName, ReadOnly):
         return [f"with {weak:.2g} to {strong:.2g} of the strength assumed: {', '.join(parts)}"]
 
     def __str__(self) -> str:
-        on = [
-            f"{name.replace('_', ' ')} {width:.0f} us"
-            for name, width in zip(self.names, self.pulse_width_us, strict=True)
-            if width > 0.0
-        ]
+        each = zip(self.names, self.pulse_width_us, strict=True)
+        on = [f"{name.replace('_', ' ')} {width:.0f} us" for name, width in each if width > 0.0]
         lines = [", ".join(on) or "nothing stimulated", *(self.reasons or ["every torque within 0.5 N m"])]
         lines += [*self.band_lines(), *self.held]
-        proof = (
-            f"optimal to {max(self.certificate.residual, 0.0):.0e}"
-            if self.problem.least is None
-            else f"gap {self.gap:.0e}"
-        )
+        residual, is_exact = max(self.certificate.residual, 0.0), self.problem.least is None
+        proof = f"optimal to {residual:.0e}" if is_exact else f"gap {self.gap:.0e}"
         return "\n".join([*lines, f"{proof}{'; ' + self.note if self.note else ''}"])
 
 

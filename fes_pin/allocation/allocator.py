@@ -127,19 +127,19 @@ class Allocator(OfProblem):
 
     def _solve(self, wanted: np.ndarray, before: np.ndarray, solver: str) -> Allocation:
         p = self.problem
-        lower, upper = p.limits(before)
+        lower, upper = limits = p.limits(before)
         f = wanted @ self.pull
         if p.lexicographic:
             total, root = p.prices + p.change, np.sqrt(p.weights / p.scale)
             target = p.change * before / total
-            r, note = error_then_effort(root[:, None] * p.matrix, root * wanted, total, target, lower, upper)
+            r, note = error_then_effort(root[:, None] * p.matrix, root * wanted, total, target, limits)
             return self.result(r, wanted, lower, upper, before, note)
         if p.change:
             f -= p.change * before
         if p.least is not None:
             return self._choose(f, wanted, lower, upper, before)
         if p.cubes:
-            r, note = least_cubes(self.squares, f, p.prices, p.change, lower, upper, self.certify.unseen(wanted))
+            r, note = least_cubes(self.squares, f, p.prices, p.change, limits, self.certify.unseen(wanted))
             return self.result(r, wanted, lower, upper, before, note)
         if solver == "daqp":
             r = self.program.solve(f[None], lower, upper)[0][0]

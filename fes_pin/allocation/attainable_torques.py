@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy.optimize import linprog, lsq_linear
@@ -12,10 +12,7 @@ from scipy.optimize import linprog, lsq_linear
 from fes_pin.allocation.inputs import fractions, torque_matrix, wanted_torque
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import all_known, by_name, shortened
-from fes_pin.data.show import frame, table_html
-
-if TYPE_CHECKING:
-    import pandas
+from fes_pin.data.show import DataFrame, frame, table_html
 
 INSIDE_NM = 1e-6
 """A torque nearer to the set than this counts as inside, N m."""
@@ -83,7 +80,7 @@ class AttainableTorques:
         """Least and greatest torque of one joint, whatever the others do, N m."""
         return -self.support({joint: -1.0}), self.support({joint: 1.0})
 
-    def to_frame(self) -> pandas.DataFrame:
+    def to_frame(self) -> DataFrame:
         """Least and greatest torque, N m, a row each joint, as a frame of pandas; see `data.show.frame`."""
         least, greatest = zip(*map(self.range, self.joints), strict=True)
         return frame({"joint": self.joints, "least": least, "greatest": greatest}, "joint")
@@ -109,9 +106,8 @@ class AttainableTorques:
             return np.inf
         n, size = self.columns.shape[1], float(np.abs(wanted).max())
         equal = np.column_stack([self.columns, -wanted / size])
-        result = linprog(
-            np.r_[np.zeros(n), -1.0], A_eq=equal, b_eq=np.zeros(len(wanted)), bounds=[(0, 1)] * n + [(0, None)]
-        )
+        bounds = [(0, 1)] * n + [(0, None)]
+        result = linprog(np.r_[np.zeros(n), -1.0], A_eq=equal, b_eq=np.zeros(len(wanted)), bounds=bounds)
         return float(result.x[-1] / size) if result.success else 0.0
 
     def outline(self, first: str, second: str) -> np.ndarray:

@@ -156,9 +156,8 @@ def solve_by(
     if rows is not None:
         G, h = matrix(np.vstack([rows, -rows])), np.append(upper[n:], -lower[n:])
     quiet: dict[str, Any] = {"raise_error": False} if solver == "osqp" else {}  # it warns of a default that will change
-    found = qpsolvers.solve_problem(
-        qpsolvers.Problem(matrix(H), f, G, h, None, None, lower[:n], upper[:n]), solver=solver, **quiet
-    )
+    problem = qpsolvers.Problem(matrix(H), f, G, h, None, None, lower[:n], upper[:n])
+    found = qpsolvers.solve_problem(problem, solver=solver, **quiet)
     if found.x is None or not np.isfinite(found.x).all():
         raise InputError(f"solver {solver!r} found no answer")
     box = np.zeros(n) if found.z_box is None else found.z_box

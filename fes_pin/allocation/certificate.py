@@ -56,11 +56,8 @@ class Certificate:
 
     def is_optimal(self, tolerance: float = 1e-9) -> bool:
         """Whether no residual exceeds this part of `flattest`, or else rounding, and the cost is a finite number."""
-        return (
-            self.residual <= max(tolerance * self.flattest, self.rounding)
-            and math.isfinite(self.cost)
-            and math.isfinite(self.gap)
-        )
+        is_finite = math.isfinite(self.cost) and math.isfinite(self.gap)
+        return is_finite and self.residual <= max(tolerance * self.flattest, self.rounding)
 
 
 def residuals(

@@ -5,7 +5,7 @@ from scipy.linalg import null_space
 from scipy.optimize import lsq_linear
 
 from fes_pin.allocation.bounded import BoundedProgram, lone_steps, solve_once
-from fes_pin.allocation.problem import EPSILON
+from fes_pin.allocation.problem import EPSILON, Limits
 
 STEPS = 100
 FLATTEST = 1e-9
@@ -15,13 +15,7 @@ LEAST_SHARE = 1e-10
 
 
 def least_cubes(
-    squares: np.ndarray,
-    f: np.ndarray,
-    prices: np.ndarray,
-    change: float,
-    lower: np.ndarray,
-    upper: np.ndarray,
-    tolerance: float,
+    squares: np.ndarray, f: np.ndarray, prices: np.ndarray, change: float, limits: Limits, tolerance: float
 ) -> tuple[np.ndarray, str]:
     """Minimise `1/2 r'Sr + f'r + prices r^3 / 3 + change/2 r'r` by quadratic programs in turn with a line search.
 
@@ -33,28 +27,23 @@ def least_cubes(
     def cost(r: np.ndarray) -> float:
         return 0.5 * r @ base @ r + f @ r + prices @ r**3 / 3.0
 
-    r = np.clip(np.full(len(f), 0.5), lower, upper)
+    r = np.clip(np.full(len(f), 0.5), *limits)
     for _ in range(STEPS):
         gradient = base @ r + f + prices * r * r
-        if lone_steps(gradient, r, lower, upper, curvature) <= tolerance:
+        if lone_steps(gradient, r, *limits, curvature) <= tolerance:
             return r, ""
         H = base + np.diag(np.maximum(2.0 * prices * r, FLATTEST * curvature))
-        step = solve_once(H, gradient - H @ r, lower, upper) - r
+        step = solve_once(H, gradient - H @ r, *limits) - r
         length, now = 1.0, cost(r)
         dust = 8.0 * EPSILON * abs(now)
         while length > 1e-6 and cost(r + length * step) > now + dust + 1e-4 * length * (gradient @ step):
             length *= 0.5
-        r = np.clip(r + length * step, lower, upper)
+        r = np.clip(r + length * step, *limits)
     return r, f"not converged in {STEPS} quadratic programs"
 
 
 def error_then_effort(
-    rows: np.ndarray,
-    wanted: np.ndarray,
-    total: np.ndarray,
-    target: np.ndarray,
-    lower: np.ndarray,
-    upper: np.ndarray,
+    rows: np.ndarray, wanted: np.ndarray, total: np.ndarray, target: np.ndarray, limits: Limits
 ) -> tuple[np.ndarray, str]:
     """Least `|rows r - wanted|` within limits; among its minimisers the least `total (r - target)^2`.
 
@@ -63,6 +52,7 @@ def error_then_effort(
 
     Returns the recruitment and a note with the slope of the second cost along the null space that no limit explains.
     """
+    lower, upper = limits
     r, open_ = lower.copy(), lower < upper
     if open_.any():
         room = np.zeros(open_.sum()), (upper - lower)[open_]
@@ -73,8 +63,8 @@ def error_then_effort(
         return r, "one choice alone has the least error, to 0"
     slope = root**2 * (r - target)
     endless = np.full(along.shape[1], np.inf)
-    limits = np.append(-endless, lower - r), np.append(endless, upper - r)
-    moved, y = (each[0] for each in BoundedProgram(np.eye(len(endless)), along).solve(slope[None] @ along, *limits))
+    left = np.append(-endless, lower - r), np.append(endless, upper - r)
+    moved, y = (each[0] for each in BoundedProgram(np.eye(len(endless)), along).solve(slope[None] @ along, *left))
     if np.isnan(y).any():
         return r, "least error; the least effort among its choices was not found"
     unexplained = along.T @ (slope + root**2 * (along @ moved) + y[len(endless) :])

@@ -26,6 +26,8 @@ LEAST_LEFT = 0.05
 SECONDS = 1.0
 """Default limit on the search for the best channels to switch off, s: thirty channels take a few hundredths."""
 EPSILON = float(np.finfo(float).eps)
+Limits = tuple[np.ndarray, np.ndarray]
+"""Least and greatest recruitment of each channel."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,17 +90,17 @@ class Options:
         return cls(**given)
 
     def __post_init__(self) -> None:
-        for name in ("lexicographic", "rounding"):
-            truth(getattr(self, name), name)
+        vars(self).update({n: truth(getattr(self, n), n) for n in ("lexicographic", "rounding")})
         known_word(self.effort_kind, ("squares", "cubes", "fatigue"), "effort_kind")
         if self.effort_kind == "cubes" and self.lexicographic:
             raise InputError("lexicographic goes with effort squares or fatigue, not with cubes")
         if self.least is not None and (self.effort_kind == "cubes" or self.lexicographic):
             raise InputError("least recruitments go with effort squares or fatigue, not with cubes or lexicographic")
-        if positive_number(self.rate, "rate", infinite=True) < np.inf:
-            between(self.rate, 0.0, 1.0, "rate (of recruitment, not of pulse width)")
-        positive_number(self.seconds, "seconds", infinite=True)
-        between(self.change, 0.0, LARGEST_PRICE, "change")
+        rate = positive_number(self.rate, "rate", infinite=True)
+        if rate < np.inf:
+            between(rate, 0.0, 1.0, "rate (of recruitment, not of pulse width)")
+        seconds = positive_number(self.seconds, "seconds", infinite=True)
+        vars(self).update(rate=rate, seconds=seconds, change=between(self.change, 0.0, LARGEST_PRICE, "change"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,7 +177,7 @@ class AllocationProblem(ReadOnly):
         """Whether the program is one of squares within limits, so that torques may be allocated many at a time."""
         return self.least is None and not self.cubes and not self.lexicographic
 
-    def limits(self, before: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def limits(self, before: np.ndarray) -> Limits:
         """Limits of recruitment under the rate limit, from the recruitments in force."""
         if self.rate == np.inf:
             return self.lower, self.upper
@@ -230,12 +232,8 @@ def problem_of(nerves: Any, q: Any, v: Any, options: Options) -> AllocationProbl
     scale = float(np.einsum("ji,j,ji->i", matrix, weights, matrix).max()) or 1.0
     return AllocationProblem(
         *(names, joints, nominal, matrix, ChannelRecruitment(curve, n), weights, prices, lower, upper, least),
-        change=float(options.change),
-        rate=float(options.rate),
+        **{name: getattr(options, name) for name in ("change", "rate", "lexicographic", "rounding", "seconds")},
         cubes=options.effort_kind == "cubes",
-        lexicographic=bool(options.lexicographic),
-        rounding=bool(options.rounding),
-        seconds=float(options.seconds),
         scale=scale,
         held=tuple(nerves.held(q)) if named else (),
         band=nerves.strength_band if named else (1.0, 1.0),
@@ -303,8 +301,7 @@ def recruitment_limits(options: Options, names: tuple[str, ...]) -> tuple[np.nda
     never = (lower > 0.0) & (least > upper)
     if never.any():
         i = int(np.argmax(never))
-        raise InputError(
-            f"{names[i]} may not be off, for its lower limit is {lower[i]:g}, and not on, for its upper limit "
-            f"{upper[i]:g} lies below its least recruitment {least[i]:g}"
-        )
+        off = f"may not be off, for its lower limit is {lower[i]:g}"
+        on = f"not on, for its upper limit {upper[i]:g} lies below its least recruitment {least[i]:g}"
+        raise InputError(f"{names[i]} {off}, and {on}")
     return lower, upper, least

@@ -73,8 +73,7 @@ def allocate_walk(torques: Any, nerves: Any, q: Any, v: Any = None, **options: A
         program = Allocator.of_problem(replace(p, nominal=matrix, matrix=matrix, scale=scale, other=None))
         each.append(program(torque, before))
         before = each[-1].recruitment
-    r, widths, achieved = (
-        np.array(a) for a in zip(*((o.recruitment, o.pulse_width_us, o.achieved) for o in each), strict=True)
-    )
+    parts = zip(*((one.recruitment, one.pulse_width_us, one.achieved) for one in each), strict=True)
+    r, widths, achieved = map(np.array, parts)
     residual = np.array([one.certificate.residual for one in each])
     return WalkAllocation(r, widths, wanted, achieved, residual, p, matrices, tuple(each))

@@ -42,12 +42,8 @@ class Leans(Tabulated):
     """The field that says whether the posture itself is kept."""
 
     def _table(self) -> dict[str, Any]:
-        names = [mode.name for mode in self.falling]
-        return {
-            "mode": names,
-            "positive_deg": self.lean_deg[:, 0].tolist(),
-            "negative_deg": self.lean_deg[:, 1].tolist(),
-        }
+        positive, negative = self.lean_deg.T.tolist()
+        return {"mode": [mode.name for mode in self.falling], "positive_deg": positive, "negative_deg": negative}
 
     @property
     def least_lean_deg(self) -> float:

@@ -108,10 +108,8 @@ class ModalControllability(Tabulated):
             out.append("(of the modes without damping and rates: see pbh)")
         out.append(f"{'mode':70s} PBH  both ways  {f'1 deg, {self.inputs.price_unit}':>15s}  strongest input")
         for i, mode in enumerate(self.modes):
-            out.append(
-                f"{i + 1:3d} {mode.name:66s} {'yes' if self.controllable[i] else 'no':4s} "
-                f"{'yes' if self.both_ways[i] else 'no':10s} {self.energy[i]:15.3g}  {self._strongest[i]}"
-            )
+            pbh, both = ("yes" if one[i] else "no" for one in (self.controllable, self.both_ways))
+            out.append(f"{i + 1:3d} {mode.name:66s} {pbh:4s} {both:10s} {self.energy[i]:15.3g}  {self._strongest[i]}")
         return "\n".join(out)
 
 
@@ -144,18 +142,9 @@ def modal_controllability(linear: LinearBody, inputs, horizon: float = 0.3) -> M
     controllable = independent(found.values, gains)
     with np.errstate(divide="ignore"):
         energy = np.where(controllable, price / squared, np.inf)
-    return ModalControllability(
-        linear=linear,
-        modes=found,
-        inputs=inputs,
-        horizon=float(horizon),
-        gains=gains,
-        controllable=controllable,
-        both_ways=np.logical_and(*(push.any(axis=1) for push in inputs.pushes(gains))),
-        energy=energy,
-        mode_influence=gains * (np.radians(1.0) / found.degree)[:, None],
-        joint_influence=linear.mobility @ torque,
-    )
+    both_ways = np.logical_and(*(push.any(axis=1) for push in inputs.pushes(gains)))
+    influence = gains * (np.radians(1.0) / found.degree)[:, None], linear.mobility @ torque
+    return ModalControllability(linear, found, inputs, horizon, gains, controllable, both_ways, energy, *influence)
 
 
 def independent(values: np.ndarray, gains: np.ndarray) -> np.ndarray:

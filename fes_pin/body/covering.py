@@ -43,12 +43,9 @@ class Demand:
         rows, limits = np.vstack([p.A_eq, -p.A_eq, p.A_ub]), np.concatenate([p.b_eq, -p.b_eq, p.b_ub])
         if not len(rows):
             return None
-        found = linprog(
-            np.append(np.zeros(used.sum()), 1.0),
-            A_ub=sparse.csr_array(np.column_stack([rows[:, used], -np.ones(len(rows))])),
-            b_ub=limits,
-            bounds=np.column_stack([np.append(p.lower[used], 0.0), np.append(p.upper[used], np.inf)]),
-        )
+        violated = sparse.csr_array(np.column_stack([rows[:, used], -np.ones(len(rows))]))
+        bounds = np.column_stack([np.append(p.lower[used], 0.0), np.append(p.upper[used], np.inf)])
+        found = linprog(np.append(np.zeros(used.sum()), 1.0), violated, limits, bounds=bounds)
         if found.status != 0:
             raise RuntimeError(f"the least violation was not found: {found.message}")
         if found.fun <= FEASIBLE:
@@ -116,7 +113,6 @@ def _cover(count: int, rows: list[np.ndarray], excluded: list[np.ndarray]) -> np
     if excluded:
         apart = np.array(excluded, dtype=float)
         constraints.append(optimize.LinearConstraint(apart, ub=apart.sum(axis=1) - 1.0))
-    answer = optimize.milp(
-        np.ones(count), constraints=constraints, integrality=np.ones(count), bounds=optimize.Bounds(0, 1)
-    )
+    ones, off_or_on = np.ones(count), optimize.Bounds(0, 1)
+    answer = optimize.milp(ones, constraints=constraints, integrality=ones, bounds=off_or_on)
     return np.round(answer.x).astype(bool) if answer.status == 0 else None

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -144,10 +144,7 @@ def postures_of_walk(coordinates: Mapping[str, np.ndarray], stance: str, flat_fo
     """
     known_word(stance, SIDES, "stance")
 
-    def measured(name: str) -> np.ndarray:
-        return _coordinate(coordinates, name)
-
-    angles: dict[str, np.ndarray] = {}
+    angles, measured = dict[str, np.ndarray](), partial(_coordinate, coordinates)
     for side in SIDES:
         s = side[0]
         for joint in ("hip_flexion", "hip_adduction", "hip_rotation"):
@@ -158,10 +155,8 @@ def postures_of_walk(coordinates: Mapping[str, np.ndarray], stance: str, flat_fo
         foot = turn(axes[0], measured(f"ankle_angle_{s}")) @ turn(axes[1], measured(f"subtalar_angle_{s}"))
         if side == stance and flat_foot:
             foot = _flat_ankle(angles, pelvis_turns(coordinates), side, foot)
-        for joint, value in zip(
-            ("ankle_dorsiflexion", "ankle_inversion", "ankle_rotation"), ankle_angles(foot, side), strict=True
-        ):
-            angles[f"{side}_{joint}"] = value
+        ankle = (f"{side}_ankle_{name}" for name in ("dorsiflexion", "inversion", "rotation"))
+        angles |= zip(ankle, ankle_angles(foot, side), strict=True)
     for joint in JOINT_NAMES[16:]:
         angles[joint] = measured(joint)
     return NamedArray(np.stack([angles[name] for name in JOINT_NAMES], axis=1), JOINT_NAMES)

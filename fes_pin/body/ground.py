@@ -85,9 +85,8 @@ class Wrench(ReadOnly):
 
     def on(self, places: Sequence[int]) -> Wrench:
         """With these of the joints alone."""
-        return Wrench(
-            self.at_rest, self.per_angle[:, places], self.per_acceleration[:, places], self.per_torque[:, places]
-        )
+        moving = (self.per_angle, self.per_acceleration, self.per_torque)
+        return Wrench(self.at_rest, *(part[:, places] for part in moving))
 
     def __sub__(self, other: Wrench) -> Wrench:
         """Return this wrench minus another one."""
@@ -113,12 +112,8 @@ def ground_wrench(body: Body, model: pin.Model, q: np.ndarray) -> Wrench:
     force, moment = -(mass + foot.mass) * g, np.cross(data.com[0], weight) - np.cross(foot.lever, foot.mass * g)
     along = np.cross(jacobian.T, weight).T
     turning = momentum[3:] + mass * np.cross(data.com[0], jacobian.T).T
-    return Wrench(
-        np.concatenate([force, moment]),
-        np.vstack([np.zeros((3, model.nv)), along]),
-        np.vstack([mass * jacobian, turning]),
-        np.zeros((6, model.nv)),
-    )
+    angle, rise = np.vstack([np.zeros_like(jacobian), along]), np.vstack([mass * jacobian, turning])
+    return Wrench(np.concatenate([force, moment]), angle, rise, np.zeros((6, model.nv)))
 
 
 def centre_of_pressure(wrench: np.ndarray) -> np.ndarray:
@@ -228,10 +223,8 @@ def second_foot(body: Body, model: pin.Model, q: np.ndarray) -> SecondFoot:
     first, second = (_foot(body, q, each) for each in (body.stance, side))
     tilt, height = np.degrees(np.arccos(np.clip(second.turn[2, 2], -1.0, 1.0))), second.place[2]
     if tilt > FLAT_DEG or abs(height) > LEVEL_M:
-        raise InputError(
-            f"the {side} forefoot is not on the ground: it is tilted by {tilt:.1f} deg and {100 * height:+.1f} cm high",
-            column="both_feet",
-        )
+        lies = f"it is tilted by {tilt:.1f} deg and {100 * height:+.1f} cm high"
+        raise InputError(f"the {side} forefoot is not on the ground: {lies}", column="both_feet")
     data = model.createData()
     com = pin.centerOfMass(model, data, q).copy()
     pin.computeJointJacobians(model, data, q)

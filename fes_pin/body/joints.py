@@ -83,8 +83,7 @@ def _plain(name: str) -> str:
 
 def axis_of(name: str) -> np.ndarray:
     """Axis about which the outer segment turns when the joint's angle grows: (3,) unit vector, neutral posture."""
-    plain = _plain(name)
-    axis = _TURNS[plain][0].copy()
+    axis = _TURNS[_plain(name)][0].copy()
     return -axis if side_of(name) == "left" and abs(axis[1]) < 0.5 else axis
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy.linalg import eigh, null_space
@@ -21,20 +21,12 @@ from fes_pin.body.modes import Mode, ModeSet, mode_name
 from fes_pin.data.errors import InputError
 from fes_pin.data.named import NamedArray
 from fes_pin.data.numbers import known_word
-from fes_pin.data.show import frame
+from fes_pin.data.read_only import held
+from fes_pin.data.show import DataFrame, frame
 from fes_pin.data.tabulated import Tabulated
-
-if TYPE_CHECKING:
-    import pandas
 
 _RANK = 1e-9
 """Singular values below this part of the largest are rounding: the second foot's rows are of order 1."""
-
-
-def _fixed(array: np.ndarray) -> np.ndarray:
-    """An array that cannot be changed."""
-    array.setflags(write=False)
-    return array
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,12 +92,12 @@ class LinearBody(Tabulated):
     @cached_property
     def basis(self) -> np.ndarray:
         """Columns that span the deviations that the ground allows: (n, r), orthonormal."""
-        return _fixed(np.eye(self.n) if self.closure is None else null_space(self.closure, rcond=_RANK))
+        return held(np.eye(self.n) if self.closure is None else null_space(self.closure, rcond=_RANK))
 
     @cached_property
     def mobility(self) -> np.ndarray:
         """Acceleration of each joint per torque at each: (n, n), 1/(kg m2); A^-1 on one foot."""
-        return _fixed(self.basis @ np.linalg.solve(self.basis.T @ self.A @ self.basis, self.basis.T))
+        return held(self.basis @ np.linalg.solve(self.basis.T @ self.A @ self.basis, self.basis.T))
 
     @property
     def conservative(self) -> bool:
@@ -120,12 +112,12 @@ class LinearBody(Tabulated):
         F[:n, n:] = np.eye(n)
         F[n:, :n] = self.mobility @ self.B
         F[n:, n:] = -self.mobility @ self.E
-        return _fixed(F)
+        return held(F)
 
     @cached_property
     def R(self) -> np.ndarray:
         """Input matrix of equation (11) for u = C + D: (2n, n)."""
-        return _fixed(np.vstack([np.zeros((self.n, self.n)), self.mobility]))
+        return held(np.vstack([np.zeros((self.n, self.n)), self.mobility]))
 
     @property
     def holding_torque(self) -> dict[str, float]:
@@ -147,7 +139,7 @@ class LinearBody(Tabulated):
     def _table(self) -> dict[str, Any]:
         return {"joint": list(self.joint_names), "angle_rad": self.q.tolist(), "holding_nm": (-self.C).tolist()}
 
-    def to_frame(self, matrix: str | None = None) -> pandas.DataFrame:
+    def to_frame(self, matrix: str | None = None) -> DataFrame:
         """Angles and holding torques by joint as a frame of pandas, or one of the matrices with its names.
 
         Parameters
@@ -182,10 +174,8 @@ class LinearBody(Tabulated):
         shares = np.abs(shapes * (self.A @ shapes))
         shares /= shares.sum(axis=0)
         names, stance = self.joint_names, self.body.stance
-        named = tuple(
-            Mode(float(value), shape, names, share, mode_name(float(value), share, names, stance))
-            for value, shape, share in zip(values, shapes.T, shares.T, strict=True)
-        )
+        each = zip(values.tolist(), shapes.T, shares.T, strict=True)
+        named = tuple(Mode(v, shape, names, share, mode_name(v, share, names, stance)) for v, shape, share in each)
         return ModeSet(named, values, shapes, self.conservative)
 
     def poles(self) -> np.ndarray:
@@ -238,7 +228,5 @@ class LinearBody(Tabulated):
         if self.both_feet:
             return f"Linearized {self.body}, both feet on the ground{slope}{held}: {self.n} joints"
         worst = int(np.argmax(np.abs(self.C)))
-        return (
-            f"Linearized {self.body}{slope}{held}: {self.n} joints; "
-            f"largest torque to hold it {-self.C[worst]:+.1f} N m at {self.joint_names[worst]}"
-        )
+        largest = f"{-self.C[worst]:+.1f} N m at {self.joint_names[worst]}"
+        return f"Linearized {self.body}{slope}{held}: {self.n} joints; largest torque to hold it {largest}"

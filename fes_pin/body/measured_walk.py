@@ -91,11 +91,9 @@ def data_folder() -> Path:
     for folder in (root / WALKING.name, root / "data" / WALKING.name, root):
         if (folder / ANGLES).is_file():
             return folder
-    raise InputError(
-        f"no {WALKING.name}/{ANGLES} there; set {VARIABLE} to the folder that holds it: joint angles and inverse "
-        f"dynamics by OpenSim of {WALKING.origin} ({WALKING.licence})",
-        file=root,
-    )
+    missing = f"no {WALKING.name}/{ANGLES} there; set {VARIABLE} to the folder that holds it"
+    what = f"joint angles and inverse dynamics by OpenSim of {WALKING.origin} ({WALKING.licence})"
+    raise InputError(f"{missing}: {what}", file=root)
 
 
 def columns_of_numbers(path: Path, wanted: Sequence[str]) -> dict[str, np.ndarray]:

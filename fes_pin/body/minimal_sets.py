@@ -92,10 +92,8 @@ class MinimalSet:
         price = f"; energy {self.energy:.2g} s, condition {self.condition:.1e}" if self.falls else ""
         if self.equals > 1:
             price += f"; {'at least ' * (self.equals == MOST_SETS)}{self.equals} sets of this size do"
-        return (
-            f"{len(self.inputs):2d} nerves ({self.locked_joints} joints locked, {self.falls} falls): "
-            f"{', '.join(self.inputs) or '-'}; {further}; {able}{price}"
-        )
+        count = f"{len(self.inputs):2d} nerves ({self.locked_joints} joints locked, {self.falls} falls)"
+        return f"{count}: {', '.join(self.inputs) or '-'}; {further}; {able}{price}"
 
 
 def minimal_sets(
@@ -158,9 +156,8 @@ def minimal_sets(
     InputError
         Unknown brace, joint or stimulation, negative number, a lean that is not positive and finite.
     """
-    asked = _Question(
-        positive_number(lean_deg, "lean_deg"), together, gravity, settle_deg, stimulation, balance, strength_factor
-    )
+    lean = positive_number(lean_deg, "lean_deg")
+    asked = _Question(lean, together, gravity, settle_deg, stimulation, balance, strength_factor)
     max_braces, alternatives = whole(max_braces, "max_braces"), whole(alternatives, "alternatives", 1)
     inputs = Inputs.of(inputs, linear)
     orthoses = _orthoses(braces)
@@ -183,9 +180,8 @@ def minimal_sets(
 
 def pareto(sets: Iterable[MinimalSet]) -> list[MinimalSet]:
     """Return the sets that no other beats in both nerves and braces; of equal ones the cheapest."""
-    best: dict[int, MinimalSet] = {}
-    for found in sorted(sets, key=lambda s: (len(s.braces), len(s.inputs), s.energy)):
-        best.setdefault(len(found.braces), found)
+    order = sorted(sets, key=lambda s: (len(s.braces), len(s.inputs), s.energy))
+    best = {len(found.braces): found for found in reversed(order)}
     front: list[MinimalSet] = []
     for count in sorted(best):
         if not front or len(best[count].inputs) < len(front[-1].inputs):
@@ -268,16 +264,7 @@ def _priced(linear: LinearBody, inputs: Inputs, chosen: tuple[str, ...], asked: 
         )
         leans.append(able.least_lean_deg)
         error = max(error, float(able.error_deg.max(initial=0.0)))
-    return MinimalSet(
-        inputs=inputs.names,
-        braces=tuple(chosen),
-        free_joints=linear.n,
-        locked_joints=len(linear.braced),
-        falls=len(energies),
-        energy=float(energies.max(initial=0.0)),
-        condition=condition,
-        stimulation=asked.stimulation if asked.together else "constant",
-        lean_deg=leans[1],
-        lean_band_deg=(leans[0], leans[2]),
-        error_deg=error,
-    )
+    low, lean, high = leans
+    counts = linear.n, len(linear.braced), len(energies)
+    energy, stimulation = float(energies.max(initial=0.0)), asked.stimulation if asked.together else "constant"
+    return MinimalSet(inputs.names, chosen, *counts, energy, condition, stimulation, lean, (low, high), error)

@@ -17,21 +17,15 @@ from fes_pin.data.tabulated import Tabulated
 
 NEUTRAL_RATE = 1e-3
 """Below this rate, 1/s, a mode neither falls nor swings within a quarter of an hour."""
-_PLANES = {
-    "fore-aft": ("flexion", "dorsiflexion", "extension"),
-    "sideways": ("adduction", "inversion", "bending"),
-    "turning": ("rotation",),
-}
-_VERBS = {
-    ("fall", "fore-aft"): "fall forward or back",
-    ("fall", "sideways"): "fall sideways",
-    ("fall", "turning"): "twist away",
-    ("swing", "fore-aft"): "swing forward and back",
-    ("swing", "sideways"): "swing sideways",
-    ("swing", "turning"): "twist to and fro",
-    ("neutral", "fore-aft"): "drift forward or back",
-    ("neutral", "sideways"): "drift sideways",
-    ("neutral", "turning"): "drift in rotation",
+_PLANES = (  # fore-aft, sideways, turning
+    ("flexion", "dorsiflexion", "extension"),
+    ("adduction", "inversion", "bending"),
+    ("rotation",),
+)
+_VERBS = {  # in each of the planes
+    "fall": ("fall forward or back", "fall sideways", "twist away"),
+    "swing": ("swing forward and back", "swing sideways", "twist to and fro"),
+    "neutral": ("drift forward or back", "drift sideways", "drift in rotation"),
 }
 
 
@@ -184,12 +178,10 @@ def kind_of(value: float) -> str:
     return "fall" if value > 0.0 else "swing"
 
 
-def _plane(share: np.ndarray, names: tuple[str, ...]) -> str:
-    totals = {
-        plane: sum(float(s) for s, name in zip(share, names, strict=True) if name.rsplit("_", 1)[1] in motions)
-        for plane, motions in _PLANES.items()
-    }
-    return max(totals, key=totals.__getitem__)
+def _plane(share: np.ndarray, names: tuple[str, ...]) -> int:
+    each = [(float(s), name.rsplit("_", 1)[1]) for s, name in zip(share, names, strict=True)]
+    totals = [sum(s for s, motion in each if motion in motions) for motions in _PLANES]
+    return totals.index(max(totals))
 
 
 def _region(name: str, stance: str) -> str:
@@ -210,7 +202,7 @@ def mode_name(value: float, share: np.ndarray, names: tuple[str, ...], stance: s
     order = sorted(regions, key=regions.__getitem__, reverse=True)
     where = order[0] if len(order) < 2 or regions[order[1]] < 0.5 * regions[order[0]] else f"{order[0]} and {order[1]}"
     kind = kind_of(value)
-    text = f"{_VERBS[kind, _plane(share, names)]} about the {where}"
+    text = f"{_VERBS[kind][_plane(share, names)]} about the {where}"
     rate = np.sqrt(abs(value))
     if kind == "fall":
         return f"{text}, {np.log(2.0) / rate:.2g} s to double"

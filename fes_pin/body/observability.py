@@ -88,9 +88,8 @@ def observability(linear: LinearBody, sensors: Iterable[str]) -> ModalObservabil
         if name not in linear.joint_names:
             raise InputError(f"{name!r} is braced: nothing moves there")
     rows = _angles(linear, found, names)
-    return ModalObservability(
-        found, names, rows, independent(found.values, rows), _posteriors(found.modes, rows[None])[0]
-    )
+    (left,) = _posteriors(found.modes, rows[None])
+    return ModalObservability(found, names, rows, independent(found.values, rows), left)
 
 
 def _angles(linear: LinearBody, found: ModeSet, names: Sequence[str]) -> np.ndarray:
@@ -163,10 +162,8 @@ def fewest_goniometers(
     whole = observability(linear, names)
     rows = [i for i, mode in enumerate(whole.modes) if mode.kind == "fall"]
     if whole.worst_deg > within_deg or not np.all(whole.observable[rows]):
-        raise InputError(
-            f"these joints leave a fall uncertain by {whole.worst_deg:.2g} degrees, more than {within_deg:g}: "
-            "they do not see every falling mode"
-        )
+        found = f"these joints leave a fall uncertain by {whole.worst_deg:.2g} degrees, more than {within_deg:g}"
+        raise InputError(f"{found}: they do not see every falling mode")
     for size in range(1, len(names) + 1):
         sets: list[ModalObservability] = []
         combinations = itertools.combinations(range(len(names)), size)

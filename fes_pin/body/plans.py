@@ -191,9 +191,8 @@ class Plans:
             along.insert(0, self._responses[i][self._later])
             alone.insert(0, self._courses[i][self._later])
         later = sum(map(len, along)) - 1
-        if (
-            kind == "swing" and not self.steady
-        ):  # what still swings then goes on: |rest| + |offset| + |rate| within the limit
+        # what still swings then goes on: |rest| + |offset| + |rate| within the limit
+        if kind == "swing" and not self.steady:
             (begin, end), w, time = self._edges, np.sqrt(-value), self._looks[0][-1]
             rate = (np.sin(w * (time - begin)) - np.sin(w * np.maximum(time - end, 0.0))) / -value
             offset, ends = self._responses[i][[-1]] - last / -value, self._courses[i][[-1]]

@@ -52,14 +52,9 @@ class LinearProgram:
 
     def widened(self, cost: Sequence[float] | np.ndarray, A_ub: np.ndarray, A_eq: np.ndarray) -> LinearProgram:
         """The same with further variables, each 0 or more: their costs (v,), and their columns, (rows, v) each."""
-        return replace(
-            self,
-            cost=np.append(self.cost, cost),
-            A_ub=np.column_stack([self.A_ub, A_ub]),
-            A_eq=np.column_stack([self.A_eq, A_eq]),
-            lower=np.append(self.lower, np.zeros(len(cost))),
-            upper=np.append(self.upper, np.full(len(cost), np.inf)),
-        )
+        lower, upper = np.append(self.lower, np.zeros(len(cost))), np.append(self.upper, np.full(len(cost), np.inf))
+        A_ub, A_eq = np.column_stack([self.A_ub, A_ub]), np.column_stack([self.A_eq, A_eq])
+        return replace(self, cost=np.append(self.cost, cost), A_ub=A_ub, A_eq=A_eq, lower=lower, upper=upper)
 
     def towards(self, other: LinearProgram) -> LinearProgram:
         """The program whose last variable says how far from these limits to those of another, 1 there, an answer is."""
@@ -70,14 +65,9 @@ class LinearProgram:
         if not len(self.cost):
             kept = np.all(self.b_ub >= -FEASIBLE) and np.all(np.abs(self.b_eq) <= FEASIBLE)
             return ProgramAnswer(np.zeros(0) if kept else None, 0.0)
-        found = linprog(
-            self.cost,
-            A_ub=sparse.csr_array(self.A_ub),
-            b_ub=self.b_ub,
-            A_eq=sparse.csr_array(self.A_eq),
-            b_eq=self.b_eq,
-            bounds=np.column_stack([self.lower, self.upper]),
-        )
+        most, equal = (sparse.csr_array(rows) for rows in (self.A_ub, self.A_eq))
+        bounds = np.column_stack([self.lower, self.upper])
+        found = linprog(self.cost, most, self.b_ub, equal, self.b_eq, bounds)
         if found.status != 0:
             return ProgramAnswer(None, np.inf, unbounded=found.status == 3)
         return ProgramAnswer(found.x, self._error(found))

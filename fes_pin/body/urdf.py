@@ -37,10 +37,8 @@ def write_urdf(skeleton: Skeleton, stance: str, title: str, provenance: str) -> 
     known_word(stance, SIDES, "stance")
     lines = ['<?xml version="1.0"?>', f"<!-- {provenance.replace('--', '-')} -->", f"<robot name={quoteattr(title)}>"]
     root = f"{stance}_forefoot"
-    origin = skeleton.centres[f"{stance}_mtp"] * [1.0, 1.0, 0.0]
-    lines.append('  <link name="ground"/>')
-    lines += _fixed("stance", "ground", root, np.zeros(3))
-    lines += _link(root, skeleton, origin)
+    lines += ['  <link name="ground"/>', *_fixed("stance", "ground", root, np.zeros(3))]
+    lines += _link(root, skeleton, origin_of(root, skeleton, stance))
     for joint, parent, child in tree(stance):
         here = skeleton.centres[joint.name]
         lines += _joint(joint, parent, child, here - origin_of(parent, skeleton, stance))

@@ -115,11 +115,9 @@ def walk_table(folder: Path, nerves, passive: float = 0.0) -> str:
     walk = read_walk(folder).active(PassiveLegs(passive))
     result = allocate_walk(walk.torque, nerves, walk.q, walk.rates, weights=walk.known.astype(float))
     low, high = (nerves.assumed_strength * factor for factor in nerves.strength_band)
-    lines = [
-        f"{len(walk.time)} samples, {nerves.n} channels, optimal to {result.residual.max():.0e}; "
-        f"{nerves.assumed_strength:g} of a healthy adult's strength ({low:.2g} to {high:.2g})",
-        *nerves.held(walk.q),
-    ]
+    done = f"{len(walk.time)} samples, {nerves.n} channels, optimal to {result.residual.max():.0e}"
+    strong = f"{nerves.assumed_strength:g} of a healthy adult's strength ({low:.2g} to {high:.2g})"
+    lines = [f"{done}; {strong}", *nerves.held(walk.q)]
     lines.append(f"{'joint':28s}{'peak':>9s}{'short, rms':>12s}{'within 10 %':>13s}")
     for j in np.flatnonzero(walk.known):
         peak, short = np.abs(walk.torque[:, j]).max(), result.shortfall[:, j]

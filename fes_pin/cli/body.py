@@ -12,6 +12,7 @@ from fes_pin.cli.group import App, needs, python_names, release_output
 from fes_pin.cli.options import Force, output
 from fes_pin.data.errors import InputError, errors_of
 from fes_pin.data.numbers import between
+from fes_pin.data.outputs import Outputs
 
 app = App(help="The walking body: modes, nerves, view.")
 
@@ -43,9 +44,8 @@ def _body_options(
     elif segments is not None:
         body = Body.from_segments(segments, stance or "right")
     else:
-        body = Body.from_subject(
-            72.6 if mass is None else mass, 1.80 if height is None else height, sex or "male", stance or "right"
-        )
+        kg, m = 72.6 if mass is None else mass, 1.80 if height is None else height
+        body = Body.from_subject(kg, m, sex or "male", stance or "right")
     legs = PassiveLegs(passive) if between(passive, 0.0, 10.0, "--passive") else None
     linear = linearize(body, posture, slope, passive=legs)
     joints = [joint for name in brace or [] for joint in ORTHOSES.get(name, (name,))]
@@ -119,7 +119,6 @@ def nerves(
     from fes_pin.body.catchable import catchable
     from fes_pin.body.controllability import modal_controllability
     from fes_pin.body.inputs import Inputs
-    from fes_pin.data.outputs import Outputs
     from fes_pin.muscles.nerve_inputs import subject_nerves, whose_strength
     from fes_pin.view.influence import check_image, influence_image, influence_table
 
@@ -166,10 +165,8 @@ def _fewest(linear, inputs, lean: float, max_braces: int, stimulation: str, sett
     found = pareto(found) if max_braces else found
     what = "catch, over time," if stimulation == "over_time" else "hold, stimulated constantly,"
     none = "none of these nerves' sets does; brace more joints (--brace corset ...)"
-    return [
-        f"\nFewest nerves that keep the posture and {what} a lean of {lean:g} degrees in every fall:",
-        *(map(str, found) if found else [none]),
-    ]
+    title = f"\nFewest nerves that keep the posture and {what} a lean of {lean:g} degrees in every fall:"
+    return [title, *(map(str, found) if found else [none])]
 
 
 @app.command()
@@ -186,7 +183,6 @@ def view(
     force: Force = False,
 ) -> None:
     """A page with the body, or a live one: a posture, a mode in motion, a nerve's influence, or measured walking."""
-    from fes_pin.data.outputs import Outputs
     from fes_pin.muscles.nerve_inputs import subject_nerves
     from fes_pin.view.viewer import show_influence, show_mode, show_posture
 

@@ -17,6 +17,7 @@ from typer.core import TyperCommand, TyperGroup
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.read_files import one_command
+from fes_pin.settings import while_set
 
 USAGE_ERROR: Any = next(kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "ClickException")
 """Error of typer for a command line that it cannot read; it exports only subclasses of this one."""
@@ -158,13 +159,11 @@ def _run_by_group(command: Callable[..., Any]) -> Callable[..., Any]:
         _check_needs(ctx, words, getattr(command, "rules", {}))
         if quiet and str(given.get("out") or "-") != "-" and isinstance(sys.stdout, Held):
             sys.stdout.is_silent = True
-        before = VOICE.set(verbose - quiet)
         try:
-            return command(**given)
+            with while_set(VOICE, verbose - quiet):
+                return command(**given)
         except InputError as error:
             raise _in_options(error, words, getattr(command, "words", {})) from error
-        finally:
-            VOICE.reset(before)
 
     each = [p for one in (command, _shared) for p in signature(one, eval_str=True).parameters.values()]
     parameters = [p.replace(kind=Parameter.KEYWORD_ONLY) for p in each]
@@ -175,12 +174,8 @@ def _run_by_group(command: Callable[..., Any]) -> Callable[..., Any]:
 
 def _check_needs(ctx: typer.Context, words: Mapping[str, str], rules: Mapping[str, str]) -> None:
     """Refuse options that another one, or its absence, leaves no meaning."""
-    given = {
-        name
-        for name in words
-        if getattr(ctx.get_parameter_source(name), "name", "DEFAULT") != "DEFAULT"
-        and ctx.params.get(name) not in (None, (), [])
-    }
+    said = [name for name in words if getattr(ctx.get_parameter_source(name), "name", "DEFAULT") != "DEFAULT"]
+    given = {name for name in said if ctx.params.get(name) not in (None, (), [])}
     for name, rule in rules.items():
         others = rule.removeprefix("not ").split()
         there = [n for n in others if n in given]

@@ -10,6 +10,7 @@ import typer
 from fes_pin.cli.group import python_names
 from fes_pin.cli.options import Force, Libraries, output
 from fes_pin.cli.progress import catalogue_with, say_whose_code
+from fes_pin.data.outputs import Outputs
 
 if TYPE_CHECKING:
     from fes_pin.data.trial import Trial
@@ -24,7 +25,6 @@ def urdf(
     force: Force = False,
 ) -> None:
     """Write a fitted joint as URDF: inertia and weight as fitted, damping and friction in <dynamics>."""
-    from fes_pin.data.outputs import Outputs
     from fes_pin.models.store import load_model
     from fes_pin.models.urdf_out import extended_urdf
 
@@ -55,7 +55,6 @@ def pulses(
     force: Force = False,
 ) -> None:
     """Write a trial as a list of pulses within stated limits; a trial beyond them is an input error."""
-    from fes_pin.data.outputs import Outputs
     from fes_pin.data.pulses import PulseLimits, pulse_list
     from fes_pin.data.tabular import table_bytes
 
@@ -76,9 +75,8 @@ def _stimulated(path: Path) -> Trial:
     from fes_pin.data.trial import read_trial
 
     names = set(read_csv_or_hint(path).names)
-    kinds = [
-        (one, kind) for one in known_rigs().values() for kind in one.outputs if set(PULSES) & set(one.stimuli(kind))
-    ]
-    fits = [(one, kind) for one, kind in kinds if names <= set(one.columns_of(kind))]
+    kinds = [(one, kind) for one in known_rigs().values() for kind in one.outputs]
+    pulsed = [(one, kind) for one, kind in kinds if set(PULSES) & set(one.stimuli(kind))]
+    fits = [(one, kind) for one, kind in pulsed if names <= set(one.columns_of(kind))]
     schema, kind = fits[0] if fits else (schema_of("muscle"), None)
     return read_trial(path, rig=replace(schema, needed={}), kind=kind, inputs_only=True)

@@ -19,10 +19,10 @@ from fes_pin.data.as_read import HeldFile
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import check_folder, read_bytes
 from fes_pin.data.outputs import Outputs
+from fes_pin.data.schema import IMPOSED, RigSchema, known_rigs, one_of
 
 if TYPE_CHECKING:
     from fes_pin.data.new_study import NewStudy
-    from fes_pin.data.schema import RigSchema
     from fes_pin.data.study import Study
     from fes_pin.data.wanted import Wanted
     from fes_pin.models.catalogue import Catalogue
@@ -80,7 +80,6 @@ def new_study(
     """
     from fes_pin.data.new_body_study import new_body_study
     from fes_pin.data.new_study import new_study as make
-    from fes_pin.data.schema import IMPOSED
     from fes_pin.data.wanted import Wanted
     from fes_pin.diagnosis.checked import odd_lines
     from fes_pin.models.nominal import guess_start
@@ -183,8 +182,6 @@ def _folder(files: list[Path], out: Path | None, force: bool) -> Path:
 
 def _schema(rig: str | None, catalogue: Catalogue, urdf: Path | None, of_rigs: Sequence[object]) -> RigSchema:
     """Return the numbers of the rig, with its URDF where it needs one; walking takes no options `of_rigs`."""
-    from fes_pin.data.schema import known_rigs, one_of
-
     rigs = known_rigs(catalogue.schemas())
     schema = rigs[one_of(rig or "joint", tuple(rigs), partial(InputError, column="--rig"))]
     if schema.owner is None and (urdf is not None or catalogue.origins() or any(of_rigs)):

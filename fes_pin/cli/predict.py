@@ -112,9 +112,8 @@ def _refuse_ignored(is_study: bool, **given: object) -> None:
     for name, value in given.items():
         if value and is_study != (name in ("trials", "exclude")):
             what = "one trial: a study says it of each" if is_study else "a study"
-            raise InputError(
-                f"goes only with {what}", column="--set" if name == "setting" else f"--{name}".replace("_", "-")
-            )
+            option = "set" if name == "setting" else name.replace("_", "-")
+            raise InputError(f"goes only with {what}", column=f"--{option}")
 
 
 def _trials(path: Path, model: Model, trials: str | None, exclude: str | None, catalogue: Catalogue) -> Sequence[Trial]:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from fes_pin.cohort.one import Answer, Work
+from fes_pin.data.files import own_json
 from fes_pin.data.outputs import Outputs
 
 STATE = "state.json"
@@ -34,7 +35,7 @@ class Store:
     def has(self, work: Work, key: str) -> bool:
         """Return whether a valid answer exists: of the same files, versions, seed, limit and library, and whole."""
         place = self.place(work.name)
-        state = self._read(place / STATE)
+        state = own_json(place / STATE)
         is_whole = all((place / name).is_file() for name in state.get("files", ()))
         return is_whole and state.get("key") == key and not state.get("again", False)
 
@@ -48,15 +49,7 @@ class Store:
 
     def get(self, name: str) -> Kept | None:
         """One answer; None if there is none."""
-        state = self._read(self.place(name) / STATE)
+        state = own_json(self.place(name) / STATE)
         if not state:
             return None
-        return Kept(name, self._read(self.place(name) / "diagnosis.json"), str(state.get("error", "")))
-
-    @staticmethod
-    def _read(path: Path) -> dict[str, Any]:
-        try:
-            found = json.loads(path.read_bytes())  # its own, and no input
-        except (OSError, ValueError):
-            return {}
-        return found if isinstance(found, dict) else {}
+        return Kept(name, own_json(self.place(name) / "diagnosis.json"), str(state.get("error", "")))

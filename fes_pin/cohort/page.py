@@ -144,10 +144,8 @@ def _studies(rows: Sequence[Row]) -> list[Markup]:
         left = "something" if r["unexplained"] else "nothing"
         cells.append([link, r["verdict"].replace("_", " "), r["causes"] or "-", free, _errors(r, "horizon"), left])
     made = html_table(head, cells, (3, 4))
-    return [
-        element("p", f"{E_WORDS} {MODELS}", class_="soft"),
-        made if len(rows) <= FOREST else folded(f"All {len(rows)} studies", made),
-    ]
+    about = element("p", f"{E_WORDS} {MODELS}", class_="soft")
+    return [about, made if len(rows) <= FOREST else folded(f"All {len(rows)} studies", made)]
 
 
 def _errors(row: Row, name: str) -> str:

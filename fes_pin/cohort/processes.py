@@ -109,9 +109,8 @@ def on_cluster(tasks: Iterable[Task], address: str, run: Callable[[Work, str], A
     """
     host = re.fullmatch(r"(?:(?:tcp|tls)://)?\[?([^\s/]+?)\]?:\d{1,5}|(?!tcp:|tls:)\w+://\S+", address)
     if host is None:
-        raise InputError(
-            f"expected the address of a Dask scheduler, as tcp://host:8786, found {address!r}", column="scheduler"
-        )
+        message = f"expected the address of a Dask scheduler, as tcp://host:8786, found {address!r}"
+        raise InputError(message, column="scheduler")
     distributed = optional_library("distributed", "cohort", "a cluster needs dask.distributed")
     try:
         if host[1]:

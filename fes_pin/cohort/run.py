@@ -1,7 +1,7 @@
 """A cohort from its studies to its tables and its page; a run that was killed goes on where it was."""
 
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,22 +12,13 @@ from fes_pin.cohort.keep import STATE, Store
 from fes_pin.cohort.one import Answer, Work, diagnose_one
 from fes_pin.cohort.page import cohort_html
 from fes_pin.cohort.processes import Task, in_processes, on_cluster
-from fes_pin.cohort.tables import (
-    ERRORS,
-    Row,
-    cause_rows,
-    nominal_rows,
-    pooled_rows,
-    prevalence_rows,
-    study_row,
-    with_rates,
-)
+from fes_pin.cohort.tables import ERRORS, Row, tables_of
 from fes_pin.data.errors import InputError
 from fes_pin.data.outputs import Outputs
 from fes_pin.data.results import Saveable
 from fes_pin.data.tabular import SUFFIXES, table_bytes
 from fes_pin.infer.result import shown
-from fes_pin.models.catalogue import Catalogue, load_library
+from fes_pin.models.catalogue import load_library
 from fes_pin.verdict.files import OF_ALL, OF_WALKS
 
 
@@ -154,7 +145,7 @@ def run_cohort(
     if all(errors.values()):
         raise InputError(f"none of {len(found)} studies could be diagnosed; the first: {min(errors.items())[1]}")
 
-    made = _cohort(store, found, catalogue)
+    made = Cohort(**tables_of(map(store.get, found), len(catalogue.effects)))  # one is held at a time
     outputs.write(out, _files(made, seed, command))
     return made
 
@@ -163,18 +154,6 @@ def _check_outputs(outputs: Outputs, out: Path, folders: Sequence[Path]) -> None
     outputs.check(out, ("cohort.html", *(f"{name}.{kind}" for name in HEADS for kind in ("csv", "parquet"))))
     for folder in folders:
         outputs.check(folder, (*OF_ALL, *OF_WALKS, STATE))
-
-
-def _cohort(store: Store, names: Iterable[str], catalogue: Catalogue) -> Cohort:
-    studies, causes, nominal = list[Row](), list[Row](), list[Row]()
-    for name in names:
-        if (one := store.get(name)) is not None:  # no more than one record is held
-            studies.append(study_row(one))
-            causes += cause_rows(one)
-            nominal += nominal_rows(one)
-    good = sum(r["verdict"] != "failed" for r in studies)
-    causes = with_rates(causes, good * len(catalogue.effects))
-    return Cohort(studies, causes, pooled_rows([*causes, *nominal], good), prevalence_rows(causes, good))
 
 
 def _files(made: Cohort, seed: int, command: str) -> dict[str, str | bytes]:

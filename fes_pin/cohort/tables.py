@@ -16,6 +16,19 @@ ERRORS = {f"{model}_{n}_percent": (model, n) for model in ("nominal", "extended"
 """Columns of errors E, by model and name in `diagnosis.json`: see `identify.error_measures`."""
 
 
+def tables_of(kept: Iterable[Kept | None], candidates: int) -> dict[str, Sequence[Row]]:
+    """Return the tables of a cohort, whose studies were each searched for so many candidates."""
+    studies, causes, nominal = list[Row](), list[Row](), list[Row]()
+    for one in filter(None, kept):
+        studies.append(study_row(one))
+        causes += cause_rows(one)
+        nominal += nominal_rows(one)
+    good = sum(r["verdict"] != "failed" for r in studies)
+    causes = with_rates(causes, good * candidates)
+    pooled_too, prevalence = pooled_rows([*causes, *nominal], good), prevalence_rows(causes, good)
+    return {"studies": studies, "causes": causes, "pooled": pooled_too, "prevalence": prevalence}
+
+
 def study_row(one: Kept) -> Row:
     """Return the result of a study; its error if it failed, and None or NaN for values that were not computed."""
     found = one.record
@@ -72,11 +85,8 @@ def _cause(study: str, cause: Mapping[str, Any]) -> list[Row]:
 def nominal_rows(one: Kept) -> list[Row]:
     """Return every parameter of an extended model but those of its causes: what all studies have."""
     known = one.record.get("extended", {}).get("parameters", {})
-    return [
-        {"cause": "", "parameter": n, "value": _number(v["value"]), "std": _number(v["std"])}
-        for n, v in known.items()
-        if "." not in n
-    ]
+    nominal = ((n, {k: _number(v[k]) for k in ("value", "std")}) for n, v in known.items() if "." not in n)
+    return [{"cause": "", "parameter": name, **value} for name, value in nominal]
 
 
 def by_parameter(rows: Iterable[Row]) -> dict[tuple[str, str], list[Row]]:

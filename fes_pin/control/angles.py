@@ -33,9 +33,8 @@ def reference(value: object, ends: tuple[float, float], place: str = "") -> floa
     """
     found = value if type(value) is float else as_number(value)
     if found is None or not ends[0] <= found <= ends[1]:
-        raise InputError(
-            f"reference_rad{place}: expected {ends[0]:g} to {ends[1]:g} rad, found {shortened(value)}{hint(found)}"
-        )
+        expected = f"reference_rad{place}: expected {ends[0]:g} to {ends[1]:g} rad"
+        raise InputError(f"{expected}, found {shortened(value)}{hint(found)}")
     return found
 
 

@@ -132,10 +132,8 @@ class PositionController:
         model = getattr(model, "model", model)
         dynamics = AnkleDynamics.of(model, load_kg)
         if observer is not None and getattr(observer, "dynamics", None) != dynamics:
-            raise InputError(
-                f"expected a JointObserver of this ankle with {load_kg:g} kg, found {shortened(observer)}",
-                column="observer",
-            )
+            message = f"expected a JointObserver of this ankle with {load_kg:g} kg, found {shortened(observer)}"
+            raise InputError(message, column="observer")
         constants = model.rig.constants
         play = [e.half_width_us for e in model.effects if isinstance(e, RecruitmentHysteresis)]
         curve = LinearRecruitment(constants["threshold_us"], constants["saturation_us"])
@@ -143,20 +141,15 @@ class PositionController:
         self.pulse = PulseWidth(curve, play[0] if play else 0.0, self.limits)
         self.dynamics = dynamics
         self.lowest, self.fade = dynamics.rest_angle(), math.exp(-PULSE_S / dynamics.time_constant)
-        if not self.limits.range_of_motion_rad[0] < self.lowest < self.limits.range_of_motion_rad[1]:
-            low, high = self.limits.range_of_motion_rad
-            raise InputError(
-                f"expected a range that holds the {self.lowest:.3g} rad at which the joint rests, "
-                f"found {low:g} to {high:g} rad",
-                column="range_of_motion_rad",
-            )
+        low, high = ends = self.limits.range_of_motion_rad
+        if not low < self.lowest < high:
+            want = f"expected a range that holds the {self.lowest:.3g} rad at which the joint rests"
+            raise InputError(f"{want}, found {low:g} to {high:g} rad", column="range_of_motion_rad")
         self.observer = copy.deepcopy(observer) if observer is not None else JointObserver(dynamics)
         given = GivenAnkle(model, dynamics)
         with np.errstate(all="ignore"):  # a model that is not finite has no gains, and is an input error
             self.gains = tune(dynamics, self.observer, given if given.names else None)
-        self.monitor = FaultMonitor(
-            dynamics, self.limits.range_of_motion_rad, self.observer.angle_std_rad, resolution_rad
-        )
+        self.monitor = FaultMonitor(dynamics, ends, self.observer.angle_std_rad, resolution_rad)
         angles = np.linspace(self.lowest, 2.8, REACH_ANGLES)
         # from the first angle on that needs more than those before
         self.reachable = angles, np.maximum.accumulate([dynamics.activation_for(q) for q in angles.tolist()])
@@ -198,10 +191,8 @@ class PositionController:
                 joint.step(other.step(joint.angle_rad + error, time_s=k * PULSE_S), PULSE_S)
         if other.status is not Status.RUNNING or other.calm < 1.0:
             why = "the loop swings by itself" if other.status is Status.RUNNING else str(other.status)
-            raise InputError(
-                f"with {', '.join(given.names)}, which the controller's equations leave out, the loop fails on this "
-                f"model itself: {why}"
-            )
+            left_out = f"with {', '.join(given.names)}, which the controller's equations leave out"
+            raise InputError(f"{left_out}, the loop fails on this model itself: {why}")
 
     def _begin(self) -> None:
         """Wait for readings of a joint at rest, at the start and after a pause."""
@@ -389,17 +380,15 @@ class PositionController:
         """
         lines = [self.watch.warning] if self.watch is not None and self.watch.warning else []
         if self.beyond_rad > FARTHEST_BEYOND_RAD:
-            lines.append(
-                f"the reference lies up to {math.degrees(self.beyond_rad):.1f} degrees beyond what the muscle is asked "
-                f"for with this load, {self.lowest:.2f} to {self.highest:.2f} rad: the joint is held within that"
-            )
+            beyond = f"the reference lies up to {math.degrees(self.beyond_rad):.1f} degrees beyond"
+            asked = f"what the muscle is asked for with this load, {self.lowest:.2f} to {self.highest:.2f} rad"
+            lines.append(f"{beyond} {asked}: the joint is held within that")
         if self.paused_s:
             lines.append(f"the calls paused for {self.paused_s:.3g} s: stimulation begins again with the joint at rest")
         if self.calm < 1.0:
-            lines.append(
-                f"the loop swung by itself at {self.swings.frequency_hz:.1f} Hz and was calmed to "
-                f"{100 * self.calm:.0f} %: the model lacks something, such as the frame; diagnose trials of this rig"
-            )
+            swung = f"the loop swung by itself at {self.swings.frequency_hz:.1f} Hz and was calmed"
+            why = "the model lacks something, such as the frame; diagnose trials of this rig"
+            lines.append(f"{swung} to {100 * self.calm:.0f} %: {why}")
         return "; ".join(lines)
 
     def _reach(self) -> None:

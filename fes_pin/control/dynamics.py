@@ -73,30 +73,21 @@ class AnkleDynamics(Tabulated):
             For another rig, or a load that is none or that the passive joint does not hold.
         """
         if not isinstance(model, Model):
-            raise InputError(
-                f"expected a model, as fp.nominal_model gives it, found {shortened(model)}", column="model"
-            )
+            message = f"expected a model, as fp.nominal_model gives it, found {shortened(model)}"
+            raise InputError(message, column="model")
         if not isinstance(model.rig, Ankle):
             raise InputError(f"position control needs the rig ankle, found {model.rig.name}")
         if number(load_kg, "load_kg") < 0.0:
             raise InputError(f"expected a load of at least 0 kg, found {load_kg:g}")
         rig, c = model.rig, {n: float(v) for n, v in model.rig.constants.items()}
-        ends = [static_torque_nm(c, q, 0.0, load_kg) for q in ANGLES_RAD]
-        if not ends[0] > 0.0 > ends[1]:
-            low, high = ANGLES_RAD
-            raise InputError(
-                f"expected a load that rests between {low} and {high} rad, found {load_kg:g}", column="load_kg"
-            )
+        low, high = ANGLES_RAD
+        if not static_torque_nm(c, low, 0.0, load_kg) > 0.0 > static_torque_nm(c, high, 0.0, load_kg):
+            message = f"expected a load that rests between {low} and {high} rad, found {load_kg:g}"
+            raise InputError(message, column="load_kg")
         frame = next((e for e in model.effects if isinstance(e, FrameVibration)), None)
-        return cls(
-            rig.inertia_kgm2,
-            rig.damping_nms,
-            rig.time_constant_s,
-            c["moment_arm_m"] * rig.gain * c["force_scale_n"],
-            c,
-            float(load_kg),
-            *(() if frame is None else map(float, (frame.coupling, frame.frequency_hz, frame.damping_ratio))),
-        )
+        swings = () if frame is None else map(float, (frame.coupling, frame.frequency_hz, frame.damping_ratio))
+        pull_nm = c["moment_arm_m"] * rig.gain * c["force_scale_n"]
+        return cls(rig.inertia_kgm2, rig.damping_nms, rig.time_constant_s, pull_nm, c, float(load_kg), *swings)
 
     @cached_property
     def pieces(self) -> int:

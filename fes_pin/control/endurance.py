@@ -104,9 +104,8 @@ def muscle_budget(model: Model, load_kg: float, reference_rad: np.ndarray, capac
 def spent(fatigue: Fatigue, capacity: float, needed: float, time: float) -> float:
     """Capacity after a time in s of an activation that a fresh muscle would need."""
     act = min(needed / max(capacity, FLOOR), 1.0)
-    return capacity + time * (
-        (1.0 - capacity) / fatigue.recovery_s - fatigue.rate_per_s * act * max(capacity - FLOOR, 0.0)
-    )
+    tires = fatigue.rate_per_s * act * max(capacity - FLOOR, 0.0)
+    return capacity + time * ((1.0 - capacity) / fatigue.recovery_s - tires)
 
 
 def least_rest(model: Model, load_kg: float, bout_rad: np.ndarray, bouts: int) -> float:

@@ -87,11 +87,9 @@ class GivenAnkle:
     def _values(self, gain: float = 1.0, slow: float = 1.0, stiff: float = 1.0) -> tuple[list[float], list[float]]:
         """Parameters and constants, with gain, time constant and stiffness times factors."""
         p, c = self.model.parameters(), dict(self.constants)
-        p["gain"], p["time_constant_s"], c["f1_per_rad"] = (
-            gain * p["gain"],
-            slow * p["time_constant_s"],
-            stiff * c["f1_per_rad"],
-        )
+        p["gain"] *= gain
+        p["time_constant_s"] *= slow
+        c["f1_per_rad"] *= stiff
         return [p[n] for n in self.layout.values], [c[n] for n in self.layout.constants]
 
     def moved(self, q: float, factors: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> Iterator[Sampled]:

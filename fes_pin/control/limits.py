@@ -105,10 +105,8 @@ class Limiter:
         in_range(saturation_us, "pulse_width_us", "saturation_us")
         between(threshold_us, 0.0, saturation_us, "threshold_us")
         if limits.pulse_width_us < threshold_us:
-            raise InputError(
-                f"pulse_width_us: expected at least the threshold of {threshold_us:g} us, "
-                f"found {limits.pulse_width_us:g}"
-            )
+            expected = f"pulse_width_us: expected at least the threshold of {threshold_us:g} us"
+            raise InputError(f"{expected}, found {limits.pulse_width_us:g}")
         self.most_us = min(limits.pulse_width_us, saturation_us)
         self.threshold_us = threshold_us
         self.change_us = self.most_change_us = limits.rate_us_per_s * PULSE_S
@@ -117,10 +115,8 @@ class Limiter:
         self.bucket_us, self.refill_us = BURST * whole, (1.0 - BURST) * whole * PULSE_S
         if self.refill_us < threshold_us:
             least = limits.charge_uc_per_s * threshold_us / self.refill_us
-            raise InputError(
-                f"charge_uc_per_s: expected at least {least:.3g} uC/s, which steady pulses at threshold need, "
-                f"found {limits.charge_uc_per_s:g}"
-            )
+            expected = f"charge_uc_per_s: expected at least {least:.3g} uC/s, which steady pulses at threshold need"
+            raise InputError(f"{expected}, found {limits.charge_uc_per_s:g}")
         self.left_us, self.last_us = self.bucket_us, 0.0
 
     @property

@@ -53,14 +53,11 @@ def margins(loop: Loop) -> StabilityMargins:
     crossing = [1.0 / -r for r in 0.5 * (real[1:] + real[:-1])[flips] if -1.0 < r < 0.0]
     ones = np.diff(np.sign(size - 1.0)) != 0
     lag = np.mod(turn[1:][ones] + math.pi, 2.0 * math.pi)
-    least = int(np.argmin(np.abs(1.0 + answer)))
-    return StabilityMargins(
-        min(crossing, default=math.inf),
-        math.degrees(min(lag, default=math.inf)),
-        float(min(lag / (2.0 * math.pi * hz[1:][ones]), default=math.inf)),
-        float(np.abs(1.0 + answer[least])),
-        float(hz[least]),
-    )
+    gain, phase = min(crossing, default=math.inf), math.degrees(min(lag, default=math.inf))
+    delay = float(min(lag / (2.0 * math.pi * hz[1:][ones]), default=math.inf))
+    distance = np.abs(1.0 + answer)
+    least = int(np.argmin(distance))
+    return StabilityMargins(gain, phase, delay, float(distance[least]), float(hz[least]))
 
 
 def delay_margin(dynamics: AnkleDynamics, observer: JointObserver, gains: Gains) -> tuple[float, float]:

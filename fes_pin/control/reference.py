@@ -85,11 +85,5 @@ class ReferenceWindow:
         n = len(BELL)
         before, now, ahead, beyond = [sum(map(mul, BELL, self.values[k : k + n])) for k in range(4)]
         half, square = 0.5 / PULSE_S, 1.0 / PULSE_S**2
-        return (
-            now,
-            half * (ahead - before),
-            square * (ahead - 2.0 * now + before),
-            ahead,
-            half * (beyond - now),
-            square * (beyond - 2.0 * ahead + now),
-        )
+        this_pulse = now, half * (ahead - before), square * (ahead - 2.0 * now + before)
+        return *this_pulse, ahead, half * (beyond - now), square * (beyond - 2.0 * ahead + now)

@@ -14,7 +14,6 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.linalg
@@ -23,11 +22,8 @@ from fes_pin.control.dynamics import PULSE_S, AnkleDynamics
 from fes_pin.control.given import GivenAnkle, Sampled, held
 from fes_pin.control.observer import JointObserver
 from fes_pin.data.errors import InputError
-from fes_pin.data.show import frame
+from fes_pin.data.show import DataFrame, frame
 from fes_pin.data.tabulated import Tabulated
-
-if TYPE_CHECKING:
-    import pandas
 
 DEGREE = math.pi / 180.0
 LADDER = (0.5, 0.35, 0.25, 0.18, 0.12, 0.08, 0.05, 0.03)
@@ -73,7 +69,7 @@ class Gains(Tabulated):
         if self.table.shape[1:] != (3,) or len(self.angles) < 2 or not (np.diff(self.angles) > 0.0).all():
             raise InputError("expected two or more rising angles, and three gains for each", column="table")
 
-    def to_frame(self) -> pandas.DataFrame:
+    def to_frame(self) -> DataFrame:
         """The gains by angle as a frame of pandas, a row an angle."""
         names = ("of_activation", "of_angle_per_rad", "of_rate_s_per_rad")
         columns = {n: self.table[:, k] for k, n in enumerate(names)}
@@ -88,9 +84,8 @@ def plant(dynamics: AnkleDynamics, q: float) -> tuple[np.ndarray, np.ndarray, fl
     """The joint held at an angle, from pulse to pulse, its frame at rest: transition (4, 4) of (activation, angle,
     rate, torque), input (4,), and torque that full activation makes.
     """
-    a, b = held(
-        dynamics.linear(q, dynamics.activation_for(q), 1.0)[:4, :4], np.eye(4)[0] / dynamics.time_constant, PULSE_S
-    )
+    f = dynamics.linear(q, dynamics.activation_for(q), 1.0)[:4, :4]
+    a, b = held(f, np.eye(4)[0] / dynamics.time_constant, PULSE_S)
     return a, b, dynamics.pull_nm * math.sin(q)
 
 
@@ -216,11 +211,8 @@ def tune(dynamics: AnkleDynamics, observer: JointObserver, given: GivenAnkle | N
         observer.torque_wander = share * quickest
         steady = [observer.steady_gain(believed[0]) for _, believed in places]
         for boldness, table in zip(LADDER, tables, strict=True):
-            loops = [
-                Loop.of(truth, believed, k, see)
-                for (truths, believed), k, see in zip(places, table[::2], steady, strict=True)
-                for truth in truths
-            ]
+            each = zip(places, table[::2], steady, strict=True)
+            loops = (Loop.of(one, at, k, see) for (truths, at), k, see in each for one in truths)
             worst = max(loop.radius() for loop in loops)
             tried.append(Gains(angles, table, boldness, worst, observer.torque_wander))
         if min(g.radius for g in tried) < 1.0 and not dynamics.frame_coupling:
@@ -232,10 +224,9 @@ def tune(dynamics: AnkleDynamics, observer: JointObserver, given: GivenAnkle | N
         return best
     frame = f" with its frame at {dynamics.frame_hz:.3g} Hz" if dynamics.frame_coupling else ""
     frame += f" with {', '.join(given.names)}" if given is not None else ""
-    raise InputError(
-        f"no gains hold this ankle{frame} over +-{100 * UNCERTAINTY:.0f} % in gain, time constant and stiffness: "
-        f"at best its swing grows by {100 * (least - 1.0):.2g} % a pulse"
-    )
+    wide = f"over +-{100 * UNCERTAINTY:.0f} % in gain, time constant and stiffness"
+    grows = f"at best its swing grows by {100 * (least - 1.0):.2g} % a pulse"
+    raise InputError(f"no gains hold this ankle{frame} {wide}: {grows}")
 
 
 def _truths(dynamics: AnkleDynamics, q: float, given: GivenAnkle | None) -> list[Sampled]:

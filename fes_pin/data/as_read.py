@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping
+from contextlib import AbstractContextManager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path, PosixPath
@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from fes_pin.data.read_only import ReadOnly
+from fes_pin.settings import while_set
 
 _SEEN: ContextVar[dict[str, str] | None] = ContextVar("seen", default=None)
 
@@ -68,15 +69,9 @@ class HeldFile(PosixPath):
         return super().read_text(*args, **more) if self.content is None else self.content.decode("utf-8")
 
 
-@contextmanager
-def hashing() -> Iterator[dict[str, str]]:
+def hashing() -> AbstractContextManager[dict[str, str]]:
     """SHA-256 of every file that is read inside, by its absolute path."""
-    seen: dict[str, str] = {}
-    token = _SEEN.set(seen)
-    try:
-        yield seen
-    finally:
-        _SEEN.reset(token)
+    return while_set(_SEEN, dict[str, str]())
 
 
 def note_bytes(path: str | Path, content: bytes) -> None:

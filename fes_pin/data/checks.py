@@ -14,9 +14,12 @@ import numpy as np
 
 from fes_pin.data.errors import KeyFault
 from fes_pin.data.motion import GROUND_REACTION, OPTIONAL, REQUIRED, TRANSLATIONS, knees_bend_positively
-from fes_pin.data.schema import ROLES, NumberKey, RigSchema, is_like, one_of, unknown, unread
+from fes_pin.data.schema import ROLES, RigSchema, is_like, number_or_none, one_of, positive, unknown, unread
 from fes_pin.data.table import Fault
 
+LOW_PASS = "low_pass_hz"
+LABELS = {"role": None, "group": None, LOW_PASS: None, "remarks": ()}
+"""What is said of a trial but for name, kind and conditions, and what holds of one that says nothing."""
 TURN = 2.0 * math.pi
 LONGEST_MUSCLE_M = 1.0
 """Length in m that no muscle with its tendon has: the longest, sartorius, comes to about half a metre."""
@@ -42,23 +45,6 @@ def checked_mapping(value: Any, error: KeyFault, key: str) -> dict[Any, Any]:
     return dict(pairs)
 
 
-def checked_kind(schema: RigSchema, kind: object, error: KeyFault) -> str:
-    """The kind of a trial of this rig; the rig's default if it names none.
-
-    Raises
-    ------
-    InputError
-        Made by `error` from the key and a message, for a kind that the rig does not have.
-    """
-    if kind is None:
-        return schema.default_kind
-    if not isinstance(kind, str) or kind not in schema.outputs:
-        found = f"{kind[:40]!r}" if isinstance(kind, str) else f"a {type(kind).__name__}"
-        expected = f"{'one of ' if len(schema.outputs) > 1 else ''}{', '.join(schema.outputs)}"
-        raise error("kind", f"expected {expected} for rig {schema.name}, found {found}")
-    return kind
-
-
 def checked_label(value: object, error: KeyFault, key: str = "group", what: str = "a label") -> str:
     """A name or label: one line of text.
 
@@ -72,32 +58,25 @@ def checked_label(value: object, error: KeyFault, key: str = "group", what: str 
     return value
 
 
-def check_labels(name: object, role: object, group: object, error: KeyFault) -> None:
-    """Require of a trial's name, role and group that they are such; role and group may be None.
+def checked_labels(name: object, said: Mapping[str, Any], error: KeyFault) -> dict[str, Any]:
+    """The name of a trial, and what is `said` of it as a whole by the keys of LABELS; what is missing has its default.
 
     Raises
     ------
     InputError
         Made by `error`.
     """
+    labels = {key: said.get(key, default) for key, default in LABELS.items()}
     checked_label(name, error, "name", "a name")
-    if role is not None:
-        one_of(role, ROLES, partial(error, "role"))
-    if group is not None:
-        checked_label(group, error)
-
-
-def checked_remarks(value: object, error: KeyFault) -> tuple[str, ...]:
-    """Remarks on a trial, each one line of text.
-
-    Raises
-    ------
-    InputError
-        Made by `error`, for anything else.
-    """
-    if not isinstance(value, Sequence) or isinstance(value, str):
+    if labels["role"] is not None:
+        one_of(labels["role"], ROLES, partial(error, "role"))
+    if labels["group"] is not None:
+        checked_label(labels["group"], error)
+    if not isinstance(labels["remarks"], Sequence) or isinstance(labels["remarks"], str):
         raise error("remarks", "expected texts, one for each remark")
-    return tuple(checked_label(one, error, "remarks", "a remark") for one in value)
+    labels["remarks"] = tuple(checked_label(r, error, "remarks", "a remark") for r in labels["remarks"])
+    labels[LOW_PASS] = number_or_none(labels[LOW_PASS], positive("Hz", False), LOW_PASS, error)
+    return {"name": name, **labels}
 
 
 def check_columns(names: Sequence[str], schema: RigSchema, kind: str, inputs_only: bool, error: Fault) -> None:
@@ -219,14 +198,6 @@ def check_constants(schema: RigSchema, constants: Mapping[str, float], files: Co
     for key, required in schema.files.items():
         if required and key not in files:
             raise error(key, "missing; expected the path of a file")
-
-
-def known_constants(schema: RigSchema) -> dict[str, NumberKey]:
-    """What `[rig]` may hold: the rig's constants, and start values that may be known instead."""
-    known = dict(schema.constants)
-    if schema.start_may_be_known:
-        known |= {key: NumberKey(n.unit, n.lower, n.strict, False) for key, n in schema.start.items()}
-    return known
 
 
 def check_same_inputs(

@@ -127,9 +127,8 @@ def free_pendulum(folder: Path) -> Files:
     files, trials = {}, []
     for ours, theirs, role in (("fit", "id", "fit"), ("held", "vad", "held_out")):
         for number in range(1, 100):
-            time, angle, rate = (
-                found.get(n) for n in (f"Time_{theirs}.{number}", *(f"Y_{theirs}.{number}.{k}" for k in (1, 2)))
-            )
+            names = (f"Time_{theirs}.{number}", f"Y_{theirs}.{number}.1", f"Y_{theirs}.{number}.2")
+            time, angle, rate = map(found.get, names)
             if time is None or angle is None or rate is None:
                 break
             rows = zip((time - time[0]).tolist(), angle.tolist(), rate.tolist(), strict=True)

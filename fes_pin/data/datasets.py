@@ -85,11 +85,8 @@ WALKING = DATASETS[WALKING_NAME]
 def folders() -> tuple[Path, ...]:
     """Where data sets are looked for: in FES_PIN_DATA and its `data`, else in the user's cache."""
     named = os.environ.get(VARIABLE, "")
-    return (Path(named), Path(named) / "data") if named else (_cache(),)
-
-
-def _cache() -> Path:
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "fes_pin" / "datasets"
+    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    return (Path(named), Path(named) / "data") if named else (cache / "fes_pin" / "datasets",)
 
 
 def _known(name: str) -> Dataset:

@@ -6,7 +6,8 @@ import os
 import shutil
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from itertools import takewhile
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -91,6 +92,14 @@ def read_json(path: str | Path) -> Any:
         return json.loads(text)
     except (ValueError, RecursionError) as error:
         raise InputError(f"expected JSON: {error}", file=path, row=getattr(error, "lineno", None)) from None
+
+
+def own_json(path: Path) -> dict[str, Any]:
+    """A table that fes_pin wrote itself; empty where there is none, or where it is no longer one."""
+    with suppress(OSError, ValueError):
+        found = json.loads(path.read_bytes())
+        return found if isinstance(found, dict) else {}
+    return {}
 
 
 def hold(path: str | Path) -> HeldFile:
@@ -338,14 +347,10 @@ def _target(folder: Path, name: str) -> Path:
 
 def _make_folder(folder: Path) -> Path | None:
     """Make a folder; the topmost one that had to be made, to remove it again."""
-    made = None
-    for parent in (folder, *folder.parents):
-        if parent.exists():
-            break
-        made = parent
-    if made is not None:
+    new = list(takewhile(lambda one: not one.exists(), (folder, *folder.parents)))
+    if new:
         folder.mkdir(parents=True, exist_ok=True)
-    return made
+    return new[-1] if new else None
 
 
 def _stage(path: Path, content: bytes, mode: int = 0o666) -> Path:

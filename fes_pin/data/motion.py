@@ -77,20 +77,15 @@ def _read_storage(path: Path) -> tuple[Table, bool | None]:
     if header == len(lines):
         raise InputError("expected column labels after endheader", file=path, row=header)
     table = read_text_recording(path, TextForm(" ", header_row=header + 1, first_row=header + 2, strict=True))
-    keys = _storage_keys(lines[:end])
+    keys = {}
+    for line in lines[:end]:
+        key, _, value = line.partition("=") if "=" in line else line.strip().partition(" ")
+        keys[key.strip().lower()] = value.strip()
     rows = keys.get("nrows", keys.get("datarows"))
     if rows is not None and rows != str(len(table)):
         message = f"expected {rows} rows as the header says, found {len(table)}"
         raise table.error(message, table.names[0], len(table) - 1)
     return table, {"yes": True, "no": False}.get(keys.get("indegrees", "").lower())
-
-
-def _storage_keys(lines: list[str]) -> dict[str, str]:
-    keys = {}
-    for line in lines:
-        key, _, value = line.partition("=") if "=" in line else line.strip().partition(" ")
-        keys[key.strip().lower()] = value.strip()
-    return keys
 
 
 def read_coordinates(path: str | Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:

@@ -22,10 +22,8 @@ def new_body_study(wanted: Wanted) -> NewStudy:
         A file that is neither, files that do not pair, numbers that are missing or none.
     """
     files, folder, settings = wanted.files, wanted.folder, wanted.settings
-    moves: list[Path] = []
-    pushes: list[Path] = []
-    for path in files:
-        (pushes if _is_ground_reaction(path) else moves).append(path)
+    pushes = [path for path in files if _is_ground_reaction(path)]
+    moves = [path for path in files if path not in pushes]
     if len(moves) != len(pushes) or not moves:
         found = f"{len(moves)} of coordinates and {len(pushes)} of ground reaction"
         raise InputError(f"expected as many files of joint coordinates as of ground reaction, found {found}")

@@ -4,7 +4,7 @@ What the files do not say is taken from options, or asked of a person at a termi
 """
 
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -18,15 +18,7 @@ from fes_pin.data.recorded.columns import INTERPOLATE
 from fes_pin.data.recorded.propose import Proposal, propose
 from fes_pin.data.recorded.text import TextForm
 from fes_pin.data.schema import NumberKey, check_known, one_of, unknown
-from fes_pin.data.study_text import (
-    HEADER,
-    form_in_words,
-    inline_table,
-    quoted,
-    source_from_option,
-    source_in_words,
-    toml_table,
-)
+from fes_pin.data.study_text import HEADER, columns_text, form_in_words, source_from_option, source_in_words, toml_table
 from fes_pin.data.units import known_unit, own_unit, quantities_of
 from fes_pin.data.wanted import Wanted, labels_of, number_set, of_files
 
@@ -93,12 +85,13 @@ class _Making:
         contents: dict[str, str | bytes] = {}
         files = self._urdf(contents)
         places = [placed(path, self.wanted.folder, contents, "trials/") for path in self.wanted.files]
+        options = {"resample_hz": self.wanted.resample_hz, "missing": INTERPOLATE if self.wanted.fill else None}
         text = [
             *toml_table("study", {"name": self.wanted.name, "rig": self.schema.name}),
             *toml_table("rig", {**files, **rig, **known}, "known before the trials, never fitted", self._units()),
             *toml_table("rig.passive", passive, "known as well", self._units()),
             *toml_table("start", start, "start values of what the nominal model fits", self._units()),
-            *self._columns(sources),
+            *columns_text(sources, self.names, self.form, options),
         ]
         for path, place, kind, conditions in zip(self.wanted.files, places, kinds, trials, strict=True):
             text += toml_table("[trial]", {"file": place, "kind": kind, **labels_of(self.wanted, path), **conditions})
@@ -139,19 +132,14 @@ class _Making:
             needed.append(next(iter(stimuli)))
         read = {c for k in order for c in schema.columns_of(k)}
         others = [c for c in (*schema.optional, *schema.imposed) if c in read]
-        sources = {}
-        for column in dict.fromkeys([*needed, *inputs[:1], *others]):
-            source = self._source(column, column in needed)
-            if source is not None:
-                sources[column] = source
-        return sources
+        sources = {c: self._source(c, c in needed) for c in dict.fromkeys([*needed, *inputs[:1], *others])}
+        return {column: source for column, source in sources.items() if source is not None}
 
     def _candidates(self, column: str) -> tuple[str, ...]:
         return tuple(dict.fromkeys(n for p in self.proposals for n in p.candidates[column]))
 
     def _source(self, column: str, is_needed: bool) -> dict[str, Any] | None:
-        option = self.wanted.columns.get(column)
-        if option is not None:
+        if (option := self.wanted.columns.get(column)) is not None:
             return self._stated(column, option)
         candidates = self._candidates(column)
         if len(candidates) != 1:
@@ -169,8 +157,7 @@ class _Making:
         if name == column or not quantities or quantities == ("pulses",):
             return {"name": name}
         if unit:
-            found = known_unit(unit, quantities)
-            if found is not None:
+            if (found := known_unit(unit, quantities)) is not None:
                 return {"name": name, "unit": found[1]}
             return self._asked(column, f"--column {column}={name},scale=NUMBER ({own_unit(column)} for each {unit})")
         units = own_unit(column, self.wanted.revolute)
@@ -280,21 +267,6 @@ class _Making:
             contents[urdf.name] = read_bytes(urdf)
             return {"urdf": urdf.name}
         return {"urdf": placed(urdf, self.wanted.folder, contents)}
-
-    def _columns(self, sources: Mapping[str, Mapping[str, Any]]) -> list[str]:
-        """The table `[columns]`; empty where the files are as the study format has them."""
-        used = {s["name"] for s in sources.values() if "name" in s}
-        ignored = [n for n in self.names if n not in used]
-        options = {"resample_hz": self.wanted.resample_hz, "missing": INTERPOLATE if self.wanted.fill else None}
-        plain = all(s == {"name": c} for c, s in sources.items()) and self.names[:1] == ("time_s",)
-        if plain and self.form == TextForm() and not ignored and not any(options.values()):
-            return []
-        out = ["", "[columns]  # the rig's columns, as the recordings call them, and their units there"]
-        out += [f"{column} = {inline_table(source)}" for column, source in sources.items()]
-        out += [f"ignored = [{', '.join(map(quoted, ignored))}]"] if ignored else []
-        about: dict[str, Any] = {k: v for k, v in options.items() if v is not None}
-        about |= {k: v for k, v in asdict(self.form or TextForm()).items() if v != getattr(TextForm(), k)}
-        return out + toml_table("columns.file", about, "how the recordings are written")
 
     def _units(self) -> dict[str, str]:
         schema = self.schema

@@ -201,8 +201,7 @@ def by_name(values: Any, names: Sequence[str], what: str, default: float) -> np.
     """
     if hasattr(values, "keys"):
         values = dict(values)
-        unknown = [key for key in values if key not in names]
-        if unknown:
+        if unknown := [key for key in values if key not in names]:
             raise InputError(f"{what} names {unknown[0]!r}, which is not one of {', '.join(names)}")
         values = [values.get(name, default) for name in names]
     array = numbers(values, what)

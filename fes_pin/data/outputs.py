@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fes_pin.data.errors import InputError
-from fes_pin.data.files import check_folder, write_bytes, write_files
+from fes_pin.data.files import check_folder, own_json, write_bytes, write_files
 from fes_pin.data.read_files import refuse_inputs, was_read
 
 RECORD = ".fes_pin.json"
@@ -89,7 +89,7 @@ class Outputs:
     def _check(self, folder: Path, contents: Mapping[str, str | bytes | None]) -> dict[str, str]:
         """The record of the folder, where all files may be written."""
         check_folder(folder)
-        record = _record(folder)
+        record = {n: note for n, note in own_json(folder / RECORD).items() if isinstance(note, str)}
         refuse_inputs(folder / name for name in contents)
         for name, content in contents.items():
             place = folder / name
@@ -143,14 +143,6 @@ def _place(path: str | Path) -> Path | None:
                 raise InputError("cannot be written: the folder does not exist", file=path)
             return place
     return None
-
-
-def _record(folder: Path) -> dict[str, str]:
-    """What the folder's record says of files; what cannot be read says nothing."""
-    with suppress(OSError, ValueError):
-        found = json.loads((folder / RECORD).read_bytes())
-        return {n: note for n, note in found.items() if isinstance(note, str)} if isinstance(found, dict) else {}
-    return {}
 
 
 @contextmanager

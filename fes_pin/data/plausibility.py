@@ -89,9 +89,8 @@ def implausible(study: Study | ToPredict) -> list[str]:
     done = [(t, remark) for t in study.trials for remark in t.remarks]  # to samples, when they were read
     warnings = [*_each("", done), *_inputs(study), *_units(study), *_imposed(study)]
     outputs = tuple(dict.fromkeys((*study.schema.outputs.values(), "velocity")))
-    measured = [
-        (t, n) for t in study.trials for n in outputs if n in t and n not in study.schema.driving(t.kind, t.columns)
-    ]
+    driving = study.schema.driving
+    measured = [(t, n) for t in study.trials for n in outputs if n in t and n not in driving(t.kind, t.columns)]
     constant = [(t, n) for t, n in measured if not np.ptp(t[n]) > 0.0]
     _check_counts(study, [one for one in measured if one not in constant])
     if len(constant) == len(measured) and not isinstance(study, ToPredict):
@@ -148,8 +147,7 @@ def _check_rows(study: Study | ToPredict) -> None:
 
 def _inputs(study: Study | ToPredict) -> Iterable[str]:
     """Remarks on inputs; a muscle that is never stimulated is an InputError."""
-    short = [t.name for t in study.trials if len(t) < FEW]
-    if short:
+    if short := [t.name for t in study.trials if len(t) < FEW]:
         yield f"fewer than {FEW} samples in {trials_named(short)}"
     alone = isinstance(study, ToPredict)  # trials that nothing drives are then no oddity, but for a muscle at rest
     names = dict.fromkeys(n for t in study.trials for n in _stimuli(study, t) if n in PULSES or not alone)
@@ -202,11 +200,9 @@ def _units(study: Study | ToPredict) -> Iterable[str]:
 def _imposed(study: Study | ToPredict) -> Iterable[str]:
     """Remarks on imposed motions; a motion that never moves is an InputError."""
     trials = [t for t in study.trials if t.kind == IMPOSED]
-    if not trials:
+    if not trials or isinstance(study, ToPredict):
         return
     name = study.schema.imposed[0]
-    if isinstance(study, ToPredict):
-        return
     motions = [imposed_motion(t, study.schema.imposed) for t in trials]
     ends = [(float(m.values[0].min()), float(m.values[0].max())) for m in motions]
     moved = max(high for _, high in ends) - min(low for low, _ in ends)

@@ -124,12 +124,8 @@ def pulse_list(
     _refuse(time, charge > limits.charge_uc * (1 + 1e-12), f"a pulse has more than {limits.charge_uc:g} uC")
     close = np.r_[False, np.diff(time) < (1 - 1e-6) / limits.rate_hz]
     _refuse(time, close, f"two pulses come closer than at {limits.rate_hz:g} Hz")
-    return {
-        "time_s": time,
-        "pulse_width_us": width,
-        "current_ma": np.full(len(time), limits.current_ma),
-        "charge_uc": charge,
-    }
+    current = np.full(len(time), limits.current_ma)
+    return {"time_s": time, "pulse_width_us": width, "current_ma": current, "charge_uc": charge}
 
 
 def _refuse(time: np.ndarray, where: np.ndarray, what: str) -> None:

@@ -22,7 +22,7 @@ class ReadOnly:
     def _freeze(self) -> None:
         """Make what is held read-only; called when the object is built and when a copy of it is."""
         for name, value in list(vars(self).items()):
-            vars(self)[name] = _held(value)
+            vars(self)[name] = held(value)
 
     def __getstate__(self) -> dict[str, Any]:
         return {n: as_dicts(v) for n, v in vars(self).items()}
@@ -38,14 +38,14 @@ class ReadOnly:
         return hash(key_of(self))
 
 
-def _held(value: Any) -> Any:
+def held(value: Any) -> Any:
     """A mapping or list, and what it holds, so that nobody can write to it; an array is marked so."""
     if isinstance(value, np.ndarray):
         value.setflags(write=False)
         return value
     if isinstance(value, Mapping) and not isinstance(value, ReadOnly):
-        return MappingProxyType({n: _held(v) for n, v in value.items()})
-    return tuple(map(_held, value)) if type(value) in (list, tuple) else value
+        return MappingProxyType({n: held(v) for n, v in value.items()})
+    return tuple(map(held, value)) if type(value) in (list, tuple) else value
 
 
 def as_dicts(value: Any) -> Any:

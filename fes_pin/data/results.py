@@ -8,20 +8,17 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import Any, ClassVar, Self
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import read_json, write_text
 from fes_pin.data.provenance import Provenance
 from fes_pin.data.read_only import ReadOnly, as_dicts
-from fes_pin.data.show import by_columns, frame, table_html, table_text
+from fes_pin.data.show import DataFrame, by_columns, frame, table_html, table_text
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial, trial_csv
 from fes_pin.infer.result import ON, STOPPED, Cause, Explained, Named, Remainder, shown
 from fes_pin.infer.text import listed, percent
-
-if TYPE_CHECKING:
-    import pandas
 
 RESULT, TEXT, TABLE = "result", "text", "table"
 """Keys that every saved result has in addition to those of its kind: its kind, its text by lines, its table by
@@ -67,7 +64,7 @@ class Saveable(Recorded):
         """Title, head, rows and notes of the table that is printed."""
         raise NotImplementedError
 
-    def to_frame(self) -> pandas.DataFrame:
+    def to_frame(self) -> DataFrame:
         """The result as a frame of pandas: a row a parameter of each cause or change, a model, or a study.
 
         The parameters of a fit are its index.

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from functools import partial
 from typing import Any
@@ -181,6 +181,28 @@ class RigSchema(ReadOnly):
             named = (*self.inputs, *free, *self.optional)
         return ("time_s", *dict.fromkeys(named))
 
+    def kind_of(self, kind: object, error: KeyFault) -> str:
+        """The kind of a trial of this rig; the rig's default if it names none.
+
+        Raises
+        ------
+        InputError
+            Made by `error` from the key and a message, for a kind that the rig does not have.
+        """
+        if kind is None:
+            return self.default_kind
+        if not isinstance(kind, str) or kind not in self.outputs:
+            found = f"{kind[:40]!r}" if isinstance(kind, str) else f"a {type(kind).__name__}"
+            expected = f"{'one of ' if len(self.outputs) > 1 else ''}{', '.join(self.outputs)}"
+            raise error("kind", f"expected {expected} for rig {self.name}, found {found}")
+        return kind
+
+    @property
+    def known_constants(self) -> dict[str, NumberKey]:
+        """The keys of a study's [rig]: the rig's constants, and where it may be so its start values that are known."""
+        start = self.start if self.start_may_be_known else {}
+        return {**self.constants, **{k: replace(n, required=False) for k, n in start.items()}}
+
 
 START_S = {"start_s": any_number("s", required=False)}
 """A condition of any rig: when a trial began in the session."""
@@ -324,11 +346,9 @@ def check_known(names: Iterable[str], known: Collection[str], error: KeyFault, a
 def unknown(name: str, known: Iterable[str]) -> str:
     """What to say of an unknown name: another unit, a likely typo, or what is known."""
     known = list(known)
-    same = [candidate for candidate in known if without_unit(candidate) == without_unit(name)]
-    if same:
+    if same := [candidate for candidate in known if without_unit(candidate) == without_unit(name)]:
         return f"wrong unit or none; expected {same[0]}"
-    close = get_close_matches(name.lower(), known, n=1, cutoff=0.75)
-    if close:
+    if close := get_close_matches(name.lower(), known, n=1, cutoff=0.75):
         return f"unknown; did you mean {close[0]}?"
     return f"unknown; expected {'one of ' if len(known) > 1 else ''}{', '.join(known)}" if known else "unknown"
 

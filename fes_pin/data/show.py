@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 from fes_pin.data.libraries import optional_library
 
 if TYPE_CHECKING:
-    import pandas
+    from pandas import DataFrame
+else:
+    DataFrame = Any
 
 
 def table_html(title: str, head: Sequence[str], rows: Sequence[Sequence[str]], notes: Sequence[str] = ()) -> str:
@@ -39,7 +41,7 @@ def by_columns(head: Sequence[str], rows: Sequence[Sequence[Any]]) -> dict[str, 
     return {name: [row[k] for row in rows] for k, name in enumerate(head)}
 
 
-def frame(columns: Mapping[str, Any], index: str | None = None) -> pandas.DataFrame:
+def frame(columns: Mapping[str, Any], index: str | None = None) -> DataFrame:
     """Columns as a frame of pandas, one of them as its index.
 
     Raises

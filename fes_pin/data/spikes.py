@@ -78,10 +78,8 @@ def _spikes(x: np.ndarray, length: int) -> np.ndarray:
         middle = slice(LINE - CUBIC, LINE + CUBIC)
         weights = [_weights(at[middle], inside, 3), _weights(at[:LINE], inside, 1), _weights(at[LINE:], inside, 1)]
         sample = x[inside : inside + count]
-        here, before, after = (
-            sample - sum(w * s for w, s in zip(ws, part, strict=True))
-            for ws, part in zip(weights, (sides[middle], sides[:LINE], sides[LINE:]), strict=True)
-        )
+        parts = zip(weights, (sides[middle], sides[:LINE], sides[LINE:]), strict=True)
+        here, before, after = (sample - sum(w * s for w, s in zip(*p, strict=True)) for p in parts)
         hit &= np.sign(here) * np.sign(before) > 0
         hit &= np.sign(here) * np.sign(after) > 0
         hit &= np.abs(before - after) < np.minimum(np.abs(before), np.abs(after))
@@ -125,8 +123,7 @@ def _first_spikes(x: np.ndarray) -> np.ndarray:
 
 def _weights(at: np.ndarray, to: float, degree: int) -> np.ndarray:
     """Weights with which values at some places give the value at another of a least-squares polynomial."""
-    basis = np.vander(at - to, degree + 1)
-    return np.linalg.pinv(basis)[-1]
+    return np.linalg.pinv(np.vander(at - to, degree + 1))[-1]
 
 
 def _quantum(x: np.ndarray) -> float:

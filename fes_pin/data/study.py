@@ -10,46 +10,24 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path, PurePosixPath
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import tomli_w
 
 from fes_pin.data.as_read import AsRead, digest_of, hashing
-from fes_pin.data.checks import (
-    check_constants,
-    check_labels,
-    check_same_inputs,
-    checked_kind,
-    checked_label,
-    checked_mapping,
-    checked_remarks,
-    known_constants,
-)
+from fes_pin.data.checks import check_constants, check_same_inputs, checked_label, checked_labels, checked_mapping
 from fes_pin.data.errors import InputError, fault_at
 from fes_pin.data.files import as_path, hold, what_is_at, write_files
 from fes_pin.data.motion import GROUND_REACTION
 from fes_pin.data.numbers import instance
 from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.recorded.columns import Columns
-from fes_pin.data.schema import (
-    Rigs,
-    RigSchema,
-    check_conditions,
-    check_known,
-    checked_numbers,
-    known_rigs,
-    number_or_none,
-    positive,
-    schema_of,
-)
-from fes_pin.data.show import by_columns, frame, table_html
-from fes_pin.data.study_tables import HORIZON, StudyTables, check_files
+from fes_pin.data.schema import Rigs, RigSchema, check_conditions, check_known, checked_numbers, known_rigs, schema_of
+from fes_pin.data.show import DataFrame, by_columns, frame, table_html
+from fes_pin.data.study_tables import HORIZON, StudyTables, check_files, checked_horizon
 from fes_pin.data.table import format_csv
 from fes_pin.data.toml import Document, document_of, read_toml
-from fes_pin.data.trial import LOW_PASS, POSITIVE_HZ, Trial, check_trial, read_body_trial, read_trial, trial_csv
-
-if TYPE_CHECKING:
-    import pandas
+from fes_pin.data.trial import Trial, check_trial, read_body_trial, read_trial, trial_csv
 
 EDITED = "edited after it was read"
 """What stands in the place of a hash of a file that is no longer what its study holds."""
@@ -113,7 +91,7 @@ class Study(ReadOnly):
         twice = set(schema.start) & set(given["constants"])
         if odd := sorted(twice & set(given["start"])):
             raise fault_at("start.{}")(odd[0], "is also among the constants; expected it in one of them")
-        known = {"constants": {**known_constants(schema), **schema.passive}}
+        known = {"constants": {**schema.known_constants, **schema.passive}}
         known["start"] = {key: number for key, number in schema.start.items() if key not in twice}
         numbers = {n: checked_numbers(given[n], keys, fault_at(f"{n}.{{}}")) for n, keys in known.items()}
 
@@ -129,7 +107,7 @@ class Study(ReadOnly):
         self._check_trials(trials, schema)
         if schema.inputs_required:  # else a trial without an input is one that nothing drives
             check_same_inputs([(t.kind, t.columns) for t in trials], schema, numbers["constants"], _fault_of(trials))
-        number_or_none(self.horizon_s, positive("s"), HORIZON, fault_at("Study.{}"))
+        checked_horizon(self.horizon_s, fault_at("Study.{}"))
         vars(self).update(numbers, files=files, folder=as_path(self.folder, "folder"), trials=trials, described=schema)
         self._freeze()
 
@@ -289,7 +267,7 @@ class Study(ReadOnly):
         ]
         return table_html(repr(self), head, rows)
 
-    def to_frame(self) -> pandas.DataFrame:
+    def to_frame(self) -> DataFrame:
         """One row a trial, with its conditions, as a frame of pandas; see `data.show.frame`."""
         conditions = dict.fromkeys(n for t in self.trials for n in t.conditions)
         head = ("trial", "kind", "role", "group", "samples", "duration_s", *conditions)
@@ -380,7 +358,7 @@ class _Reader(StudyTables):
         each = enumerate(zip(tables, self._trial_names(tables), strict=True))
         trials = [self._trial(f"trial[{index}]", table, name, own) for index, (table, name) in each]
         check_same_inputs([(t.kind, t.columns) for t in trials], self.schema, constants, self._fault_of)
-        horizon = self.horizon()
+        horizon = checked_horizon(self.document.table("study").get(HORIZON), self.document.under("study"))
         folder = self.folder.absolute()
         return Study(self.name, self.rig, constants, start, tuple(trials), folder, files, self.schema, horizon)
 
@@ -412,15 +390,9 @@ class _Reader(StudyTables):
 
     def _trial(self, where: str, table: Mapping[str, Any], name: str, own: Columns | None) -> Trial:
         named, error = self.schema.recordings, self.document.under(where)
-        kind, role, group = checked_kind(self.schema, table.get("kind"), error), table.get("role"), table.get("group")
-        check_labels(name, role, group, error)
-        remarks = checked_remarks(table.get("remarks", ()), error)
-        low_pass = number_or_none(table.get(LOW_PASS), POSITIVE_HZ, LOW_PASS, error)
-        about = ("name", "kind", "role", "group", "remarks", LOW_PASS)
-        rest = {key: value for key, value in table.items() if key not in (*named, *about)}
-        numbers = check_conditions(self.schema, kind, rest, error)
-        labels: dict[str, Any] = {"name": name, "role": role, "group": group, "conditions": numbers}
-        labels |= {"remarks": remarks, LOW_PASS: low_pass}
+        kind, labels = self.schema.kind_of(table.get("kind"), error), checked_labels(name, table, error)
+        rest = {key: value for key, value in table.items() if key not in (*named, "kind", *labels)}
+        labels["conditions"] = check_conditions(self.schema, kind, rest, error)
         for key in named:
             if key not in table:
                 raise error(key, "missing; expected the path of a file inside the study")
@@ -467,7 +439,7 @@ def write_study(study: Study, folder: str | Path) -> None:
         file = trial.name if _PLAIN.fullmatch(trial.name) else f"trial~{place + 1}"  # which is no plain name
         named = _trial_files(schema, trial, file)
         contents |= named
-        labels: dict[str, Any] = {n: getattr(trial, n) for n in ("role", "group", LOW_PASS)}
+        labels: dict[str, Any] = {n: getattr(trial, n) for n in ("role", "group", "low_pass_hz")}
         labels |= {"remarks": list(trial.remarks), "name": trial.name if file != trial.name else None}
         known = {"kind": trial.kind, **trial.conditions, **{n: v for n, v in labels.items() if v}}
         tables.append({**dict(zip(schema.recordings, named, strict=True)), **known})

@@ -5,8 +5,8 @@ from functools import partial
 from pathlib import Path
 
 from fes_pin.data.as_read import HeldFile
-from fes_pin.data.checks import check_constants, checked_label, known_constants
-from fes_pin.data.errors import InputError
+from fes_pin.data.checks import check_constants, checked_label
+from fes_pin.data.errors import InputError, KeyFault
 from fes_pin.data.files import hold, read_json
 from fes_pin.data.recorded.columns import Columns, columns_of
 from fes_pin.data.schema import Rigs, RigSchema, check_known, number_or_none, one_of, positive
@@ -34,6 +34,11 @@ def check_files(schema: RigSchema, files: Mapping[str, Path]) -> None:
         read_json(files["segments"])
 
 
+def checked_horizon(value: object, error: KeyFault) -> float | None:
+    """How far ahead errors over a horizon look, s, where it is stated; it must lie above 0."""
+    return number_or_none(value, positive("s"), HORIZON, error)
+
+
 class StudyTables:
     """One reading of a study.toml; every error that it raises names the line and the key.
 
@@ -50,11 +55,6 @@ class StudyTables:
         check_known(document.data, ("study", "rig", "start", "columns", "trial"), self.error)
         self.name, self.rig = self._study_table()
         self.schema = rigs[self.rig]
-
-    def horizon(self) -> float | None:
-        """How far ahead errors over a horizon look, s, where the study says so."""
-        given = self.document.table("study").get(HORIZON)
-        return number_or_none(given, positive("s"), HORIZON, self.document.under("study"))
 
     def _study_table(self) -> tuple[str, str]:
         if "study" not in self.document.data:
@@ -75,8 +75,7 @@ class StudyTables:
         if self.schema.passive:
             table.pop("passive", None)
         paths = {key: table.pop(key) for key in self.schema.files if key in table}
-        known = known_constants(self.schema)
-        constants = self.document.numbers("rig", table, known, also=(*self.schema.files,))
+        constants = self.document.numbers("rig", table, self.schema.known_constants, also=(*self.schema.files,))
         constants |= self.document.numbers("rig.passive", passive, self.schema.passive)
         check_constants(self.schema, constants, paths, self.document.under("rig"))
         files = {key: hold(self.document.path_of(f"rig.{key}", value)) for key, value in paths.items()}

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from functools import partial
 from typing import Any
 
@@ -40,6 +41,23 @@ def quoted(text: str) -> str:
 def inline_table(source: Mapping[str, Any]) -> str:
     """A table in one line."""
     return "{ " + ", ".join(f"{k} = {toml_value(v)}" for k, v in source.items()) + " }"
+
+
+def columns_text(
+    sources: Mapping[str, Mapping[str, Any]], names: Sequence[str], form: TextForm | None, options: Mapping[str, Any]
+) -> list[str]:
+    """Lines of [columns], and of [columns.file] with the options that are set; none where all is as by default."""
+    used = {source["name"] for source in sources.values() if "name" in source}
+    ignored = [name for name in names if name not in used]
+    plain = all(source == {"name": column} for column, source in sources.items()) and tuple(names[:1]) == ("time_s",)
+    if plain and form == TextForm() and not ignored and not any(options.values()):
+        return []
+    out = ["", "[columns]  # the rig's columns, as the recordings call them, and their units there"]
+    out += [f"{column} = {inline_table(source)}" for column, source in sources.items()]
+    out += [f"ignored = [{', '.join(map(quoted, ignored))}]"] if ignored else []
+    about: dict[str, Any] = {k: v for k, v in options.items() if v is not None}
+    about |= {k: v for k, v in asdict(form or TextForm()).items() if v != getattr(TextForm(), k)}
+    return out + toml_table("columns.file", about, "how the recordings are written")
 
 
 def source_from_option(column: str, option: str, names: Sequence[str]) -> dict[str, Any]:

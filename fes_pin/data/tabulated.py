@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import numbers
 from fes_pin.data.read_only import ReadOnly
-from fes_pin.data.show import frame, table_html
-
-if TYPE_CHECKING:
-    import pandas
+from fes_pin.data.show import DataFrame, frame, table_html
 
 
 class Tabulated(ReadOnly):
@@ -40,9 +37,8 @@ class Tabulated(ReadOnly):
             value = getattr(self, item.name)
             if item.name in self.along or (type(value) is np.ndarray and value.dtype != bool):
                 vars(self)[item.name] = numbers(value, item.name)
-        if len({getattr(self, name).shape[:1] for name in self.along} | {()}) > 2 or any(
-            not getattr(self, name).ndim for name in self.along
-        ):
+        lengths = [getattr(self, name).shape[:1] for name in self.along]
+        if len(set(lengths)) > 1 or () in lengths:
             raise InputError(f"expected arrays of one length, found others: {', '.join(self.along)}")
         self._freeze()
 
@@ -55,7 +51,7 @@ class Tabulated(ReadOnly):
             return {n: getattr(self, n) for n in self.along}
         return {n: [v] for n, v in self._values().items() if isinstance(v, int | float)}
 
-    def to_frame(self) -> pandas.DataFrame:
+    def to_frame(self) -> DataFrame:
         """The columns that share their first axis, or without any the numbers, as a frame of pandas.
 
         Raises

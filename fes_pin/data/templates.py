@@ -68,10 +68,8 @@ def slide(mass_kg: float) -> str:
         A mass that is not above 0.
     """
     _check(mass=mass_kg)
-    what = (
-        f"A carriage of {mass_kg:g} kg on a level rail. Position 0: where you say. Positive moves along +x.{_WRITTEN}"
-    )
-    return slide_urdf("slide", what, mass_kg, 0.0, 100.0)
+    what = f"A carriage of {mass_kg:g} kg on a level rail. Position 0: where you say."
+    return slide_urdf("slide", f"{what} Positive moves along +x.{_WRITTEN}", mass_kg, 0.0, 100.0)
 
 
 def _turning(name: str, what: str, mass: float, centre: float, about_centre: float, upright: bool) -> str:

@@ -7,20 +7,12 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from fes_pin.data.as_read import AsRead, digest_of, hashing
-from fes_pin.data.checks import (
-    check_columns,
-    check_labels,
-    check_values,
-    checked_kind,
-    checked_label,
-    checked_mapping,
-    checked_remarks,
-)
+from fes_pin.data.checks import check_columns, check_values, checked_label, checked_labels, checked_mapping
 from fes_pin.data.errors import InputError, fault_at
 from fes_pin.data.files import as_path, write_text
 from fes_pin.data.motion import coordinates_of, ground_reaction_of, on_common_time, read_motion
@@ -28,16 +20,10 @@ from fes_pin.data.numbers import instance
 from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.recorded.columns import Columns
 from fes_pin.data.recorded.sniff import NEW_STUDY, read_csv_or_hint
-from fes_pin.data.schema import NumberKey, RigSchema, check_conditions, checked_numbers, number_or_none, schema_of
-from fes_pin.data.show import frame
+from fes_pin.data.schema import NumberKey, RigSchema, check_conditions, checked_numbers, schema_of
+from fes_pin.data.show import DataFrame, frame
 from fes_pin.data.table import MIN_ROWS, Table, check_time, check_times, format_csv
 
-if TYPE_CHECKING:
-    import pandas
-
-
-LOW_PASS = "low_pass_hz"
-POSITIVE_HZ = NumberKey("Hz", 0.0, required=False)
 OF_THE_START = ("position0", "velocity0")
 """Conditions that state where a trial begins: of its later parts they say nothing."""
 BEGAN = "start_s"
@@ -93,12 +79,10 @@ class Trial(ReadOnly):
 
     def __post_init__(self) -> None:
         error = self.key_error
-        check_labels(self.name, self.role, self.group, error)
+        labels = checked_labels(self.name, vars(self), error)
         checked_label(self.kind, error, "kind", "a kind")
-        remarks = checked_remarks(self.remarks, error)
         given = {key: checked_mapping(getattr(self, key), error, key) for key in ("columns", "conditions")}
         conditions = checked_numbers(given["conditions"], dict.fromkeys(given["conditions"], NumberKey("")), error)
-        low_pass = number_or_none(self.low_pass_hz, POSITIVE_HZ, LOW_PASS, error)
         time = _numbers(self.time, "time_s", self)
         columns = {name: _numbers(values, name, self) for name, values in given["columns"].items()}
         if self.as_read is not None:
@@ -108,7 +92,7 @@ class Trial(ReadOnly):
         if odd := [name for name, values in columns.items() if values.shape != time.shape]:
             raise self.error(f"expected shape {time.shape} as of the time, found {columns[odd[0]].shape}", odd[0])
         check_times(time, self.error, half_digit=self.as_read.half_digit if self.as_read else None)
-        vars(self).update(time=time, columns=columns, conditions=conditions, low_pass_hz=low_pass, remarks=remarks)
+        vars(self).update(labels, time=time, columns=columns, conditions=conditions)
         self._freeze()
 
     def _freeze(self) -> None:
@@ -126,9 +110,8 @@ class Trial(ReadOnly):
         return self.error(message, key)
 
     def __hash__(self) -> int:
-        return hash(
-            (self.name, self.kind, len(self), frozenset(self.columns), float(self.time[0]), float(self.time[-1]))
-        )
+        ends = float(self.time[0]), float(self.time[-1])
+        return hash((self.name, self.kind, len(self), frozenset(self.columns), *ends))
 
     def __len__(self) -> int:
         return len(self.time)
@@ -270,7 +253,7 @@ class Trial(ReadOnly):
             raise error("time_s", "missing; expected a column of times or an index of them")
         return cls(name, kind, columns, time, **labels)
 
-    def to_frame(self) -> pandas.DataFrame:
+    def to_frame(self) -> DataFrame:
         """Every column against `time_s` as a frame of pandas; see `data.show.frame`."""
         return frame({"time_s": self.time, **self.columns}, index="time_s")
 
@@ -337,7 +320,7 @@ def check_trial(
     InputError
         Names the column or the condition and the trial.
     """
-    kind = checked_kind(schema, trial.kind, trial.key_error)
+    kind = schema.kind_of(trial.kind, trial.key_error)
     check_conditions(schema, kind, trial.conditions, trial.key_error)
     check_columns([n for n in trial.columns if n not in also], schema, kind, inputs_only, trial.error)
     if "angle_rad" in trial.conditions:
@@ -388,23 +371,21 @@ def read_trial(
     path = as_path(path)
     error = fault_at(file=path)
     schema = schema_of(rig, partial(error, "rig"))
-    kind = checked_kind(schema, kind, error)
-    label = path.stem if name is None else name
-    check_labels(label, role, group, error)
+    kind = schema.kind_of(kind, error)
+    told = {"role": role, "group": group, "remarks": remarks, "low_pass_hz": low_pass_hz}
+    labels = checked_labels(path.stem if name is None else name, told, error)
     given = {} if conditions is None else checked_mapping(conditions, error, "conditions")
-    numbers = check_conditions(schema, kind, given, error)
-    labels: dict[str, Any] = {"name": label, "kind": kind, "conditions": numbers}
-    labels |= {"role": role, "group": group, LOW_PASS: number_or_none(low_pass_hz, POSITIVE_HZ, LOW_PASS, error)}
+    labels |= {"kind": kind, "conditions": check_conditions(schema, kind, given, error)}
     if own is not None:
         instance(own, Columns, "own")
     with hashing() as sha256:
         if len(schema.recordings) > 1:
             columns, time = _body_columns(path, inputs_only)
             check_values(columns, schema, lambda message, column, _: error(column, message))
-            return _made(columns, time, AsRead(sha256, b""), remarks=checked_remarks(remarks, error), **labels)
+            return _made(columns, time, AsRead(sha256, b""), **labels)
         table, said = (read_csv_or_hint(path), "") if own is None else own.read(path, schema, kind, inputs_only)
     columns, time = _checked_columns(table, schema, kind, inputs_only)
-    labels["remarks"] = (*checked_remarks(remarks, error), *([said] if said else []))
+    labels["remarks"] += (said,) if said else ()
     return _made(columns, time, AsRead(sha256, b"", table.half_digit), **labels)
 
 

@@ -109,8 +109,7 @@ def factor_of(
         What `error` makes of a message, for a unit that is none of what this column holds.
     """
     quantities = quantities_of(column, revolute)
-    found = known_unit(unit, quantities)
-    if found is not None:
+    if (found := known_unit(unit, quantities)) is not None:
         return UNITS[found[0]][found[1]]
     expected = [u for q in quantities for u in UNITS[q]]
     if not expected:
@@ -127,8 +126,7 @@ def unit_in_name(name: str, column: str, revolute: bool | None = None) -> str:
 
 def own_unit(column: str, revolute: bool | None = None) -> str:
     """The unit that the study format has in a column; "" where it has none."""
-    quantities = quantities_of(column, revolute)
-    units = [next(iter(UNITS[q])) for q in quantities]
+    units = [next(iter(UNITS[q])) for q in quantities_of(column, revolute)]
     return " or ".join(u for u in units if u != "1")
 
 

@@ -49,11 +49,8 @@ def moving_joints(path: str | Path) -> list[tuple[str, str]]:
         Not XML, XML with a document type or entities, not a URDF, links that make no tree, a joint without a usable
         axis or limits, a mass that is not positive, an inertia that no body can have.
     """
-    return [
-        (joint.get("name", ""), joint.get("type", ""))
-        for joint in _Urdf(path).joints
-        if joint.get("type") in MOVING and joint.find("mimic") is None
-    ]
+    moving = [j for j in _Urdf(path).joints if j.get("type") in MOVING and j.find("mimic") is None]
+    return [(joint.get("name", ""), joint.get("type", "")) for joint in moving]
 
 
 def is_revolute(path: str | Path | None) -> bool | None:
@@ -146,6 +143,7 @@ class _Urdf:
         if not self.links:
             raise InputError("expected at least one <link>", file=path)
         self.masses = {name: self._mass(name, link) for name, link in self.links.items()}
+        self.ends: dict[str, list[str]] = {}  # parent and child of each joint
         self.parent: dict[str, str] = {}
         for joint in self.joints:
             self._check_joint(joint)
@@ -190,13 +188,10 @@ class _Urdf:
             raise self.error(f"expected a mass between {SMALLEST:g} and {LARGEST:g} kg, found {value:g}", name)
         if "inertia" not in numbers:
             raise self.error("expected an <inertia> together with the mass", name)
-        self._check_inertia(numbers["inertia"], name)
-        return value
-
-    def _check_inertia(self, inertia: Mapping[str, tuple[float, ...]], name: str) -> None:
-        principal = np.linalg.eigvalsh(inertia_matrix(value for (value,) in inertia.values()))
+        principal = np.linalg.eigvalsh(inertia_matrix(m for (m,) in numbers["inertia"].values()))
         if not is_possible(principal):
             raise self.error(f"expected an inertia that is positive, found a principal one of {principal[0]:g}", name)
+        return value
 
     def _check_joint(self, joint: Element) -> None:
         name, kind = joint.get("name", ""), joint.get("type")
@@ -211,7 +206,7 @@ class _Urdf:
             ends.append(link)
         if ends[1] in self.parent or ends[0] == ends[1]:
             raise self.error(f"expected a tree, but link {ends[1]!r} has several parents or is its own", name)
-        self.parent[ends[1]] = ends[0]
+        self.ends[name], self.parent[ends[1]] = ends, ends[0]
         numbers = self._read(joint, JOINT_NUMBERS, name)
         if kind in (*ONE_JOINT, "planar") and "axis" in numbers:
             self._check_axis(numbers["axis"]["xyz"], name)
@@ -245,9 +240,8 @@ class _Urdf:
             name = joint.get("name", "")
             kind = "fixed" if joint.find("mimic") is not None else joint.get("type", "")
             one = SubElement(robot, "joint", name=name, type=kind)
-            for tag in ("parent", "child"):
-                end = joint.find(tag)
-                SubElement(one, tag, link="" if end is None else end.get("link", ""))
+            for tag, end in zip(("parent", "child"), self.ends[name], strict=True):
+                SubElement(one, tag, link=end)
             self._write(one, joint, JOINT_NUMBERS, name)
         return tostring(robot, encoding="unicode")
 
@@ -283,8 +277,7 @@ class _Urdf:
 
     def beyond(self, joint: str) -> list[str]:
         """Links beyond a joint, the one that it moves first."""
-        child = next(j for j in self.joints if j.get("name") == joint).find("child")
-        first = "" if child is None else child.get("link", "")
+        first = self.ends[joint][1]
         return [first, *(link for link in self.links if link != first and first in self._ancestry(link))]
 
     def _ancestry(self, link: str) -> set[str]:

@@ -120,8 +120,7 @@ def _made(name: str, stage: Stage, signal: str, functions: Mapping[str, FeatureF
     amplitudes = [(f"a{k:02d}", float, parameter(0.0, null=0.0)) for k in range(len(functions))]
     title = "".join(part.capitalize() for part in name.split("_"))
     own = {"name": name, "stage": stage, "signal": signal, "functions": functions, "__module__": __name__}
-    made = dataclasses.make_dataclass(title, [*amplitudes, *scales], bases=(_Features,), namespace=own, frozen=True)
-    return made
+    return dataclasses.make_dataclass(title, [*amplitudes, *scales], bases=(_Features,), namespace=own, frozen=True)
 
 
 EffortFeatures = _made("effort_features", Stage.JOINT, "torque", EFFORTS)

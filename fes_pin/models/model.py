@@ -5,19 +5,16 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from fes_pin.data.errors import InputError, fault_at
 from fes_pin.data.numbers import instance, shortened
 from fes_pin.data.schema import check_known
-from fes_pin.data.show import by_columns, frame, table_html
+from fes_pin.data.show import DataFrame, by_columns, frame, table_html
 from fes_pin.data.trial import Trial
 from fes_pin.models.parameters import ParameterInfo
 from fes_pin.models.rigs.base import Rig
 from fes_pin.models.stage import Effect, in_order
-
-if TYPE_CHECKING:
-    import pandas
 
 
 @dataclass(frozen=True, repr=False)
@@ -139,7 +136,7 @@ class Model:
         rows = [(n, f"{v:.6g}", info[n].unit or "-") for n, v in self.parameters().items()]
         return table_html(f"{' + '.join(self.structure())} model", ("parameter", "value", "unit"), rows)
 
-    def to_frame(self) -> pandas.DataFrame:
+    def to_frame(self) -> DataFrame:
         """Return every parameter with its value, unit and bounds as a pandas frame; see `data.show.frame`."""
         info, head = self.parameter_info(), ("parameter", "value", "unit", "lower", "upper")
         rows = [(n, v, info[n].unit, info[n].lower, info[n].upper) for n, v in self.parameters().items()]

@@ -21,17 +21,9 @@ OF_A_FILE = "fes_pin_library_"
 """How the names of modules begin that are made of files."""
 PACKAGE = "fes_pin."
 FROZEN = "expected @dataclass(frozen=True) above it"
-EQUATIONS = (
-    "signals",
-    "states",
-    "memories",
-    "constant_names",
-    "trial_constants",
-    "set_rest",
-    "sample",
-    "rates",
-    "readings",
-)
+EQUATIONS = [
+    n for n, one in vars(Rig).items() if inspect.isfunction(one) and "NotImplementedError" in one.__code__.co_names
+]
 """Methods without which a rig has no equations."""
 STAGES = ", ".join(f"Stage.{stage.name}" for stage in Stage)
 
@@ -141,15 +133,9 @@ def classes_of(module: ModuleType) -> tuple[type[Effect] | type[Rig], ...]:
     InputError
         If there is none.
     """
-    inside = (module.__name__, f"{module.__name__}.")
-    found = [
-        one
-        for one in vars(module).values()
-        if isinstance(one, type)
-        and issubclass(one, Effect | Rig)
-        and (one.__module__ == inside[0] or one.__module__.startswith(inside[1]))
-        and not one.__name__.startswith("_")
-    ]
+    parts = [c for c in vars(module).values() if isinstance(c, type) and issubclass(c, Effect | Rig)]
+    own = [one for one in parts if f"{one.__module__}.".startswith(f"{module.__name__}.")]
+    found = [one for one in own if not one.__name__.startswith("_")]
     if not found:
         raise InputError("holds no cause and no rig; expected a class of Effect or Rig", file=_where(module.__name__))
     return tuple(dict.fromkeys(found))

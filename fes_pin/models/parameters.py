@@ -72,10 +72,8 @@ class ParameterInfo:
 
     def holds(self, value: float) -> bool:
         """Whether a value is within the bounds, or beyond one by no more than rounding, as a fit may end at it."""
-        return self.lower <= value <= self.upper or any(
-            math.isclose(value, bound, rel_tol=ROUNDING, abs_tol=ROUNDING * self.scale)
-            for bound in (self.lower, self.upper)
-        )
+        bound = self.nearest(value)
+        return value == bound or math.isclose(value, bound, rel_tol=ROUNDING, abs_tol=ROUNDING * self.scale)
 
     def nearest(self, value: float) -> float:
         """The value within the bounds that is nearest to one."""

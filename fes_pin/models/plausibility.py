@@ -49,14 +49,8 @@ def odd_numbers(study: Study | ToPredict, model: Model, simulated: Simulation) -
         For data that allow no verdict, see `data.plausibility`; and for a time step much longer than the time constants
         of the model's start values.
     """
-    return [
-        *implausible(study),
-        *_steps(study, model),
-        *_range(study, model),
-        *_swings(study, model),
-        *_turned(study, model, simulated),
-        *_at_rest(study, model),
-    ]
+    odd = [*implausible(study), *_steps(study, model), *_range(study, model)]
+    return [*odd, *_swings(study, model), *_turned(study, model, simulated), *_at_rest(study, model)]
 
 
 def warn_of_odd_numbers(model: Model, trials: Sequence[Trial], simulated: Simulation) -> None:
@@ -83,9 +77,8 @@ def _steps(study: Study | ToPredict, model: Model) -> Iterable[str]:
         # a constant that a fit found may be short, and that is no slip of units
         is_fitted = isinstance(study, ToPredict)
         if slowest.dt > COARSE * constant and not (is_fitted and slowest.dt < SLOW_S):
-            raise InputError(
-                f"{said}: is time_s in ms, or the value in [start] wrong?", file=study.folder, column="time_s"
-            )
+            message = f"{said}: is time_s in ms, or the value in [start] wrong?"
+            raise InputError(message, file=study.folder, column="time_s")
         if slowest.dt > constant:
             yield f"{said}: what happens between samples is lost; is time_s in another unit?"
         if longest < constant and name != RUN_OUT:
@@ -128,8 +121,7 @@ def _swings(study: Study | ToPredict, model: Model) -> Iterable[str]:
     if not c.get("revolute") or not weight > 0.0 or model.parameters().get("gravity_scale", 1.0) == 0.0:
         return
     free = [t for t in study.trials if "position" in t and ("effort" not in t or not t["effort"].any())]
-    wide = [t.name for t in free if _widest_swing(t["position"]) > SWING]
-    if wide:
+    if wide := [t.name for t in free if _widest_swing(t["position"]) > SWING]:
         yield f"position swings back by more than a turn, and nothing drives it, in trial {wide[0]}: is it in degrees?"
         return
     hangs = math.atan2(-c["gravity_cos"], c["gravity_sin"])

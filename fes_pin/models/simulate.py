@@ -141,8 +141,7 @@ class Simulator(OnTrials):
         the position, to the first 0.2 s. Unknowns of effects are at their nulls.
         """
         rig, out = self.model.rig, [self.model.initial_unknowns(t) for t in self.trials]
-        unmeasured = [i for i, t in enumerate(self.trials) if rig.unmeasured(t)]
-        if unmeasured:
+        if unmeasured := [i for i, t in enumerate(self.trials) if rig.unmeasured(t)]:
             kind = self.trials[unmeasured[0]].kind
             found = self._following(values, out, unmeasured, rig.unknowns(kind), rig.output(kind))
             for i, own in zip(unmeasured, found, strict=True):

@@ -23,6 +23,7 @@ from fes_pin.models.model import Model
 from fes_pin.models.outside import PACKAGE, fault_of, in_one_line
 from fes_pin.models.rigs.base import Rig
 from fes_pin.models.stage import Effect
+from fes_pin.settings import while_set
 
 NAMES = {
     **{"rate": "states", "update": "memories", "rates": "states", "trial_constants": "constant_names"},
@@ -60,11 +61,8 @@ def guard(one: type[Effect] | type[Rig]) -> None:
     for name in [n for n in dir(one) if n == "__post_init__" or not n.startswith("__")]:
         found, base = inspect.getattr_static(one, name), getattr(Effect if issubclass(one, Effect) else Rig, name, None)
         function = getattr(found, "__func__", found)
-        if (
-            not inspect.isfunction(function)
-            or function.__module__.startswith(PACKAGE)
-            or hasattr(function, "is_guarded")
-        ):
+        is_theirs = inspect.isfunction(function) and not function.__module__.startswith(PACKAGE)
+        if not is_theirs or hasattr(function, "is_guarded"):
             continue
         arguments = inspect.signature(base).parameters if callable(base) else {}
         try:
@@ -210,8 +208,7 @@ def _try(model: Model, part: Effect | Rig, kind: str, inputs: tuple[str, ...], *
     places = _places(sym)
     symbols = [values[n] for values, n in places]
     numbers = _numbers(sym, [{**model.parameters(), **{f"{part.name}.{n}": v for n, v in s.items()}} for s in settings])
-    _NOTES.set(notes)
-    try:
+    with while_set(_NOTES, notes):
         of_rig, steps = _near_rest(sym)
         moving = ["." in n and values is not sym.p for values, n in places]
         names, *both = _returned([note for note in notes if type(note[1][0]) is type(part)])
@@ -224,8 +221,6 @@ def _try(model: Model, part: Effect | Rig, kind: str, inputs: tuple[str, ...], *
             values[n] = float(number)
         with np.errstate(all="ignore"):  # what is not finite is rejected
             _near_rest(plain)
-    finally:
-        _NOTES.set(None)
     if isinstance(part, Effect):
         columns = ["time", "reading", *layout.outputs, *model.rig.schema.motion(kind)]
         columns += ["effort", "answer"] if "effort" in (*inputs, *columns) else []

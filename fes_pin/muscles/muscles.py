@@ -104,10 +104,9 @@ class MuscleTable(ReadOnly):
         if len(far):
             j = int(far[0][-1])
             low, high = np.degrees([self.lower[j], self.upper[j]])
-            raise InputError(
-                f"moment arms about {JOINT_NAMES[j]} are known from {low:.0f} to {high:.0f} degrees: beyond, the "
-                f"muscles' paths leave the bones; {np.degrees(angles[tuple(far[0])]):.0f} is too far outside"
-            )
+            known = f"moment arms about {JOINT_NAMES[j]} are known from {low:.0f} to {high:.0f} degrees"
+            outside = f"{np.degrees(angles[tuple(far[0])]):.0f} is too far outside"
+            raise InputError(f"{known}: beyond, the muscles' paths leave the bones; {outside}")
         return inside
 
     def held(self, q=None) -> tuple[str, ...]:
@@ -170,9 +169,8 @@ def standard_muscles() -> MuscleTable:
     for row in read_table("trunk.csv"):
         for s, side in enumerate(SIDES):
             sign = MIRROR_SIGN.get(row["joint"], 1.0) if side == "left" else 1.0
-            levers[s * len(rows) + names.index(row["muscle"]), JOINT_NAMES.index(row["joint"])] = (
-                sign * float(row["lever_mm"]) / 1e3
-            )
+            muscle = s * len(rows) + names.index(row["muscle"])
+            levers[muscle, JOINT_NAMES.index(row["joint"])] = sign * float(row["lever_mm"]) / 1e3
     known = np.full((len(JOINT_NAMES), 2), [-np.inf, np.inf])
     for j, name in enumerate(JOINT_NAMES):
         known[j] = np.radians(KNOWN_DEG.get(name.split("_", 1)[1], known[j]))

@@ -103,11 +103,9 @@ class Nerves(ReadOnly):
             if name not in names:
                 raise InputError(f"fatigue names {name!r}, which is not among the nerves")
             between(left, 0.0, 1.0, f"fatigue of {name} (0: nothing left, 1: fresh)")
-        members = np.array(
-            [[n in (nerve, m) for n in names] for nerve, m in zip(table.nerves, table.names, strict=True)]
-        )
-        object.__setattr__(self, "names", names)
-        object.__setattr__(self, "members", members.astype(float))
+        each = zip(table.nerves, table.names, strict=True)
+        members = np.array([[n in (nerve, m) for n in names] for nerve, m in each], dtype=float)
+        vars(self).update(names=names, members=members)
         truth(self.force_length, "force_length")
         self._freeze()
 
@@ -255,10 +253,8 @@ class Nerves(ReadOnly):
     def __str__(self) -> str:
         low, high = (self.assumed_strength * factor for factor in self.strength_band)
         kind = "paralysed muscle" if self.strength is None else "as given"
-        lines = [
-            f"{self.n} channels, {self.assumed_strength:g} of a healthy adult's strength ({kind}; "
-            f"{low:.2g} to {high:.2g}); torque when full, neutral posture:"
-        ]
+        strength = f"{self.assumed_strength:g} of a healthy adult's strength ({kind}; {low:.2g} to {high:.2g})"
+        lines = [f"{self.n} channels, {strength}; torque when full, neutral posture:"]
         matrix = self.torque_matrix()
         for name, column in zip(self.names, matrix.T, strict=True):
             order = np.argsort(-np.abs(column))[:3]

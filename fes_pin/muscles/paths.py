@@ -204,9 +204,8 @@ class LegPaths(ReadOnly):
         """Minus the derivatives of the lengths over the angles: (n, 8, muscles), m."""
         steps = angles[:, None] + 1j * _STEP * np.eye(len(COORDINATES))
         lengths = self.lengths(steps.reshape(-1, len(COORDINATES)))
-        return np.where(
-            self.crossed, -lengths.imag.reshape(len(angles), len(COORDINATES), len(self.names)) / _STEP, 0.0
-        )
+        slopes = lengths.imag.reshape(len(angles), len(COORDINATES), len(self.names)) / _STEP
+        return np.where(self.crossed, -slopes, 0.0)
 
     @property
     def crossed(self) -> np.ndarray:
@@ -241,9 +240,8 @@ class LegPaths(ReadOnly):
             points[:, i] += np.einsum("nkl,nl->nk", turns[tibia][:, :, :2], track)
         for edge in self.edges:
             i, angle = edge.point, angles[:, edge.coordinate]
-            a, b = (
-                np.einsum("nlk,nl->nk", turns[self.body[i]], points[:, j] - points[:, i]) for j in (i - 1, edge.after)
-            )
+            apart = (points[:, j] - points[:, i] for j in (i - 1, edge.after))
+            a, b = (np.einsum("nlk,nl->nk", turns[self.body[i]], one) for one in apart)
             touched, place = edge.passed(angle, a, b)
             over = points[:, i] + np.einsum("nkl,nl->nk", turns[self.body[i]], place)
             points[:, i] = np.where(touched[:, None], over, points[:, i - 1])

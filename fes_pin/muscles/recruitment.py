@@ -261,9 +261,8 @@ class MeasuredRecruitment(ReadOnly):
         if not good or not (np.diff(widths) > 0).all() or not (np.diff(values) > 0).all():
             raise InputError("a measured recruitment curve needs two or more points that rise in both columns")
         if values[0] != 0.0 or values[-1] != 1.0 or widths[0] < 0.0:
-            raise InputError(
-                "a measured recruitment curve must begin at recruitment 0 and end at 1, with widths from 0"
-            )
+            ends = "begin at recruitment 0 and end at 1, with widths from 0"
+            raise InputError(f"a measured recruitment curve must {ends}")
         if not LEAST_US <= widths[-1] <= LONGEST_US:
             ends = f"{LEAST_US:g} to {LONGEST_US:g} us"
             raise InputError(f"pulse widths of a recruitment curve end at {ends}, got {widths[-1]:g}")
@@ -286,9 +285,8 @@ class MeasuredRecruitment(ReadOnly):
 
     def pulse_width_us(self, recruitment) -> np.ndarray:
         """Pulse width in us for a recruitment: 0 for 0 and below, saturation for 1 and above."""
-        return np.where(
-            np.asarray(recruitment) > 0.0, np.interp(recruitment, self.recruitments, self.pulse_widths_us), 0.0
-        )
+        width = np.interp(recruitment, self.recruitments, self.pulse_widths_us)
+        return np.where(np.asarray(recruitment) > 0.0, width, 0.0)
 
 
 class ChannelRecruitment:

@@ -164,9 +164,8 @@ class GainFilter:
         """Standard deviations of K and of tau in s, to first order."""
         alpha = self._decay()
         left = (1.0 - alpha) * self.recruitment.force_scale_n
-        by_alpha_and_beta = np.array(
-            [[self.x[-1] / left / (1.0 - alpha), 1.0 / left], [self.dt / (alpha * math.log(alpha) ** 2), 0.0]]
-        )
+        of_gain = [self.x[-1] / left / (1.0 - alpha), 1.0 / left]
+        by_alpha_and_beta = np.array([of_gain, [self.dt / (alpha * math.log(alpha) ** 2), 0.0]])
         gain, time_constant = np.sqrt(np.diag(by_alpha_and_beta @ self.p[-2:, -2:] @ by_alpha_and_beta.T))
         return float(gain), float(time_constant)
 

@@ -181,9 +181,8 @@ def binned(value: np.ndarray, against: np.ndarray) -> tuple[np.ndarray, np.ndarr
     chosen = [np.flatnonzero(index == k) for k in range(BINS)]
     groups = [g for g in chosen if len(g) >= FEW] or [np.arange(len(value))]
     at, medians = (np.array([float(np.median(v[g])) for g in groups]) for v in (against, value))
-    scaled = value / (
-        float(np.abs(value).max(initial=0.0)) or 1.0
-    )  # a share has no unit, and squares of 1e200 no number
+    size = float(np.abs(value).max(initial=0.0)) or 1.0
+    scaled = value / size  # a share has no unit, and squares of 1e200 no number
     seen = scaled[np.concatenate(groups)]
     total = float(np.sum((seen - seen.mean()) ** 2))
     between = sum(len(g) * float(scaled[g].mean() - seen.mean()) ** 2 for g in groups)

@@ -72,11 +72,8 @@ def html_table(
         return element("tr", *(element(tag, cell, **own, **{"data-title": title}) for cell, title, own in titled))
 
     body = joined([cells("td", row) for row in rows])
-    return element(
-        "div",
-        element("table", element("thead", cells("th", head)), element("tbody", body)),
-        class_="scroll prose" if prose else "scroll",
-    )
+    table = element("table", element("thead", cells("th", head)), element("tbody", body))
+    return element("div", table, class_="scroll prose" if prose else "scroll")
 
 
 def section(title: str, *contents: Markup) -> Markup:
@@ -123,8 +120,5 @@ def unit_text(unit: str) -> str:
 
 def key(*entries: tuple[str, str]) -> Markup:
     """A legend for the figures beneath it: colour names of `style.COLOURS`, and their meanings."""
-    made = [
-        element("span", Markup(f'<i style="background: var(--{colour})"></i>'), words, class_="entry")
-        for colour, words in entries
-    ]
-    return element("p", joined(made, " "), class_="key")
+    marks = [(Markup(f'<i style="background: var(--{name})"></i>'), said) for name, said in entries]
+    return element("p", joined([element("span", *one, class_="entry") for one in marks], " "), class_="key")

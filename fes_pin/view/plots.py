@@ -155,9 +155,8 @@ def _joined(many: Sequence[Missing], name: str) -> tuple[np.ndarray, np.ndarray]
 
 def _spread(x: np.ndarray, value: np.ndarray) -> np.ndarray:
     """Instants at about equal distances along the curve in a panel: rest is drawn once, motion in full."""
-    steps = np.abs(np.diff(x)) / max(float(np.ptp(x)), 1e-300) + np.abs(np.diff(value)) / max(
-        float(np.ptp(value)), 1e-300
-    )
+    across, up = (np.abs(np.diff(one)) / max(float(np.ptp(one)), 1e-300) for one in (x, value))
+    steps = across + up
     along = np.concatenate([[0.0], np.cumsum(steps + 0.3 * steps.mean() + 1e-12)])
     return np.unique(np.searchsorted(along, np.linspace(0.0, along[-1], min(DOTS, len(x)))))
 

@@ -148,9 +148,8 @@ def _by_group(change: Change) -> Markup:
     name, groups = next(iter(change.parameters.items()))
     rows = [(g, e.value, *e.interval, "") for g, e in groups.items()]
     unit = unit_text(next(iter(groups.values())).unit)
-    return figure(
-        intervals_drawing(rows, f"{name} ({unit})" if unit else name), f"{name} in each group.", "narrow", change.name
-    )
+    drawn = intervals_drawing(rows, f"{name} ({unit})" if unit else name)
+    return figure(drawn, f"{name} in each group.", "narrow", change.name)
 
 
 def _rivals(result: Result, cause: Named) -> Markup:

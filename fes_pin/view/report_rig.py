@@ -58,29 +58,24 @@ def _parameters(diagnosis: Diagnosis) -> list[Markup]:
             value_and_interval(ParameterEstimate.of(f, name, ""))[::2] if name in f.free else ("-", "-") for f in fits
         ]
         begun = f"{start[name]:.4g}" if name in start else "-"
-        rows.append(
-            [element("code", name), unit_text(info[name].unit), begun, *(text for pair in cells for text in pair)]
-        )
+        texts = (text for pair in cells for text in pair)
+        rows.append([element("code", name), unit_text(info[name].unit), begun, *texts])
     head = ("parameter", "unit", "start", "nominal", "95 % interval", "extended", "95 % interval")
     unit = position_unit(diagnosis)
     noise: list[list[Content]] = [
         [element("code", n), f"{m.std:.3g}", quantity(n, unit)[1] or "-", str(len(m.ar)) if m.ar else "white"]
         for n, m in diagnosis.extended.noise.items()
     ]
-    return [
-        html_table(head[: 3 + 2 * len(fits)], rows, range(2, 7)),
-        html_table(("noise of", "standard deviation", "unit", "autoregressive order"), noise, (1,)),
-    ]
+    kinds = html_table(("noise of", "standard deviation", "unit", "autoregressive order"), noise, (1,))
+    return [html_table(head[: 3 + 2 * len(fits)], rows, range(2, 7)), kinds]
 
 
 def _use(diagnosis: Diagnosis) -> list[Markup]:
     rig = diagnosis.model.rig
     libraries = sorted({Path(where).name for one in (rig, *diagnosis.model.effects) if (where := origin(type(one)))})
     options = "".join(f" --library {name}" for name in libraries)
-    lines = [
-        f"fes-pin predict model.toml TRIAL.csv {one}{options} --out PREDICTED.csv".replace("  ", " ")
-        for one in rig.settings
-    ]
+    told = (f"fes-pin predict model.toml TRIAL.csv {one}{options} --out PREDICTED.csv" for one in rig.settings)
+    lines = [line.replace("  ", " ") for line in told]
     columns = " and ".join(("time_s", *rig.input_columns(diagnosis.study.trials[0])))
     which = "extended" if diagnosis.causes else "fitted nominal"
     words = f"model.toml next to this page is the {which} model, whole. TRIAL.csv needs {columns}. {rig.begins}"

@@ -40,16 +40,13 @@ def missing_section(diagnosis: Diagnosis, replays: Sequence[Replay]) -> list[Mar
         "the variance that is a function of that variable alone."
     )
     extended = [("extended", "extended, median")] if after else []
-    out = [
-        element("p", text),
-        key(("nominal", "nominal, instants"), ("measured", "nominal, median"), *extended),
-    ]
+    out = [element("p", text)]
+    out.append(key(("nominal", "nominal, instants"), ("measured", "nominal, median"), *extended))
     for kind in dict.fromkeys(one.kind for one in before):
         first, second = ([one for one in many if one.kind == kind] for many in (before, after))
-        drawn = [
-            figure(missing_drawing(first, second, n, unit), file=f"missing_{kind}_against_{n}")
-            for n in sorted(first[0].against, key=lambda n: -share(first, n))
-        ]
+        names = sorted(first[0].against, key=lambda n: -share(first, n))
+        drawings = [(n, missing_drawing(first, second, n, unit)) for n in names]
+        drawn = [figure(one, file=f"missing_{kind}_against_{n}") for n, one in drawings]
         out.append(element("h3", f"Missing {kind}, {len(first)} trial{'s' * (len(first) > 1)}"))
         out.append(element("div", joined(drawn), class_="grid three"))
     return out

@@ -70,9 +70,8 @@ def not_testable(result: Result, names: Sequence[str], why: str) -> Markup:
         [element("code", n), sentence(e)] for n in names if (e := result.effect(n)) is not None
     ]
     said = element("p", f"Not testable is not the same as absent: {why}.")
-    return section(
-        "Not testable here", *([said, html_table(("cause", "what it is"), rows, prose=True)] if rows else [])
-    )
+    table = html_table(("cause", "what it is"), rows, prose=True)
+    return section("Not testable here", *([said, table] if rows else []))
 
 
 def provenance_parts(made: Provenance | None) -> list[Markup]:

@@ -152,9 +152,8 @@ class BodyScene:
         import umsgpack  # noqa: PLC0415
 
         script = (Path(import_meshcat().__file__).parent / "viewer/dist/main.min.js").read_text()
-        packed = ",\n".join(
-            f'"{base64.b64encode(umsgpack.packb(command.lower())).decode()}"' for command in self.commands()
-        )
+        texts = (base64.b64encode(umsgpack.packb(one.lower())).decode() for one in self.commands())
+        packed = ",\n".join(f'"{text}"' for text in texts)
         page = Template(resources.files("fes_pin.view").joinpath("viewer.html").read_text(encoding="utf-8"))
         return page.substitute(script=script, commands=packed, caption=html.escape(self.caption))
 
@@ -208,10 +207,8 @@ def said_of(linear: LinearBody) -> str:
     other = SIDES[1 - SIDES.index(linear.body.stance)]
     below = -sole(linear.body, linear.body.angles(linear.whole_posture, check=False), other, heel=False)[:, 2].min()
     if below > LEVEL_M:
-        parts.append(
-            f"with the {linear.body.stance} forefoot flat, as the model has it, the {other} one lies "
-            f"{100 * below:.1f} cm under the ground"
-        )
+        flat = f"with the {linear.body.stance} forefoot flat, as the model has it"
+        parts.append(f"{flat}, the {other} one lies {100 * below:.1f} cm under the ground")
     return "; ".join(parts)
 
 

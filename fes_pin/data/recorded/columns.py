@@ -114,7 +114,8 @@ class Columns:
                 continue
             if source.name and source.name not in recording.names:
                 if column in needed:
-                    message = f"missing; [columns] takes {column} from it, and this file has {_list(recording.names)}"
+                    has = ", ".join(recording.names)[:200]
+                    message = f"missing; [columns] takes {column} from it, and this file has {has}"
                     raise recording.error(message, source.name)
                 continue
             taken[column] = source
@@ -249,7 +250,3 @@ def _with_file(columns: Columns, about: Mapping[str, Any], error: KeyFault) -> C
     if text.first_row <= text.header_row:
         raise error("file.first_row", f"expected a line below the header in line {text.header_row}")
     return replace(columns, form=text, resample_hz=rate, fills=missing is not None)
-
-
-def _list(names: tuple[str, ...]) -> str:
-    return ", ".join(names)[:200]

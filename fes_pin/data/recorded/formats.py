@@ -22,7 +22,7 @@ from fes_pin.data.errors import InputError
 from fes_pin.data.files import as_path, read_bytes
 from fes_pin.data.libraries import optional_library
 from fes_pin.data.markers import TIME, c3d_points, trc_points
-from fes_pin.data.motion import read_motion
+from fes_pin.data.motion import STORAGE, read_motion
 from fes_pin.data.recorded.text import TextForm, read_text_recording, without_twins
 from fes_pin.data.table import MIN_ROWS, Table
 
@@ -239,12 +239,6 @@ def _channels(stream: Any) -> list[tuple[str, str]]:
 
 
 _READERS: Mapping[str, Callable[[Path, Sequence[str] | None], Table]] = {
-    ".parquet": _parquet,
-    ".mat": _matlab,
-    ".c3d": _c3d,
-    ".trc": _trc,
-    ".mot": _storage,
-    ".sto": _storage,
-    ".xdf": _xdf,
-    ".xdfz": _xdf,
+    **{".parquet": _parquet, ".mat": _matlab, ".c3d": _c3d, ".trc": _trc},
+    **{**dict.fromkeys(STORAGE, _storage), **dict.fromkeys((".xdf", ".xdfz"), _xdf)},
 }

@@ -25,13 +25,10 @@ def cache_folder() -> Path:
     RuntimeError
         The user has no home.
     """
-    chosen = os.environ.get("FES_PIN_CACHE")
-    if chosen:
+    if chosen := os.environ.get("FES_PIN_CACHE"):
         return Path(chosen)
-    base = os.environ.get("XDG_CACHE_HOME") or (
-        Path.home() / ("Library/Caches" if sys.platform == "darwin" else ".cache")
-    )
-    return Path(base) / "fes_pin"
+    usual = Path.home() / ("Library/Caches" if sys.platform == "darwin" else ".cache")
+    return Path(os.environ.get("XDG_CACHE_HOME") or usual) / "fes_pin"
 
 
 def read_cached(key: str) -> bytes | None:

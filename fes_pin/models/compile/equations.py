@@ -159,8 +159,7 @@ class Symbols:
         for effect in s.effects:
             rates.update({f"{effect.name}.{n}": v for n, v in effect.rate(s.of(effect)).items()})
         rates = {n: s.pace * v for n, v in rates.items()} if self.is_late else rates
-        s = self.signals(self.x, self.m)
-        readings = rig.readings(s)
+        readings = rig.readings(self.signals(self.x, self.m))
         return [memories[n] for n in self.memories], [rates[n] for n in self.states], list(readings)
 
 

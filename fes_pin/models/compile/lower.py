@@ -24,7 +24,7 @@ _NAMED = (
     *("exp", "log", "sin", "cos", "tanh", "sqrt", "fabs", "floor", "ceil", "copysign", "tan", "asin", "acos", "atan"),
     *("atan2", "sinh", "cosh", "erf", "pow", "fmod", "remainder", "hypot", "log1p", "expm1", "asinh", "acosh", "atanh"),
 )
-_LANE_FUNCTIONS = {getattr(ca, f"OP_{name.upper()}"): name for name in _NAMED}
+_LANE_FUNCTIONS = {getattr(ca, f"OP_{n.upper()}"): n for n in _NAMED} | {ca.OP_CONSTPOW: "pow"}
 
 
 @dataclass(frozen=True)
@@ -193,8 +193,6 @@ class _Lowering:
         }
         if op in simple:
             return simple[op]()
-        if op == ca.OP_CONSTPOW:
-            op = ca.OP_POW
         if op not in _LANE_FUNCTIONS:
             raise NotImplementedError(f"CasADi operation {op} has no lowering")
         return self.functions.call(_LANE_FUNCTIONS[op], *a)

@@ -155,9 +155,8 @@ class _Loop:
 
     def _number(self, k: ir.Value) -> ir.Value:
         """An integer as lanes of doubles."""
-        one = self.b.insert_element(
-            ir.Constant(self.vector, ir.Undefined), self.b.sitofp(k, DOUBLE), ir.Constant(ir.IntType(32), 0)
-        )
+        nothing, first = ir.Constant(self.vector, ir.Undefined), ir.Constant(ir.IntType(32), 0)
+        one = self.b.insert_element(nothing, self.b.sitofp(k, DOUBLE), first)
         mask = ir.Constant(ir.VectorType(ir.IntType(32), self.vector.count), [0] * self.vector.count)
         return self.b.shuffle_vector(one, one, mask)
 

@@ -256,9 +256,8 @@ def _across_slack(
         return ca.substitute(d.through(f, *inner[1:]) + ca.mtimes(ca.jacobian(f, mean), moved), mean, known.mean)
 
     slope, turned = ca.densify(-through(predicted.mean)), through(left.mean)
-    value, spread, x, covariance = (
-        ca.substitute(e, mean, known.mean) for e in (predicted.mean, predicted.covariance, left.mean, left.covariance)
-    )
+    both = (predicted.mean, predicted.covariance, left.mean, left.covariance)
+    value, spread, x, covariance = (ca.substitute(e, mean, known.mean) for e in both)
     return (measured - value, spread + noise, slope), x, covariance, turned
 
 

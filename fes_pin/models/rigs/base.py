@@ -76,9 +76,8 @@ class Rig(ReadOnly):
             raise InputError(f"expected names among {', '.join(names)}, each once", column="fitted")
         check_parameters(self, schema.start)
         known = {**schema.constants, **schema.passive, **schema.start}
-        constants = {
-            n: checked_number(v, f"constants.{n}", known.get(n, ANY_NUMBER)) for n, v in self.constants.items()
-        }
+        given = {n: (v, known.get(n, ANY_NUMBER)) for n, v in self.constants.items()}
+        constants = {n: checked_number(v, f"constants.{n}", key) for n, (v, key) in given.items()}
         if "threshold_us" in constants and constants.get("saturation_us", math.inf) <= constants["threshold_us"]:
             message = f"expected more than {constants['threshold_us']:g}"
             raise InputError(message, column="constants.saturation_us")

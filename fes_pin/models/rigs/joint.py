@@ -166,10 +166,9 @@ class Joint(Rig):
 
     def driving_sizes(self, trials: Sequence[Trial]) -> dict[str, float]:
         driven = [t["effort"] for t in trials if "effort" in t.columns]
-        weight = [
-            self.gravity_scale * (self.constants["gravity_cos"] * np.cos(q) + self.constants["gravity_sin"] * np.sin(q))
-            for q in (t["position"] for t in trials if "position" in t.columns and self.constants["revolute"])
-        ]
+        c, turns = self.constants, [t["position"] for t in trials if "position" in t.columns]
+        along = (c["gravity_cos"] * np.cos(q) + c["gravity_sin"] * np.sin(q) for q in turns if c["revolute"])
+        weight = [self.gravity_scale * one for one in along]
         size = math.sqrt(max((float(np.nanmean(x**2)) for many in (driven, weight) for x in many), default=0.0))
         return {"effort": max(size, 1e-9 * self.constants["inertia"])}
 
