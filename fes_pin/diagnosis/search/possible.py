@@ -12,8 +12,8 @@ from fes_pin.models.stage import Effect
 def is_possible(fitted: Fit, measured: Mapping[str, np.ndarray]) -> bool:
     """Return False if a cause in a fit is impossible: another cause is then mistaken for it.
 
-    It is impossible if its size or shape ended at a bound other than its null, or if its size is less than the readings
-    can resolve.
+    It is impossible if its size or shape ended at a bound other than its null or 0, or if its size is less than the
+    readings can resolve.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ def are_possible(effects: Sequence[Effect], at_bound: Collection[str], measured:
         info, smallest = effect.parameters(), effect.smallest(measured)
         for n in (*effect.amplitudes(), *effect.shapes()):
             size = getattr(effect, n)
-            if f"{effect.name}.{n}" in at_bound and size != info[n].null:
+            if f"{effect.name}.{n}" in at_bound and size not in (info[n].null, 0.0):
                 return False
             if 0.0 < abs(size) < smallest.get(n, 0.0):
                 return False

@@ -25,7 +25,7 @@ class FrameVibration(Effect):
     frequency_hz: float = parameter(
         10.0, unit="Hz", lower=2.0, upper=60.0, scale=1.0, grid=(3.0, 4.5, 6.5, 9.0, 11.0, 13.5, 17.0, 22.0, 30.0)
     )
-    damping_ratio: float = parameter(0.05, lower=0.002, upper=0.2, scale=0.02)
+    damping_ratio: float = parameter(0.05, lower=0.0, upper=0.2, scale=0.02)
 
     name, stage, signal, rigs = "frame_vibration", Stage.RIG, "acceleration", ("ankle", "joint")
     states = ("angle", "rate")
