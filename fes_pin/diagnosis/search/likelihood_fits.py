@@ -29,6 +29,7 @@ from fes_pin.infer.optimize import WORTH
 from fes_pin.infer.optimum import minimise
 from fes_pin.infer.problem import Unknowns, normal_equations
 from fes_pin.infer.scoring import LITTLE
+from fes_pin.infer.text import WHOLE
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import StateSpaceNoise
 from fes_pin.models.stage import Effect
@@ -224,11 +225,14 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
     def is_far(self, fitted: LikelihoodFit) -> bool:
         """Return whether E of a fit's free simulations is more than `FAR_PERCENT`, or negligible by least squares.
 
-        So is a fit that ended at a bound. In closed loop none is: a filter follows the data there.
+        So is a fit that ended at a bound. In closed loop none is: a filter follows the data there. Errors of an imposed
+        motion do not grow with time: a fit to it is far where it is worse than a constant.
         """
         if self.answered:
             return False
         most = NOTHING_PERCENT if self.noise == WHITE else FAR_PERCENT
+        if all(t.kind == IMPOSED for t in self.trials):
+            most = WHOLE
         return self.misfit(fitted) > most or bool(at_a_bound(fitted, self.model))
 
     def misfit(self, fitted: LikelihoodFit) -> float:
