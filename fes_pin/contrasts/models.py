@@ -75,7 +75,9 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
             apart = less
         self.fits |= {tuple(sorted(map(str, f.items))): f for f in (apart, alike)}
         begun = apart if len(apart.changes) == 1 else alike
-        self.family, names = self.screen.family(begun, self.seed), tuple(sorted(map(str, begun.items)))
+        names = tuple(sorted(map(str, begun.items)))
+        if names:
+            self.family = self.screen.family(begun, self.seed)
         self._act(names, max((s.net_gain for s in self.screen.scores(begun).scored), default=0.0))
         return names
 
