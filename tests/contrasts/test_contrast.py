@@ -36,7 +36,7 @@ def stronger_with_zeros(offset_n, folder):
     return replace(study, trials=tuple(moved))
 
 
-@pytest.mark.parametrize("offset_n", [0.0, 0.01])
+@pytest.mark.parametrize("offset_n", [0.0, 0.01, 0.1])
 def test_a_stronger_muscle_of_which_the_model_lacks_a_delay(offset_n, tmp_path):
     """An error that all groups share hides no change, nor do zeros that differ between trials."""
     found = fp.contrast(stronger_with_zeros(offset_n, tmp_path))
@@ -44,11 +44,6 @@ def test_a_stronger_muscle_of_which_the_model_lacks_a_delay(offset_n, tmp_path):
     assert change.name == "gain" and "electromechanical_delay" in found.common
     before, after = (p.value for p in change.parameters["gain"].values())
     assert after / before == pytest.approx(1.67, abs=0.02)
-
-
-def test_zeros_of_half_a_twitch_hide_its_strength_and_that_is_said(tmp_path):
-    found = fp.contrast(stronger_with_zeros(0.1, tmp_path))
-    assert "gain" in found.untestable and "gain" in found.advice()
 
 
 @pytest.mark.long
