@@ -160,16 +160,15 @@ def _compared(
     weight = np.array([np.isfinite(t[c]).sum() / floor[c].std ** 2 for t, c in zip(trials, columns, strict=True)])
     around = weight * kinds.pop("around")
     squares = {n: len(trials) * 100.0 * weight * e / around.sum() for n, e in kinds.items()}
+    rows = {str(c): columns == c for c in dict.fromkeys(columns)}
+    rmse = {c: {n: math.sqrt(float(e[k].mean())) for n, e in kinds.items()} for c, k in rows.items()}
     return Compared(
         name=one.name,
         words=one.words,
         source=one.source,
         parameters=len(whole.free),
         unfelt=one.unfelt,
-        rmse={
-            str(c): {n: math.sqrt(float(e[columns == c].mean())) for n, e in kinds.items()}
-            for c in dict.fromkeys(columns)
-        },
+        rmse=rmse,
         percent={n: percent_of_spread(weight * e, around) for n, e in kinds.items()},
         squares=squares,
         apart={},
@@ -195,6 +194,3 @@ def _check_times(trials: Sequence[Trial], **asked: float | None) -> None:
         if value is not None and not 0.0 < number(value, name) < shortest:
             message = f"expected seconds between 0 and {shortest:.4g}, the shortest trial; found {value:g}"
             raise InputError(message, column=name)
-
-
-__all__ = ["compare"]

@@ -52,10 +52,8 @@ class Ding2003(Effect):
     def update(self, s: Any) -> Mapping[str, Any]:
         pulse = s.u.stim > 0.0
         earlier = s.own.primed * exp(-s.c.dt / TAU_C_S)
-        return {
-            "weight": 1.0 + (self.half_saturation + R_0 - 1.0) * earlier,
-            "primed": where(pulse, 1.0, earlier),
-        }
+        weight = 1.0 + (self.half_saturation + R_0 - 1.0) * earlier
+        return {"weight": weight, "primed": where(pulse, 1.0, earlier)}
 
     def rest(self, s: Any) -> Mapping[str, Any]:
         return {"weight": 1.0}

@@ -4,9 +4,8 @@ A composition keeps the nominal recruitment and the rig; what a publication has 
 has not in common with it. Start values are the publication's where it has any; all parameters are fitted.
 """
 
-import dataclasses
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -83,7 +82,7 @@ class Published:
         if self.fixed:
             held = dict(self.fixed)
             left = tuple(n for n in rig.fitted_parameters() if n not in held)
-            rig = dataclasses.replace(nominal.with_parameters(held).rig, fitted=left)
+            rig = replace(nominal.with_parameters(held).rig, fitted=left)
         signals = {name for t in trials for name in rig.changeable(t.kind, rig.input_columns(t))}
         return Model(rig, tuple(e for e in self.effects(trials) if rig.takes(e) and e.signal in signals))
 
@@ -103,11 +102,9 @@ def _contractile(trials: Sequence[Trial]) -> tuple[Effect, ...]:
     force = max(float(np.nanmax([np.nanmax(t["force_n"]) for t in levered])), 1e-9)
     way = max(float(np.ptp(length)), 1e-9)
     fastest = max(float(np.quantile(speed, 0.99)), 1e-9)
-    return (
-        ForceLength(slope_per_rad=0.0, curvature_per_rad2=1.0 / way**2),
-        ForceVelocity(slope_s_per_rad=1.0 / fastest, hill=HILL),
-        SeriesElasticity(compliance=0.05 * way / force),
-    )
+    over_length = ForceLength(slope_per_rad=0.0, curvature_per_rad2=1.0 / way**2)
+    over_velocity = ForceVelocity(slope_s_per_rad=1.0 / fastest, hill=HILL)
+    return over_length, over_velocity, SeriesElasticity(compliance=0.05 * way / force)
 
 
 LITERATURE: tuple[Published, ...] = (

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import dataclasses
 import itertools
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TypeVar
 
@@ -102,9 +101,8 @@ class GroupedModel:
     def with_parameters(self, values: Mapping[str, float]) -> GroupedModel:
         """Return the same model with other values."""
         full = {**self.parameters(), **values}
-        return dataclasses.replace(
-            self, models={g: m.with_parameters(self.of(g, full)) for g, m in self.models.items()}
-        )
+        models = {g: m.with_parameters(self.of(g, full)) for g, m in self.models.items()}
+        return replace(self, models=models)
 
     def structure(self) -> tuple[str, ...]:
         """The rig, and the effects of each group."""
@@ -214,12 +212,10 @@ class GroupedProblem(NoisyProblem):
     def evaluate(self, points: Sequence[Point]) -> list[Evaluation]:
         """Return one-step predictions of all trials at each of several points, group after group."""
         cut = [by_group(unknowns, self._by_group) for _, unknowns, _ in points]
-        each = [
-            p.evaluate(
-                [(self.model.of(g, v), own[g], _of_group(r, g)) for (v, _, r), own in zip(points, cut, strict=True)]
-            )
-            for g, p in self.parts.items()
-        ]
+        each = []
+        for g, p in self.parts.items():
+            pairs = zip(points, cut, strict=True)
+            each.append(p.evaluate([(self.model.of(g, v), own[g], _of_group(r, g)) for (v, _, r), own in pairs]))
         return [Evaluation.joined(one) for one in zip(*each, strict=True)]
 
     def noise_step(self, values: Mapping[str, float], unknowns: Unknowns) -> float:
@@ -286,7 +282,7 @@ class GroupedProblem(NoisyProblem):
             jacobian = np.zeros((len(one.residual), len(self.free)))
             local = np.zeros((len(one.residual), len(self.unknown_names)))
             jacobian[:, at], local[:, unknown] = one.jacobian, one.local
-            out.append(dataclasses.replace(one, jacobian=jacobian, local=local))
+            out.append(replace(one, jacobian=jacobian, local=local))
         return out
 
 

@@ -141,10 +141,9 @@ class Screen:
         left = np.concatenate([projection(np.nan_to_num(c.columns)) for c in made], axis=1)
         gram, along = left.T @ left, left.T @ projection.residual
         blocks = slices(c.columns.shape[1] for c in made)
-        scored = []
-        for c, b in zip(made, blocks, strict=True):
-            spread = ByUnit.of(left[:, b.start], projection.residual, base.parts).spread(FITTED)
-            scored.append(_score(c, gram[b, b], along[b], spread))
+        spreads = [ByUnit.of(left[:, b.start], projection.residual, base.parts).spread(FITTED) for b in blocks]
+        each = zip(made, blocks, spreads, strict=True)
+        scored = [_score(c, gram[b, b], along[b], spread) for c, b, spread in each]
         return ItemScores(scored, gram, [b for c, b in zip(made, blocks, strict=True) if c.item.group is not None])
 
     def _columns(self, base: Grouped) -> Iterator[_Column]:

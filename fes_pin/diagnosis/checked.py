@@ -1,14 +1,12 @@
 """Checks of a study before a search: implausible numbers, and the causes that its trials can identify."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from fes_pin.data.read_only import ReadOnly
-from fes_pin.data.show import by_columns, frame, table_html
+from fes_pin.data.show import DataFrame, by_columns, frame, table_html
 from fes_pin.data.study import Study
 from fes_pin.diagnosis.diagnosis import few_trials, measured_study, split
 from fes_pin.diagnosis.plausibility import check_study
@@ -16,9 +14,6 @@ from fes_pin.diagnosis.testable import Testable, testable_causes
 from fes_pin.infer.result import shown
 from fes_pin.models.catalogue import Source, catalogue_of
 from fes_pin.models.nominal import nominal_model
-
-if TYPE_CHECKING:
-    import pandas
 
 FAR = 0.3
 """Share of the variance that the nominal model leaves above which a warning says so."""
@@ -57,7 +52,7 @@ class Checked(ReadOnly):
         shares = {name: shown(share, 4) for name, share in found.shown.items()}
         return {**record, "shown": shares, **lists, "unexplained_percent": shown(100.0 * found.unexplained, 4)}
 
-    def to_frame(self) -> pandas.DataFrame:
+    def to_frame(self) -> DataFrame:
         """Return one row a cause: whether it is identifiable, and the share of its sensitivity that is its own, 0 to 1.
 
         The share is NaN for a cause that is not identifiable or acts in no trial.

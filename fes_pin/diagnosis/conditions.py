@@ -83,18 +83,13 @@ class Conditions(ABC, Generic[F, M]):
             return made.search, made.searched, made
         search, searched = self.run(list(trials))
         if made is None and not search.was_stopped:
-            made = self._by_causes(trials, searched, first)
+            # the trial is restated that is an outlier under the causes found, if that explains it
+            misread = self._misread(trials, searched) if searched.without else first
+            made = None if misread is None else self._restated(trials, misread)
+            made = made if made is not None and self.is_explained(made) else None
         if made is None or not self._is_cheaper(search, searched, trials, made):
             return search, searched, None
         return made.search, made.searched, made
-
-    def _by_causes(
-        self, trials: Sequence[Trial], searched: SearchResult[F], first: Misread | None
-    ) -> Restated[F, M] | None:
-        """Return a search with the trial restated that is an outlier under the causes found, if that explains it."""
-        misread = self._misread(trials, searched) if searched.without else first
-        made = None if misread is None else self._restated(trials, misread)
-        return made if made is not None and self.is_explained(made) else None
 
     def _is_cheaper(
         self, search: Search[F, M], searched: SearchResult[F], trials: Sequence[Trial], made: Restated[F, M]

@@ -259,7 +259,6 @@ def _sums(fitted: LikelihoodFit, floor: LikelihoodFit, trial: Trial, horizon_s: 
         next_one = one_step(fitted.model, trial, fitted.noise)[name]
     missed, unit = (next_one, measured - predicted[name], free), floor.noise.white[name] ** 2
     begun = 0, _first(fitted, trial, horizon_s), 0
-    one, ahead, alone = (
-        _lines(measured, m, unit, noise[name])[:, k:].sum(axis=1) for m, k in zip(missed, begun, strict=True)
-    )
+    each = zip(missed, begun, strict=True)
+    one, ahead, alone = (_lines(measured, m, unit, noise[name])[:, k:].sum(axis=1) for m, k in each)
     return np.array([[one[0], ahead[0], alone[0], ahead[2]], [one[1], ahead[1], alone[1], ahead[1]]])

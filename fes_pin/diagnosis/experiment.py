@@ -15,7 +15,7 @@ from fes_pin.identify.per_trial import falls
 from fes_pin.identify.problem import measured_columns
 from fes_pin.infer.covariance import least_squares_step
 from fes_pin.infer.levels import SEPARABLE, SURE
-from fes_pin.infer.problem import Linearized, NormalEquations, normal_equations
+from fes_pin.infer.problem import Linearized, NormalEquations, Unknowns, normal_equations
 from fes_pin.models.nominal import rig_of
 from fes_pin.models.simulate import Simulator
 
@@ -136,8 +136,7 @@ def next_experiment(
     if separation.worth < 1.0:
         most = f"{separation.worth:.2g} squared noise units at most" if separation.worth >= ALIKE else "nothing"
         why = f"no stimulus or load of this rig separates {name} and {closest}: the models differ by {most}"
-        why = f"{why}; {best.model.rig.elsewhere}"
-        return NextExperiment(why, pair)
+        return NextExperiment(f"{why}; {best.model.rig.elsewhere}", pair)
     others = ", the other rivals by more" if len(rivals) > 1 else ""
     differ = f"{name} and {closest} differ by {separation.worth:.3g} squared noise units{others}"
     why = f"on this trial {differ}; {_often(separation.repeats())}"
@@ -173,13 +172,12 @@ def discriminations(
 ) -> list[Discrimination]:
     """Return the discrimination of two models by each of the trials of `near_measured`."""
     trials = [read for _, read in near]
-    if_best, slopes = (
-        LikelihoodProblem(one.model, trials, best.noise, one.free).linearize(one.values, start)
-        for one, start in (
-            (rival, [rival.model.initial_unknowns(read) for read in trials]),
-            (best, [_start(best, trial) for trial, _ in near]),
-        )
-    )
+
+    def linearized(one: LikelihoodFit, start: Unknowns) -> list[Linearized]:
+        return LikelihoodProblem(one.model, trials, best.noise, one.free).linearize(one.values, start)
+
+    if_best = linearized(rival, [rival.model.initial_unknowns(read) for read in trials])
+    slopes = linearized(best, [_start(best, trial) for trial, _ in near])
     if_rival = [Linearized(-r.residual, b.jacobian, b.local) for r, b in zip(if_best, slopes, strict=True)]
     known = (normal_equations(rival.parts).hessian, normal_equations(best.parts).hessian)
     news = [(normal_equations([one]), normal_equations([other])) for one, other in zip(if_best, if_rival, strict=True)]

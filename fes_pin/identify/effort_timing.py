@@ -132,10 +132,8 @@ _WAYS: tuple[_Way, ...] = (
 def words_of_lateness(log: Log) -> str:
     """Return a warning about efforts that were moved, or interpolated between rows."""
     if log.effort_over_s:
-        return (
-            f"the effort was recorded less often than the controller acted, and was interpolated between rows, over "
-            f"{1e3 * log.effort_over_s:.2g} ms from each"
-        )
+        often = "the effort was recorded less often than the controller acted, and was interpolated between rows"
+        return f"{often}, over {1e3 * log.effort_over_s:.2g} ms from each"
     late_s = log.effort_late_s
     when = "after" if late_s > 0.0 else "before"
     return f"the effort was recorded {1e3 * abs(late_s):.2g} ms {when} it acted, and was moved to that time"

@@ -60,9 +60,8 @@ def first_guess(model: Model, trials: Sequence[Trial], correlation_s: float = 0.
     """Return start values of noise: measurement noise from second differences, and small process noise."""
     white = {n: noise.std for n, noise in rough_noise(model, trials, correlation_s).items()}
     sizes = driving_size(model, trials)
-    return StateSpaceNoise(
-        white, {n: FIRST_SHARE * v for n, v in sizes.items()}, dict.fromkeys(sizes, FIRST_TIME_S), correlation_s
-    )
+    std = {n: FIRST_SHARE * v for n, v in sizes.items()}
+    return StateSpaceNoise(white, std, dict.fromkeys(sizes, FIRST_TIME_S), correlation_s)
 
 
 def stilled(model: Model, trials: Sequence[Trial], noise: StateSpaceNoise) -> StateSpaceNoise:

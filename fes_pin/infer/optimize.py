@@ -173,10 +173,8 @@ class Descent:
         if not steps:
             return self.unknowns
         names = self.problem.unknown_names
-        return [
-            {n: u[n] + float(d) for n, d in zip(names, step, strict=True)}
-            for u, step in zip(self.unknowns, steps, strict=True)
-        ]
+        each = zip(self.unknowns, steps, strict=True)
+        return [{n: u[n] + float(d) for n, d in zip(names, step, strict=True)} for u, step in each]
 
 
 def _relief(kept: float) -> float:

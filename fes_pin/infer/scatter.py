@@ -135,14 +135,10 @@ def scores_of(parts: Sequence[Linearized]) -> np.ndarray:
     """
     lengths = [len(p.residual) for p in parts]
     shares = [min(n, max(1, round(PIECES * n / sum(lengths)))) for n in lengths]
-    pieces = [
-        piece
-        for part, count in zip(parts, shares, strict=True)
-        for piece in np.add.reduceat(
-            without_locals(part, part.jacobian) * part.residual[:, None],
-            np.linspace(0, len(part.residual), count, endpoint=False, dtype=int),
-        )
-    ]
+    pieces = list[np.ndarray]()
+    for part, count in zip(parts, shares, strict=True):
+        rows = without_locals(part, part.jacobian) * part.residual[:, None]
+        pieces += [*np.add.reduceat(rows, np.linspace(0, len(rows), count, endpoint=False, dtype=int))]
     return np.array(pieces)
 
 

@@ -89,9 +89,8 @@ class Motion:
         model, data = self.model, self.model.createData()
 
         def carried(q: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
-            return (
-                pin.XYZQUATToSE3(q[:7]).toDualActionMatrix() @ pin.computeJointTorqueRegressor(model, data, q, v, a)[:6]
-            )
+            turned = pin.XYZQUATToSE3(q[:7]).toDualActionMatrix()
+            return turned @ pin.computeJointTorqueRegressor(model, data, q, v, a)[:6]
 
         rows = np.array(list(map(carried, self.q, self.v, self.a)))
         return {s: rows[:, :, 10 * (j - 1) : 10 * j] for s, j in self._carriers().items()}

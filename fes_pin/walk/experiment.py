@@ -42,10 +42,8 @@ def next_walk(models: WalkModels, found: SearchResult[WalkFit], cause: str) -> P
         scores[words] = _separation(designs, mine @ signal, its, designs.plausible((new,)), best)
     words = max(scores, key=lambda n: scores[n])
     if scores[words] < STRONG_EVIDENCE:
-        why = (
-            f"{pair[0]} and {pair[1]} look alike in standing, in slower walking and under a known weight: "
-            "weigh the plates with known masses, or measure the body by other means"
-        )
+        alike = f"{pair[0]} and {pair[1]} look alike in standing, in slower walking and under a known weight"
+        why = f"{alike}: weigh the plates with known masses, or measure the body by other means"
         return Plan(why, pair)
     why = f"{words} (it separates {pair[0]} from {pair[1]} by {np.sqrt(scores[words]):.1f} standard deviations)"
     return Plan(why, pair, _to_make(designs.as_read.trials[0], PLANS[words][0]))

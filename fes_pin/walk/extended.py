@@ -50,9 +50,8 @@ def with_segments(body: Body, parameters: dict[str, np.ndarray]) -> Body:
         one = pin.Inertia.FromDynamicParameters(own)
         mass, moments = one.mass, np.linalg.eigvalsh(one.inertia)
         if mass <= 0.0 or moments[0] <= 0.0 or moments[2] > (moments[0] + moments[1]) * (1.0 + ROUNDED):
-            raise InputError(
-                f"no body has a {name} of {mass:.3g} kg with moments {np.round(moments, 5).tolist()} kg m2"
-            )
+            has = f"{mass:.3g} kg with moments {np.round(moments, 5).tolist()} kg m2"
+            raise InputError(f"no body has a {name} of {has}")
         written = {
             "origin": {"xyz": in_full(*one.lever), "rpy": "0 0 0"},
             "mass": {"value": in_full(mass)},

@@ -84,9 +84,8 @@ def strides_of(trials: Sequence[WalkTrial], cutoff_hz: float) -> Strides:
         phase = _phase(trial.motion.time, contacts)
         first, last = phase[0], phase[-1] + (phase[-1] - phase[-2])
         count, counts = int(np.floor(last - first + 1e-6)), [len(at) for at in contacts.values()]
-        steps = (
-            max(counts) > 1 or min(counts) > 0
-        )  # contacts determine a stride's length: two of a foot, or one of each
+        # contacts determine a stride's length: two of a foot, or one of each
+        steps = max(counts) > 1 or min(counts) > 0
         whole &= count > 0 and (steps or _stands(trial))
         for k in range(count):
             inside = np.flatnonzero((phase >= first + k) & (phase < first + k + 1 - 1e-9))

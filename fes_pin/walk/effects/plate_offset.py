@@ -32,26 +32,22 @@ class PlateOffset(WalkEffect):
         for site, sides in PLATES.items():
             single = float(len(sides) == 1)
             for axis, word in enumerate(AXES):
-                for when in ("while loaded", "always"):
-                    columns = partial(_constant, sides=sides, axis=axis, loaded=when == "while loaded")
-                    yield Form(
-                        cls.name, f"{site}, {word} force, {when}", (f"{word}_n",), 20.0, columns,
-                        ordinary=single * ORDINARY_N * (when == "while loaded"),
-                        reads=tuple(3 * SIDES.index(s) + axis for s in sides) if when == "always" else (),
-                    )  # fmt: skip
+                for when, loaded in (("while loaded", True), ("always", False)):
+                    columns = partial(_constant, sides=sides, axis=axis, loaded=loaded)
+                    what, names = f"{site}, {word} force, {when}", (f"{word}_n",)
+                    ordinary = single * ORDINARY_N * loaded
+                    reads = () if loaded else tuple(3 * SIDES.index(s) + axis for s in sides)
+                    yield Form(cls.name, what, names, 20.0, columns, ordinary=ordinary, reads=reads)
             for axis, word in enumerate(AXES[:2]):
                 columns = partial(_displaced, sides=sides, axis=axis)
-                yield Form(
-                    cls.name, f"{site}, centre of pressure {word}", (f"{word}_m",), 0.02, columns,
-                    ordinary=single * ORDINARY_M,
-                )  # fmt: skip
+                what, names = f"{site}, centre of pressure {word}", (f"{word}_m",)
+                yield Form(cls.name, what, names, 0.02, columns, ordinary=single * ORDINARY_M)
 
 
 def _constant(trial: WalkTrial, sides: tuple[str, ...], axis: int, loaded: bool) -> np.ndarray:
     unit = {side: trial.force_at(trial.plates.pressure[side], np.eye(3)[axis]) for side in sides}
-    return np.sum([w * (trial.plates.loaded[s][:, None] if loaded else 1.0) for s, w in unit.items()], axis=0)[
-        ..., None
-    ]
+    read = [w * (trial.plates.loaded[s][:, None] if loaded else 1.0) for s, w in unit.items()]
+    return np.sum(read, axis=0)[..., None]
 
 
 def _displaced(trial: WalkTrial, sides: tuple[str, ...], axis: int) -> np.ndarray:
