@@ -431,8 +431,7 @@ def passed(true_s: np.ndarray, widths_us: Sequence[float], limits: StimulationLi
 
 @dataclass(frozen=True)
 class Called:
-    """What came of a schedule of calls: how many were refused, which faults there were, which limits were passed, and
-    in how many of the calls the controller was running."""
+    """Result of a schedule of calls: refusals, faults, limits passed, and calls with the controller running."""
 
     refused: int
     faults: tuple[str, ...]
@@ -442,7 +441,7 @@ class Called:
 
 
 def pulsed(joint: RunningTwin, lasts: tuple[float, float], gap: float) -> tuple[float, float]:
-    """Let a pulse of this width act on a joint for the time that it lasts, within a gap; what is left of both."""
+    """Apply a pulse to a joint until the next call; return the width, us, and the time, s, of it that are left."""
     width, left = lasts
     joint.step(width, min(gap, left))
     joint.step(0.0, max(gap - left, 0.0))

@@ -104,8 +104,8 @@ def _deviation(absolute: np.ndarray) -> float:
 def _first_spikes(x: np.ndarray) -> np.ndarray:
     """The same of the first samples, which have neighbours on one side alone: off the parabola through those after.
 
-    It is none if it is nearer the straight line or the parabola through the nearest than these are to each other: the
-    signal bends there.
+    A sample is no spike where it is nearer the straight line or the parabola through the nearest samples than these are
+    to each other: the signal bends there.
     """
     mask = np.zeros(len(x), dtype=bool)
     if len(x) < AROUND:

@@ -285,7 +285,8 @@ def residual_powers(run: Sequence[PredictedTrial]) -> dict[str, float]:
         for one in run:
             if name in one.outputs:
                 own = one.of_seen(np.broadcast_to(np.array(one.outputs) == name, one.seen.shape))
-                squares += float(np.sum(one.whitened[own] ** 2))
+                with np.errstate(over="ignore"):  # of a model that diverges
+                    squares += float(np.sum(one.whitened[own] ** 2))
                 count += float(np.sum(1.0 - one.readings.again[own]))
         if 0.0 < squares < math.inf:
             out[name] = squares / count

@@ -223,10 +223,11 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         return {n: min((*fits, restarted.get(n, fits[0])), key=lambda f: f.criterion) for n, fits in each}
 
     def is_far(self, fitted: LikelihoodFit) -> bool:
-        """Return whether E of a fit's free simulations is more than `FAR_PERCENT`, or negligible by least squares.
+        """Return whether a fit is far from the data: E of its free simulations is above `FAR_PERCENT`.
 
-        So is a fit that ended at a bound. In closed loop none is: a filter follows the data there. Errors of an imposed
-        motion do not grow with time: a fit to it is far where it is worse than a constant.
+        By least squares it is far above `NOTHING_PERCENT`. A fit is far too if a nominal parameter ended at a bound.
+        In closed loop no fit is far: a filter follows the data there. Errors of an imposed motion do not grow with
+        time: a fit to it is far where it is worse than a constant.
         """
         if self.answered:
             return False
@@ -278,7 +279,10 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         return best
 
     def approach(self) -> Names:
-        """Return the smallest set that is not far from the data, or the nearest of at most `MOST_CAUSES`."""
+        """Return the smallest set whose E is negligible, or the nearest set of at most `MOST_CAUSES`.
+
+        Forms of the nearest sets of several causes are refined before a further cause is tried.
+        """
         best: Names = ()
         fits = self.fits
         self.nominal()
@@ -325,6 +329,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         return min(found, self._looked_far(base, names, far), key=lambda f: f.criterion) if far else found
 
     def _looked_far(self, base: LikelihoodFit, names: Names, effects: Sequence[Effect]) -> LikelihoodFit:
+        """Return the best first fit with one of some effects: from the base, and from the filter that follows it."""
         looks = [look(base.model + e, base) for e in effects]
         if self._following is not None:
             near = self._follow(base).model
