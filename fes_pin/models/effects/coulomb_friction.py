@@ -81,7 +81,7 @@ class CoulombFriction(Effect):
     """
 
     torque_nm: float = parameter(0.01, unit="{effort}", null=0.0, lower=0.0, upper=1e6, scale=0.01)
-    stiction: float = refinement(0.0, lower=0.0, upper=10.0, scale=0.1, grid=(0.3, 1.0))
+    stiction: float = refinement(0.0, lower=0.0, upper=10.0, scale=0.1, grid=(0.05, 0.3))
     stribeck_speed: float = parameter(
         1.0, unit="{q}/s", lower=1e-4, upper=1e4, scale=0.5, optional=True, grid=(1.0, 0.2, 4.0)
     )
