@@ -163,7 +163,8 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
         if not folds or not folds[0].within:
             return []
         if id(found) not in self._chosen:
-            choose = ChosenAgain({**state.search.possible(), found.best.names: found.best}, state.search.improves)
+            fits = {n: f for n, f in state.search.possible().items() if not set(n) & set(state.rejected)}
+            choose = ChosenAgain({**fits, found.best.names: found.best}, state.search.improves)
             self._chosen[id(found)] = found, [choose.without(fold.out) for fold in folds]
         return self._chosen[id(found)][1]
 

@@ -67,9 +67,8 @@ class ChosenAgain:
             of_size = [n for n in costs if len(n) == size]
             first = min(of_size, key=lambda n: (costs[n] + PARAMETER_PENALTY * self._fits[n].degrees, n))
             sets = self._fits[first], self._fits[best]
-            if not self._improves(*sets, costs[best] - costs[first], costs[()] - costs[first]):
-                break
-            best = first
+            if self._improves(*sets, costs[best] - costs[first], costs[()] - costs[first]):
+                best = first
         return self._fits[best]
 
     def _cost(self, names: Names, held: Sequence[int]) -> float:

@@ -8,10 +8,11 @@ from fes_pin.diagnosis.remainder.lack_of_fit import lack_of_fit
 from fes_pin.diagnosis.search.likelihood_fits import WHITE, LikelihoodFits
 from fes_pin.diagnosis.search.likelihood_forms import refined_form, simplified_form
 from fes_pin.diagnosis.search.score import Scored
+from fes_pin.identify.afar import is_rounding
 from fes_pin.identify.likelihood import is_simulated
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.distributions import chi2_tail
-from fes_pin.infer.levels import FORM_SHARE
+from fes_pin.infer.levels import FORM_SHARE, NOTHING_PERCENT
 from fes_pin.infer.scatter import excess_scatter
 from fes_pin.infer.search import Search
 
@@ -51,7 +52,9 @@ class LikelihoodModels(LikelihoodFits):
         return self.library.scores(self.scored_in(found.nominal)).scored + more
 
     def excess_scatter(self, larger: LikelihoodFit, smaller: LikelihoodFit) -> float:
-        """See `infer.scatter.excess_scatter`."""
+        """See `infer.scatter.excess_scatter`; infinite where the smaller set leaves nothing but errors of rounding."""
+        if self.misfit(smaller) < NOTHING_PERCENT and is_rounding(smaller):
+            return math.inf
         return excess_scatter(larger, smaller)
 
     def level(self, fitted: LikelihoodFit) -> float:
