@@ -160,7 +160,7 @@ class _Work:
             def run(trials: Sequence[Trial]) -> tuple[LikelihoodSearch, Found]:
                 noise = PROCESS if answered or any(t.kind == IMPOSED for t in trials) else MEASUREMENT
                 own = (known, answered, self.seed, study.horizon_s, noise)
-                parts = trials if model.effects else in_parts(model.rig, trials)
+                parts = trials if model.effects else in_parts(model.rig, trials, answered)
                 ran.append(LikelihoodSearch(LikelihoodModels(model, parts, *own), self.tell))
                 return searched(ran[-1])
 
@@ -198,7 +198,7 @@ def _is_answered(rig: Rig, trials: Sequence[Trial]) -> bool:
 def _searched(study: Study, trials: Sequence[Trial], driven: bool) -> list[Trial]:
     """Return the trials of a study, or the parts of them, that a search fits."""
     train, _ = split(replace(study, trials=tuple(trials)))
-    return in_parts(nominal_model(study).rig, searched_part(train, study.schema, driven)[0])
+    return in_parts(nominal_model(study).rig, searched_part(train, study.schema, driven)[0], driven)
 
 
 def _low_passed(diagnosis: Diagnosis, end: float) -> Study | None:

@@ -100,14 +100,15 @@ def _size(trials: Sequence[Trial]) -> int:
     return sum(map(len, trials))
 
 
-def in_parts(rig: Rig, trials: Sequence[Trial]) -> list[Trial]:
+def in_parts(rig: Rig, trials: Sequence[Trial], answered: bool = True) -> list[Trial]:
     """Return the trials, cut into parts of equal length if there are fewer than half as many as run in one batch.
 
     Each part begins at a state of its own, which is estimated from its first samples. Trials of a rig that begins at
-    rest are not cut.
+    rest, or that no controller answers, are not cut: a free simulation does not know what a part inherits, as the
+    stretch of a tendon that relaxes.
     """
     most = WIDTH // max(len(trials), 1)
-    return [part for trial in trials for part in _cut(trial, most if rig.unknowns(trial.kind) else 1)]
+    return [part for trial in trials for part in _cut(trial, most if answered and rig.unknowns(trial.kind) else 1)]
 
 
 def _cut(trial: Trial, most: int) -> list[Trial]:

@@ -62,7 +62,8 @@ def with_misread(
     stated = free_errors(before.model, trials, before.noise)
     removed = held_out_gain(stated, stated, free_errors(diagnosis.nominal.model, made.trials, before.noise), seed)
     cause = _cause(made, removed.percent, trials, seed)
-    nominal = maximum_from(made.searched.nominal, in_parts(before.model.rig, trials))
+    stated_parts = in_parts(before.model.rig, trials, made.search.models.answered)
+    nominal = maximum_from(made.searched.nominal, stated_parts)
     return with_first(diagnosis, cause, nominal, made.searched.best, test)
 
 

@@ -93,8 +93,8 @@ def with_beliefs(fitted: LikelihoodFit, believed: Model) -> LikelihoodFit:
     """Return a fit again with the nominal parameters that the data do not identify held at their believed values.
 
     A parameter is not identified if half its interval is above twice its value and twice its believed value, and the
-    interval holds the latter; or if it ended at a bound and E is the same without. Its estimate would depend on where
-    the fit began. They are held one after another: of two whose ratio is identified, one stays free. A fit that
+    interval holds the latter, or if it ended at a bound; and if E is the same without. Its estimate would depend on
+    where the fit began. They are held one after another: of two whose ratio is identified, one stays free. A fit that
     diverges is returned as it is.
     """
     if not np.isfinite(normal_equations(fitted.parts).hessian).all():
@@ -107,7 +107,7 @@ def with_beliefs(fitted: LikelihoodFit, believed: Model) -> LikelihoodFit:
     rig = replace(fitted.model.rig, fitted=tuple(n for n in fitted.model.rig.fitted_parameters() if n not in held))
     model = Model(rig, fitted.model.effects).with_parameters({**_with_others(fitted, held), **held})
     again = maximise(LikelihoodProblem(model, fitted.trials, fitted.noise), fitted.unknowns)
-    if ended and misfit_percent(again) > misfit_percent(fitted) + NOTHING_PERCENT:
+    if misfit_percent(again) > misfit_percent(fitted) + NOTHING_PERCENT:
         return fitted
     return with_beliefs(again, believed)
 

@@ -2,7 +2,9 @@
 
 from dataclasses import dataclass
 
-from fes_pin.models.stage import Effect, Scalar, Signals, Stage, parameter
+import numpy as np
+
+from fes_pin.models.stage import Bounds, Effect, Measured, Scalar, Signals, Stage, parameter
 
 
 @dataclass(frozen=True)
@@ -16,9 +18,14 @@ class ThresholdShift(Effect):
     electrode.
     """
 
-    shift_us: float = parameter(20.0, unit="us", null=0.0, lower=-400.0, upper=400.0, scale=20.0)
+    shift_us: float = parameter(20.0, unit="us", null=0.0, lower=-1e4, upper=1e4, scale=20.0)
 
     name, stage, signal, rigs = "threshold_shift", Stage.NERVE, "pulse_width", ("ankle", "muscle")
+
+    def limits(self, measured: Measured) -> Bounds:
+        """Beyond the widest pulse no stimulus acts, or each does fully."""
+        widest = float(np.max(measured.get("pulse_width_us", np.zeros(1))))
+        return {"shift_us": (-widest, widest)} if widest > 0.0 else {}
 
     def apply(self, value: Scalar, s: Signals) -> Scalar:
         return value - self.shift_us
