@@ -31,7 +31,7 @@ from fes_pin.identify.afar import at_a_bound, misfit_percent
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.per_trial import falls
 from fes_pin.infer.levels import FORM_SHARE
-from fes_pin.infer.result import Remainder
+from fes_pin.infer.result import FITTED, Remainder
 from fes_pin.infer.text import WHOLE
 from fes_pin.infer.verdict import State, Verdict, Weighed
 
@@ -83,8 +83,9 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
         """Return the evidence of held-out trials and of the tests of lack of fit on a set."""
         folds = make_folds(found, self.models.trials, self.test, self.refitted)
         within = folds or [Fold(found.nominal, found.best, found.without, self.models.trials)]
+        gains = gains_of(within, found.without, self.models.judged_s, self.models.seed)
         return RigWeighed(
-            gains=gains_of(within, found.without, self.models.judged_s, self.models.seed),
+            gains=gains if folds else {n: replace(one, on=FITTED) for n, one in gains.items()},
             evidence=evidence_of(folds, found, self._alike),
             lack_of_fit=lack_of_fit(found.best),
             folds=folds,

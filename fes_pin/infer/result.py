@@ -142,9 +142,10 @@ class Gain:
     def is_material(self) -> bool:
         """Whether the low end of its interval is above `NOTHING_PERCENT`, or most of what other causes leave is.
 
-        Next to a large cause a smaller one removes little of the nominal error, but perhaps most of what remains.
+        Next to a large cause a smaller one removes little of the nominal error, but perhaps most of what remains. Of
+        data that were fitted, it may remove most of a negligible error by chance.
         """
-        return self.low > NOTHING_PERCENT or self.given > MOST_PERCENT
+        return self.low > NOTHING_PERCENT or (self.is_held_out and self.given > MOST_PERCENT)
 
     @property
     def is_held_out(self) -> bool:

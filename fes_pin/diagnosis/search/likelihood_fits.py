@@ -3,7 +3,7 @@
 import copy
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import replace
 from typing import Self
 
@@ -50,7 +50,8 @@ alternation the best cause of a muscle, by 20 000 in twice the log-likelihood, w
 twenty."""
 
 NEAREST, FITTED = 3, 8
-"""Sets of a size that are extended by least squares, and candidates by which each is; see `infer.search.Policy`."""
+"""Sets of a size that are extended by least squares, and candidates by which each but the nearest is; see
+`infer.search.Policy`."""
 MORE = 2.0
 """Ratio of the errors E of two fits above which one is farther from the data."""
 
@@ -207,6 +208,10 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         guess = first_guess(self.model, self.trials, known.correlation_s if known else 0.0)
         return without_memory(guess, self.trials) if known and known.timed else guess
 
+    def _has(self, names: Names, forms: frozenset[Hashable]) -> bool:
+        """Return whether a set needs no other start; by least squares it is begun from each base, as minima differ."""
+        return self.noise != WHITE and super()._has(names, forms)
+
     def candidates(self, base: LikelihoodFit) -> dict[str, Candidate[Starts]]:
         """Return the causes that a fit lacks and whose scores are finite, each with its shapes of largest score."""
         by_effect = best_by_effect(self.library.scores(self.scored_in(base)).scored)
@@ -289,18 +294,23 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         fits = self.fits
         self.nominal()
         while self.misfit(fits[best]) > NOTHING_PERCENT and len(best) < MOST_CAUSES:
-            for names in self.ranked(len(best))[:NEAREST]:
-                self.extend(names, FITTED if names else None)
-            larger = [n for n in self.ranked(len(best) + 1) if self.is_possible(fits[n])]
+            for k, names in enumerate(self._nearest(len(best))):
+                self.extend(names, FITTED if k else None)
+            larger = self._nearest(len(best) + 1)
             if best and larger and self.is_far(fits[larger[0]]):
-                in_parallel(self._refine, larger[:NEAREST])
-                larger.sort(key=lambda n: fits[n].criterion)
+                in_parallel(self._refine, larger)
+                larger.sort(key=lambda n: self.misfit(fits[n]))
             if not larger or self.misfit(fits[larger[0]]) > (1.0 - SMALL_SHARE) * self.misfit(fits[best]):
                 break
             best = larger[0]
         if best:
             self._refine(best)
         return best
+
+    def _nearest(self, size: int) -> list[Names]:
+        """Return the `NEAREST` sets of a size of least E whose causes are physically possible."""
+        possible = [n for n, f in self.fits.items() if len(n) == size and (not n or self.is_possible(f))]
+        return sorted(possible, key=lambda n: (self.misfit(self.fits[n]), n))[:NEAREST]
 
     def _refine(self, names: Names) -> None:
         """Replace the fit of a set by that of a refined form where E is half as large."""
