@@ -11,8 +11,8 @@ from fes_pin.view.sections import Parts, not_testable
 from fes_pin.view.style import COLOURS
 from fes_pin.view.walk_playback import PLAYBACK_FILE, playback_html
 from fes_pin.walk.judge import CHANNELS
-from fes_pin.walk.plates import stretches
 from fes_pin.walk.result import BODY_FILE, WalkDiagnosis
+from fes_pin.walk.walk_trial import stretches
 
 SHOWN_S = 4.0
 """Longest part of each trial that is shown, s."""

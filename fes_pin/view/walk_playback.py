@@ -5,9 +5,9 @@ import pinocchio as pin
 
 from fes_pin.view.arrows import Arrow
 from fes_pin.view.viewer import FRAMES_A_SECOND, BodyScene
-from fes_pin.walk.dynamics import Motion
-from fes_pin.walk.plates import LOADED_N, Plates
+from fes_pin.walk.motion import Motion
 from fes_pin.walk.result import WalkDiagnosis
+from fes_pin.walk.walk_trial import LOADED_N, Plates
 
 PLAYBACK_FILE = "playback.html"
 METRES_A_NEWTON = 2e-3

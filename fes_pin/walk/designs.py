@@ -14,10 +14,9 @@ from fes_pin.infer.fits import Names
 from fes_pin.walk.disturb import disturbed, misplaced, tissue, white
 from fes_pin.walk.effects import walk_library
 from fes_pin.walk.likelihood import MEAN_ARM_M, MEAN_FORCE, MEAN_TWIST_NM, Known, WalkNoise, fit_many, rotation
-from fes_pin.walk.plates import ORDINARY_N
 from fes_pin.walk.stated import Stated
 from fes_pin.walk.strides import Strides, strides_of
-from fes_pin.walk.walk_trial import WalkTrial
+from fes_pin.walk.walk_trial import ORDINARY_N, WalkTrial
 
 TAKEN = 0.3
 """Standard deviation of errors in the motion, as a share of a wave of the required reaction: soft tissue

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from fes_pin.data.motion import TRANSLATIONS
-from fes_pin.walk.dynamics import about
+from fes_pin.walk.motion import about
 from fes_pin.walk.strides import Strides
 from fes_pin.walk.walk_trial import WalkTrial
 

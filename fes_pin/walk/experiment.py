@@ -9,8 +9,8 @@ from fes_pin.data.trial import Trial
 from fes_pin.infer.levels import STRONG_EVIDENCE
 from fes_pin.infer.search import SearchResult
 from fes_pin.walk.designs import Designs
-from fes_pin.walk.dynamics import about
 from fes_pin.walk.models import WalkFit, WalkModels
+from fes_pin.walk.motion import about
 from fes_pin.walk.walk_trial import WalkTrial
 
 PLANS = {

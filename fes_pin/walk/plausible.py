@@ -5,8 +5,8 @@ from scipy.ndimage import uniform_filter1d
 
 from fes_pin.body.joints import SIDES
 from fes_pin.data.errors import InputError
-from fes_pin.walk.dynamics import Motion
-from fes_pin.walk.plates import LOADED_N, Plates, stretches
+from fes_pin.walk.motion import Motion
+from fes_pin.walk.walk_trial import LOADED_N, Plates, stretches
 
 FAR_M = 1.5
 """No centre of pressure lies further from the body than this, level: a long step is 1 m."""

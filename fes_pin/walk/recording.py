@@ -13,9 +13,8 @@ from fes_pin.data.smooth import CUTOFF_HZ
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.walk.motion import Session, has_rates, motion_of, pelvis_to_hip
-from fes_pin.walk.plates import plates_of
 from fes_pin.walk.plausible import carried_along, check_together
-from fes_pin.walk.walk_trial import WalkTrial
+from fes_pin.walk.walk_trial import WalkTrial, plates_of
 
 MASS_SHARE = 0.01
 """Share by which the mass that a study states may differ from that of its segments."""
