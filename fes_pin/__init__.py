@@ -34,12 +34,12 @@ if TYPE_CHECKING:  # every public name with its module: it is imported from ther
     from fes_pin.contrasts.result import Contrast as Contrast
     from fes_pin.control.control import PositionController as PositionController
     from fes_pin.control.dynamics import AnkleDynamics as AnkleDynamics
+    from fes_pin.control.dynamics import JointObserver as JointObserver
     from fes_pin.control.endurance import least_rest as least_rest
     from fes_pin.control.endurance import muscle_budget as muscle_budget
-    from fes_pin.control.limits import StimulationLimits as StimulationLimits
     from fes_pin.control.loop import track as track
     from fes_pin.control.margins import delay_margin as delay_margin
-    from fes_pin.control.observer import JointObserver as JointObserver
+    from fes_pin.control.pulse import StimulationLimits as StimulationLimits
     from fes_pin.data.errors import InputError as InputError
     from fes_pin.data.errors import InputWarning as InputWarning
     from fes_pin.data.named import NamedArray as NamedArray

@@ -14,11 +14,11 @@ import numpy as np
 from fes_pin.body.attainable import attainable, lean_text
 from fes_pin.body.catchable import catchable, plans_of
 from fes_pin.body.controllability import modal_controllability
-from fes_pin.body.covering import Demand, smallest
 from fes_pin.body.inputs import Inputs
 from fes_pin.body.joints import SIDES, known_joint, names_of
 from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.plans import SETTLE_DEG, Plans
+from fes_pin.body.programs import Demand, smallest
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import all_known, known_word, number, positive_number, truth, whole
 

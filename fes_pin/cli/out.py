@@ -25,8 +25,7 @@ def urdf(
     force: Force = False,
 ) -> None:
     """Write a fitted joint as URDF: inertia and weight as fitted, damping and friction in <dynamics>."""
-    from fes_pin.models.store import load_model
-    from fes_pin.models.urdf_out import extended_urdf
+    from fes_pin.models.store import extended_urdf, load_model
 
     catalogue = catalogue_with(library)
     text, left_out, changed = extended_urdf(load_model(model, library=catalogue), believed)

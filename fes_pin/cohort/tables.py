@@ -5,7 +5,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from fes_pin.cohort.keep import Kept
+from fes_pin.cohort.one import Kept
 from fes_pin.cohort.pool import discovery_rates, pooled, share_interval
 from fes_pin.identify.error_measures import MEASURES
 from fes_pin.infer.levels import UNUSUAL_LEVEL

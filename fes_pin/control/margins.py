@@ -9,8 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fes_pin.control.dynamics import PULSE_S, AnkleDynamics
-from fes_pin.control.observer import JointObserver
+from fes_pin.control.dynamics import PULSE_S, AnkleDynamics, JointObserver
 from fes_pin.control.tuning import Gains, Loop, corners, loop_at
 from fes_pin.data.numbers import instance
 from fes_pin.data.tabulated import Tabulated

@@ -18,9 +18,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.linalg
 
-from fes_pin.control.dynamics import PULSE_S, AnkleDynamics
+from fes_pin.control.dynamics import PULSE_S, AnkleDynamics, JointObserver
 from fes_pin.control.given import GivenAnkle, Sampled, held
-from fes_pin.control.observer import JointObserver
 from fes_pin.data.errors import InputError
 from fes_pin.data.show import DataFrame, frame
 from fes_pin.data.tabulated import Tabulated
