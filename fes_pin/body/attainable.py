@@ -15,7 +15,7 @@ from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.modes import Mode
 from fes_pin.body.plans import SETTLE_DEG, Plans
 from fes_pin.data.numbers import positive_number, truth
-from fes_pin.data.tabulated import Tabulated
+from fes_pin.data.show import Tabulated
 
 
 @dataclass(frozen=True, eq=False)

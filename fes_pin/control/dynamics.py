@@ -19,7 +19,7 @@ import scipy.linalg
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import between, number, positive_number, shortened
-from fes_pin.data.tabulated import Tabulated
+from fes_pin.data.show import Tabulated
 from fes_pin.models.effects.frame_vibration import FrameVibration
 from fes_pin.models.model import Model
 from fes_pin.models.rigs.ankle import Ankle

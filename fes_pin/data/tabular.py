@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fes_pin.data.libraries import optional_library
+from fes_pin.data.errors import optional_library
 from fes_pin.data.outputs import check_ending
 
 SUFFIXES = (".csv", ".parquet")

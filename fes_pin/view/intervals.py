@@ -8,8 +8,7 @@ from matplotlib.figure import Figure
 
 from fes_pin.infer.levels import SEPARABLE
 from fes_pin.infer.result import Named
-from fes_pin.view.chart import panels, svg
-from fes_pin.view.drawing import Drawing, rows_csv
+from fes_pin.view.drawing import Drawing, panels, rows_csv, svg
 from fes_pin.view.style import COLOURS
 
 LEAST = 0.3

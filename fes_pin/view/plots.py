@@ -12,8 +12,7 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.replay import Replay
 from fes_pin.infer.noise import NoiseModel
 from fes_pin.infer.text import percent
-from fes_pin.view.chart import panels, svg
-from fes_pin.view.drawing import Drawing, rows_csv
+from fes_pin.view.drawing import Drawing, panels, rows_csv, svg
 from fes_pin.view.missing import Missing, binned, smoothed
 from fes_pin.view.style import COLOURS, WIDTHS, label, milli, quantity
 

@@ -4,8 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from fes_pin.view.chart import panels, svg
-from fes_pin.view.drawing import Drawing
+from fes_pin.view.drawing import Drawing, panels, svg
 from fes_pin.view.page import Markup, element, figure, key, section
 from fes_pin.view.sections import Parts, not_testable
 from fes_pin.view.style import COLOURS
