@@ -1,7 +1,5 @@
 """Functional electrical stimulation on Pinocchio: simulate, diagnose, extend, control."""
 
-from __future__ import annotations
-
 import ast
 from importlib import import_module
 from pathlib import Path

@@ -3,8 +3,6 @@
 Frozen dataclasses of numbers and arrays are read-only, checked, and compared by value.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import html
 from collections.abc import Mapping, Sequence

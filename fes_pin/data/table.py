@@ -1,5 +1,6 @@
 """Numbers by named column, with what is asked of their times."""
 
+import csv
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -143,3 +144,9 @@ def format_csv(columns: Mapping[str, np.ndarray]) -> str:
     """CSV text of equally long columns; each number is the shortest text that reads back as the same number."""
     rows = zip(*(map(repr, np.asarray(values, dtype=float).tolist()) for values in columns.values()), strict=True)
     return "\n".join([",".join(columns), *map(",".join, rows)]) + "\n"
+
+
+def own_table(path: Path) -> list[dict[str, str]]:
+    """Rows of a table that comes with the package; lines that begin with # say what is in it."""
+    lines = path.read_text("utf-8").splitlines()
+    return list(csv.DictReader(line for line in lines if not line.startswith("#")))
