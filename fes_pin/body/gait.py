@@ -20,8 +20,9 @@ TABLE = Path(__file__).with_name("gait_postures.csv")
 
 @lru_cache(maxsize=1)
 def _table() -> dict[str, dict[str, float]]:
-    angles = {row["posture"]: [(n, float(row[n])) for n in JOINT_NAMES] for row in own_table(TABLE)}
-    return {posture: {n: float(np.radians(v)) for n, v in named} for posture, named in angles.items()}
+    rows = own_table(TABLE)
+    angles = [{n: float(np.radians(float(row[n]))) for n in JOINT_NAMES} for row in rows]
+    return dict(zip([row["posture"] for row in rows], angles, strict=True))
 
 
 STILL = ("neutral", "standing", "one_leg")

@@ -145,8 +145,8 @@ def diagnose(
     from fes_pin.data.tabular import SUFFIXES, check_table, table_bytes
     from fes_pin.diagnosis.replay import trajectories
     from fes_pin.diagnosis.result import Diagnosis
+    from fes_pin.verdict.ask import REPORT_FILE, answer_names
     from fes_pin.verdict.ask import diagnose as find
-    from fes_pin.verdict.files import REPORT_FILE, answer_names
     from fes_pin.view.report import answer_files
 
     catalogue = catalogue_with(library)

@@ -12,16 +12,15 @@ from pathlib import Path
 from typing import Any
 
 from fes_pin.cohort.one import STATE, Answer, Store, Work, diagnose_one
-from fes_pin.cohort.page import cohort_html
 from fes_pin.cohort.processes import Task, in_processes, on_cluster
-from fes_pin.cohort.tables import ERRORS, Row, tables_of
+from fes_pin.cohort.tables import ERRORS, Row, cohort_html, tables_of
 from fes_pin.data.errors import InputError
 from fes_pin.data.outputs import Outputs
 from fes_pin.data.results import Saveable
 from fes_pin.data.tabular import SUFFIXES, table_bytes
 from fes_pin.infer.result import shown
 from fes_pin.models.catalogue import load_library
-from fes_pin.verdict.files import OF_ALL, OF_WALKS
+from fes_pin.verdict.ask import OF_ALL, OF_WALKS
 
 STUDY = "study.toml"
 
