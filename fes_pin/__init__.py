@@ -15,8 +15,8 @@ if TYPE_CHECKING:  # every public name with its module: it is imported from ther
     from fes_pin.allocation.horizon import StrengthFatigue as StrengthFatigue
     from fes_pin.allocation.horizon import invert_lag as invert_lag
     from fes_pin.allocation.walk import allocate_walk as allocate_walk
-    from fes_pin.body.attainable import attainable as attainable
     from fes_pin.body.build import Body as Body
+    from fes_pin.body.catchable import attainable as attainable
     from fes_pin.body.catchable import catchable as catchable
     from fes_pin.body.closed_loop import close_the_loop as close_the_loop
     from fes_pin.body.gait import posture_angles as posture_angles

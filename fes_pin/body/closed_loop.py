@@ -29,7 +29,7 @@ from fes_pin.data.show import Tabulated
 STEP_S = 0.002
 """Step of the Runge-Kutta integration, s; the fastest falls here double in ten of them."""
 LOST_DEG = 45.0
-"""A joint this far from the posture is lost: no linear model reaches there (`fes_pin.body.attainable.lean_text`)."""
+"""A joint this far from the posture is lost: no linear model reaches there (`fes_pin.body.catchable.lean_text`)."""
 
 
 @dataclass(frozen=True, eq=False)

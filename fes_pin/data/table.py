@@ -140,9 +140,9 @@ def _half_digit(time: np.ndarray) -> float:
     return 0.5 * 10.0 ** -next(decimals, math.inf)
 
 
-def format_csv(columns: Mapping[str, np.ndarray]) -> str:
-    """CSV text of equally long columns; each number is the shortest text that reads back as the same number."""
-    rows = zip(*(map(repr, np.asarray(values, dtype=float).tolist()) for values in columns.values()), strict=True)
+def format_csv(columns: Mapping[str, np.ndarray], form: Callable[[float], str] = repr) -> str:
+    """CSV text of equally long columns; each number is the shortest text that reads back as it, or as `form` has it."""
+    rows = zip(*(map(form, np.asarray(values, dtype=float).tolist()) for values in columns.values()), strict=True)
     return "\n".join([",".join(columns), *map(",".join, rows)]) + "\n"
 
 
