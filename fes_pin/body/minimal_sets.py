@@ -131,7 +131,7 @@ def minimal_sets(
     gravity
         Whether the set must also carry the posture's weight (C).
     settle_deg
-        How far modes may be from the posture (see `fes_pin.body.catchable` and `catchable`). Only with `together`.
+        How far modes may be from the posture (see `fes_pin.body.catchable`). Only with `together`.
     alternatives
         How many sets of the smallest size to return for each choice of braces; the cheapest first.
     strength_factor

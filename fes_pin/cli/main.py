@@ -142,7 +142,7 @@ def diagnose(
     """Show what the study's model gets wrong, name the cause, extend the model, measure the gain."""
     from fes_pin.data.provenance import this_command
     from fes_pin.data.results import NEXT_FILE
-    from fes_pin.data.tabular import SUFFIXES, check_table, table_bytes
+    from fes_pin.data.table import SUFFIXES, check_table, table_bytes
     from fes_pin.diagnosis.replay import trajectories
     from fes_pin.diagnosis.result import Diagnosis
     from fes_pin.verdict.ask import REPORT_FILE, answer_names

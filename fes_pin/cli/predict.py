@@ -68,7 +68,7 @@ def predict(
     said with --residuals, or without --out.
     """
     from fes_pin.data.plausibility import ToPredict
-    from fes_pin.data.tabular import check_table, table_bytes
+    from fes_pin.data.table import check_table, table_bytes
     from fes_pin.diagnosis.plausibility import check_study
     from fes_pin.diagnosis.replay import trial_table
     from fes_pin.identify.stored import load_log
@@ -245,7 +245,7 @@ def pulses(
 ) -> None:
     """Write a trial as a list of pulses within stated limits; a trial beyond them is an input error."""
     from fes_pin.data.pulses import PulseLimits, pulse_list
-    from fes_pin.data.tabular import table_bytes
+    from fes_pin.data.table import table_bytes
 
     limits, outputs = PulseLimits(max_width, max_rate, max_charge, current), Outputs("pulses", force)
     listed = pulse_list(_stimulated(trial), limits, rate, width)

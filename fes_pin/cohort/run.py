@@ -17,7 +17,7 @@ from fes_pin.cohort.tables import ERRORS, Row, cohort_html, tables_of
 from fes_pin.data.errors import InputError
 from fes_pin.data.outputs import Outputs
 from fes_pin.data.results import Saveable
-from fes_pin.data.tabular import SUFFIXES, table_bytes
+from fes_pin.data.table import SUFFIXES, table_bytes
 from fes_pin.infer.result import shown
 from fes_pin.models.catalogue import load_library
 from fes_pin.verdict.ask import OF_ALL, OF_WALKS
