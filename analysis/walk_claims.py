@@ -24,9 +24,8 @@ from fes_pin.body.measured_walk import data_folder
 from fes_pin.body.passive import PassiveLegs
 from fes_pin.data.errors import InputError
 from fes_pin.data.motion import read_coordinates, read_ground_reaction
-from fes_pin.walk.dynamics import about
-from fes_pin.walk.motion import Session, motion_of, pelvis_to_hip
-from fes_pin.walk.plates import plates_of
+from fes_pin.walk.motion import Session, about, motion_of, pelvis_to_hip
+from fes_pin.walk.walk_trial import plates_of
 
 OUT = Path("out")
 try:

@@ -20,8 +20,8 @@ import numpy as np
 
 import fes_pin as fp
 from fes_pin.body.measured_walk import data_folder
-from fes_pin.view.walk_playback import show_reactions
-from fes_pin.walk.dynamics import about
+from fes_pin.view.report_walk import show_reactions
+from fes_pin.walk.motion import about
 from fes_pin.walk.recording import recordings_of
 
 sys.path.insert(0, str(Path(inspect.getfile(fp)).parents[1] / "scripts"))

@@ -1,7 +1,5 @@
 """Functional electrical stimulation on Pinocchio: simulate, diagnose, extend, control."""
 
-from __future__ import annotations
-
 import ast
 from importlib import import_module
 from pathlib import Path
@@ -17,8 +15,8 @@ if TYPE_CHECKING:  # every public name with its module: it is imported from ther
     from fes_pin.allocation.horizon import StrengthFatigue as StrengthFatigue
     from fes_pin.allocation.horizon import invert_lag as invert_lag
     from fes_pin.allocation.walk import allocate_walk as allocate_walk
-    from fes_pin.body.attainable import attainable as attainable
     from fes_pin.body.build import Body as Body
+    from fes_pin.body.catchable import attainable as attainable
     from fes_pin.body.catchable import catchable as catchable
     from fes_pin.body.closed_loop import close_the_loop as close_the_loop
     from fes_pin.body.gait import posture_angles as posture_angles
@@ -34,12 +32,12 @@ if TYPE_CHECKING:  # every public name with its module: it is imported from ther
     from fes_pin.contrasts.result import Contrast as Contrast
     from fes_pin.control.control import PositionController as PositionController
     from fes_pin.control.dynamics import AnkleDynamics as AnkleDynamics
+    from fes_pin.control.dynamics import JointObserver as JointObserver
     from fes_pin.control.endurance import least_rest as least_rest
     from fes_pin.control.endurance import muscle_budget as muscle_budget
-    from fes_pin.control.limits import StimulationLimits as StimulationLimits
     from fes_pin.control.loop import track as track
     from fes_pin.control.margins import delay_margin as delay_margin
-    from fes_pin.control.observer import JointObserver as JointObserver
+    from fes_pin.control.pulse import StimulationLimits as StimulationLimits
     from fes_pin.data.errors import InputError as InputError
     from fes_pin.data.errors import InputWarning as InputWarning
     from fes_pin.data.named import NamedArray as NamedArray

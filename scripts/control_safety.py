@@ -30,10 +30,9 @@ from scipy.stats import chi2
 from threadpoolctl import threadpool_limits
 
 from fes_pin.control.control import PositionController
-from fes_pin.control.dynamics import PULSE_S, AnkleDynamics
+from fes_pin.control.dynamics import PULSE_S, AnkleDynamics, JointObserver
 from fes_pin.control.faults import Status
-from fes_pin.control.limits import StimulationLimits
-from fes_pin.control.observer import JointObserver
+from fes_pin.control.pulse import StimulationLimits
 from fes_pin.data.errors import InputError
 from fes_pin.models.effects.fatigue import Fatigue
 from fes_pin.models.effects.frame_vibration import FrameVibration

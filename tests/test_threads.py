@@ -16,7 +16,7 @@ from fes_pin.body.linearize import linearize
 from fes_pin.identify.fit import fit
 from fes_pin.models.compile import machine, program
 from fes_pin.models.compile.native import NativeProgram
-from fes_pin.models.compile.virtual import VirtualProgram
+from fes_pin.models.compile.program import VirtualProgram
 from fes_pin.models.effects.electromechanical_delay import ElectromechanicalDelay
 from fes_pin.models.effects.sensor_offset import SensorOffset
 from fes_pin.models.model import Model

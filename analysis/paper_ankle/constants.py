@@ -18,8 +18,8 @@ import numpy as np
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import positive_number
+from fes_pin.data.show import Tabulated
 from fes_pin.data.study import Study
-from fes_pin.data.tabulated import Tabulated
 from fes_pin.data.trial import Trial
 from paper_ankle.twin import AnkleTwin, record, staircase
 

@@ -21,7 +21,7 @@ import scipy.stats
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import all_known, between, positive_number
 from fes_pin.data.read_only import ReadOnly
-from fes_pin.data.tabulated import Tabulated
+from fes_pin.data.show import Tabulated
 from paper_ankle.ratios import RATIOS, REACH, UNITS, Optimum, RatioProblem
 
 LIKELIHOOD_95 = float(scipy.stats.chi2.ppf(0.95, 1))

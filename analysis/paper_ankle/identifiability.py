@@ -16,8 +16,7 @@ import numpy as np
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import all_known
-from fes_pin.data.show import frame
-from fes_pin.data.tabulated import Tabulated
+from fes_pin.data.show import Tabulated, frame
 from fes_pin.data.trial import Trial
 from fes_pin.models.model import Model
 from fes_pin.models.simulate import Simulator

@@ -16,7 +16,7 @@ import scipy.optimize
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import shortened, whole
-from fes_pin.data.tabulated import Tabulated
+from fes_pin.data.show import Tabulated
 from fes_pin.data.trial import Trial
 from fes_pin.infer.held_out import percent_of_spread
 from fes_pin.models.model import Model

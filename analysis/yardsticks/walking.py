@@ -11,9 +11,8 @@ from fes_pin.body.gait import postures_of_walk
 from fes_pin.body.joints import SIDES
 from fes_pin.data.motion import OPTIONAL
 from fes_pin.data.smooth import low_pass, rates
-from fes_pin.walk.dynamics import Motion
-from fes_pin.walk.motion import has_rates
-from fes_pin.walk.plates import LOADED_N
+from fes_pin.walk.motion import Motion, has_rates
+from fes_pin.walk.walk_trial import LOADED_N
 
 
 def rooted_motion(free: Motion, columns: Mapping[str, np.ndarray], rows: slice) -> Motion:

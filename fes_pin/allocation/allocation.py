@@ -1,7 +1,5 @@
 """The result of an allocation: pulse widths, their torque, what is short and why, and the proof."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The joint torques that a set of nerves can make at a posture: sums of one-sided columns, a zonotope."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any

@@ -18,12 +18,15 @@ of 1.513 kg).
 """
 
 from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
 
 import numpy as np
 
 from fes_pin.body.joints import SIDES
 from fes_pin.body.skeleton import Segment, Skeleton
 from fes_pin.data.numbers import between, known_word
+from fes_pin.data.table import own_table
 
 ANKLE_HEIGHT = 0.039
 HIP_SPACING = 0.095
@@ -37,7 +40,7 @@ MASS_RANGE_KG = (20.0, 250.0)
 HEIGHT_RANGE_M = (1.0, 2.4)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Row:
     """One line of de Leva's table 4.
 
@@ -48,39 +51,21 @@ class _Row:
     mass: float
     length: float
     com: float
-    radii: tuple[float, float, float]
+    radii: np.ndarray
 
 
-# Ends: head vertex-C7; upper trunk C7-xiphoid; middle trunk xiphoid-navel; lower trunk navel-mid-hip; arm
-# shoulder-elbow- wrist-tip of the middle finger; thigh hip-knee; shank knee-ankle; foot heel-toe tip. The columns
-# "sagittal" and "transverse" are about the forward and the leftward axis: a wide upper trunk has the greater radius
-# about the forward one.
-_DE_LEVA = {
-    "male": {
-        "head": _Row(6.94, 242.9, 50.02, (30.3, 31.5, 26.1)),
-        "upper_trunk": _Row(15.96, 242.1, 50.66, (50.5, 32.0, 46.5)),
-        "middle_trunk": _Row(16.33, 215.5, 45.02, (48.2, 38.3, 46.8)),
-        "lower_trunk": _Row(11.17, 145.7, 61.15, (61.5, 55.1, 58.7)),
-        "upper_arm": _Row(2.71, 281.7, 57.72, (28.5, 26.9, 15.8)),
-        "forearm": _Row(1.62, 268.9, 45.74, (27.6, 26.5, 12.1)),
-        "hand": _Row(0.61, 187.9, 36.24, (28.8, 23.5, 18.4)),
-        "thigh": _Row(14.16, 422.2, 40.95, (32.9, 32.9, 14.9)),
-        "shank": _Row(4.33, 440.3, 43.95, (25.1, 24.6, 10.2)),
-        "foot": _Row(1.37, 258.1, 44.15, (25.7, 24.5, 12.4)),
-    },
-    "female": {
-        "head": _Row(6.68, 243.7, 48.41, (27.1, 29.5, 26.1)),
-        "upper_trunk": _Row(15.45, 228.0, 50.50, (46.6, 31.4, 44.9)),
-        "middle_trunk": _Row(14.65, 205.3, 45.12, (43.3, 35.4, 41.5)),
-        "lower_trunk": _Row(12.47, 181.5, 49.20, (43.3, 40.2, 44.4)),
-        "upper_arm": _Row(2.55, 275.1, 57.54, (27.8, 26.0, 14.8)),
-        "forearm": _Row(1.38, 264.3, 45.59, (26.1, 25.7, 9.4)),
-        "hand": _Row(0.56, 170.1, 34.27, (24.4, 20.8, 15.4)),
-        "thigh": _Row(14.78, 368.5, 36.12, (36.9, 36.4, 16.2)),
-        "shank": _Row(4.81, 438.6, 43.52, (26.7, 26.3, 9.2)),
-        "foot": _Row(1.29, 228.3, 40.14, (29.9, 27.9, 13.9)),
-    },
-}
+@cache
+def _segments(sex: str) -> dict[str, _Row]:
+    """De Leva's table 4, of men or of women: segments.csv says what its columns are."""
+    found = {}
+    for row in own_table(Path(__file__).with_name("segments.csv")):
+        if row["sex"] == sex:
+            mass, length, com, *radii = (float(row[n]) for n in _NUMBERS)
+            found[row["segment"]] = _Row(mass, length, com, np.array(radii))
+    return found
+
+
+_NUMBERS = ("mass", "length", "com", "forward", "leftward", "along")
 _STATURE = {"male": 1741.0, "female": 1735.0}
 _SHOULDERS_TO_HIPS = {"male": 515.5, "female": 497.9}
 """Mid-shoulder to mid-hip, mm (de Leva's alternative trunk)."""
@@ -105,7 +90,7 @@ class Subject:
     def __post_init__(self) -> None:
         for label, ends in (("mass_kg", MASS_RANGE_KG), ("height_m", HEIGHT_RANGE_M)):
             object.__setattr__(self, label, between(getattr(self, label), *ends, label))
-        known_word(self.sex, _DE_LEVA, "sex")
+        known_word(self.sex, _STATURE, "sex")
 
 
 def skeleton_of_subject(subject: Subject) -> Skeleton:
@@ -115,7 +100,7 @@ def skeleton_of_subject(subject: Subject) -> Skeleton:
     not add up to stature exactly, so the column of shank, thigh, trunk and head is scaled as one (by 0.98 for men, 1.00
     for women) to close it: total mass and height are the subject's to rounding. Arms hang; they are part of the trunk.
     """
-    table = _DE_LEVA[subject.sex]
+    table = _segments(subject.sex)
     body_percent = sum(row.mass * (2 if name in _PAIRED else 1) for name, row in table.items())
     per_percent = subject.mass_kg / body_percent
     per_mm = subject.height_m / _STATURE[subject.sex]
@@ -131,7 +116,7 @@ def skeleton_of_subject(subject: Subject) -> Skeleton:
         row = table[name]
         length = scale * row.length
         mass = per_percent * row.mass
-        radii = length * np.array(row.radii) / 100.0
+        radii = length * row.radii / 100.0
         return Segment(mass, np.array([0.0, y, bottom + length * (1.0 - row.com / 100.0)]), mass * np.diag(radii**2))
 
     hip, shoulder = 0.5 * HIP_SPACING * subject.height_m, SHOULDER_HALF_BREADTH * subject.height_m
@@ -198,7 +183,7 @@ def _split_foot(
     rest_z = mtp[2] + (ankle[2] - mtp[2]) * (mtp[0] - rest_x) / (mtp[0] - ankle[0])
     width, thick = FOOT_BREADTH / ANKLE_HEIGHT * ankle[2], 2.0 * mtp[2]
     toes_inertia = toes / 12.0 * np.array([width**2 + thick**2, toe_length**2 + thick**2, toe_length**2 + width**2])
-    vertical, cross, along = (np.array(row.radii) / 100.0 * length) ** 2 * mass
+    vertical, cross, along = (row.radii / 100.0 * length) ** 2 * mass
     apart = toes * (toes_x - centre) ** 2 + rest * (rest_x - centre) ** 2
     whole = np.array([along, cross - apart, vertical - apart])
     hind = Segment(rest, np.array([rest_x, ankle[1], rest_z]), np.diag(whole - toes_inertia))

@@ -24,12 +24,12 @@ from fes_pin.body.linearize import model_on_slope
 from fes_pin.body.plans import PULSE_S, SETTLE_DEG, Plans
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import positive_number, truth
-from fes_pin.data.tabulated import Tabulated
+from fes_pin.data.show import Tabulated
 
 STEP_S = 0.002
 """Step of the Runge-Kutta integration, s; the fastest falls here double in ten of them."""
 LOST_DEG = 45.0
-"""A joint this far from the posture is lost: no linear model reaches there (`fes_pin.body.attainable.lean_text`)."""
+"""A joint this far from the posture is lost: no linear model reaches there (`fes_pin.body.catchable.lean_text`)."""
 
 
 @dataclass(frozen=True, eq=False)

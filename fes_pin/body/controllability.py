@@ -17,7 +17,7 @@ from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.modes import ModeSet
 from fes_pin.data.named import NamedArray
 from fes_pin.data.numbers import between
-from fes_pin.data.tabulated import Tabulated
+from fes_pin.data.show import Tabulated
 
 RELATIVE_TOLERANCE = 1e-9
 """Below this part of the largest gain, an input does not act on a mode: rounding, not muscle."""

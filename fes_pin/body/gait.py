@@ -12,6 +12,7 @@ from fes_pin.body.joints import JOINT_NAMES, MIRROR_SIGN, SIDES, mirrored
 from fes_pin.data.errors import InputError
 from fes_pin.data.named import NamedArray
 from fes_pin.data.numbers import all_known, known_word
+from fes_pin.data.table import own_table
 
 TABLE = Path(__file__).with_name("gait_postures.csv")
 """Degrees, right stance; made by scripts/generate/gait_postures.py from the measured walk."""
@@ -19,9 +20,9 @@ TABLE = Path(__file__).with_name("gait_postures.csv")
 
 @lru_cache(maxsize=1)
 def _table() -> dict[str, dict[str, float]]:
-    rows = [line.split(",") for line in TABLE.read_text().splitlines() if line and not line.startswith("#")]
-    names = rows[0][2:]
-    return {row[0]: {n: float(np.radians(float(v))) for n, v in zip(names, row[2:], strict=True)} for row in rows[1:]}
+    rows = own_table(TABLE)
+    angles = [{n: float(np.radians(float(row[n]))) for n in JOINT_NAMES} for row in rows]
+    return dict(zip([row["posture"] for row in rows], angles, strict=True))
 
 
 STILL = ("neutral", "standing", "one_leg")

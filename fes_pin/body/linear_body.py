@@ -22,8 +22,7 @@ from fes_pin.data.errors import InputError
 from fes_pin.data.named import NamedArray
 from fes_pin.data.numbers import known_word
 from fes_pin.data.read_only import held
-from fes_pin.data.show import DataFrame, frame
-from fes_pin.data.tabulated import Tabulated
+from fes_pin.data.show import DataFrame, Tabulated, frame
 
 _RANK = 1e-9
 """Singular values below this part of the largest are rounding: the second foot's rows are of order 1."""

@@ -11,14 +11,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fes_pin.body.attainable import attainable, lean_text
-from fes_pin.body.catchable import catchable, plans_of
+from fes_pin.body.catchable import attainable, catchable, lean_text, plans_of
 from fes_pin.body.controllability import modal_controllability
-from fes_pin.body.covering import Demand, smallest
 from fes_pin.body.inputs import Inputs
 from fes_pin.body.joints import SIDES, known_joint, names_of
 from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.plans import SETTLE_DEG, Plans
+from fes_pin.body.programs import Demand, smallest
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import all_known, known_word, number, positive_number, truth, whole
 
@@ -132,14 +131,14 @@ def minimal_sets(
     gravity
         Whether the set must also carry the posture's weight (C).
     settle_deg
-        How far modes may be from the posture (see `fes_pin.body.attainable` and `catchable`). Only with `together`.
+        How far modes may be from the posture (see `fes_pin.body.catchable`). Only with `together`.
     alternatives
         How many sets of the smallest size to return for each choice of braces; the cheapest first.
     strength_factor
         Strengths are known to this factor: the band of `lean_band_deg`.
     stimulation
         `over_time`: the body is brought back to rest by inputs that change (`fes_pin.body.catchable`); `constant`: a
-        constant input holds the lean (`fes_pin.body.attainable`).
+        constant input holds the lean (`fes_pin.body.catchable`).
     balance
         Whether each foot's centre of pressure must lie on its sole. Only with `together` and `gravity`.
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from fes_pin.body.joints import side_of
 from fes_pin.data.named import NamedArray
-from fes_pin.data.tabulated import Tabulated
+from fes_pin.data.show import Tabulated
 
 NEUTRAL_RATE = 1e-3
 """Below this rate, 1/s, a mode neither falls nor swings within a quarter of an hour."""

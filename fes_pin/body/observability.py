@@ -20,7 +20,7 @@ from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.modes import Mode, ModeSet
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import instance, positive_number
-from fes_pin.data.tabulated import Tabulated
+from fes_pin.data.show import Tabulated
 
 NOISE_DEG, RATE_HZ, LOOK_S = 0.5, 200.0, 0.3
 """Noise of a good flexible goniometer, degrees; its sampling, Hz; the time that a fall leaves for a look, s (ours)."""

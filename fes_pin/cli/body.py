@@ -114,9 +114,8 @@ def nerves(
     ] = None,
 ) -> None:
     """Which nerves control which modes, what they can catch and hold, and the fewest that do."""
-    from fes_pin.body.attainable import attainable
     from fes_pin.body.balance import place_of_weight
-    from fes_pin.body.catchable import catchable
+    from fes_pin.body.catchable import attainable, catchable
     from fes_pin.body.controllability import modal_controllability
     from fes_pin.body.inputs import Inputs
     from fes_pin.muscles.nerve_inputs import subject_nerves, whose_strength

@@ -15,8 +15,8 @@ from typing import Annotated, Any, TextIO, TypeVar
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from fes_pin.data.as_read import one_command
 from fes_pin.data.errors import InputError
-from fes_pin.data.read_files import one_command
 from fes_pin.settings import while_set
 
 USAGE_ERROR: Any = next(kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "ClickException")

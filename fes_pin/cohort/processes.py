@@ -18,8 +18,7 @@ from itertools import islice
 from queue import SimpleQueue
 
 from fes_pin.cohort.one import Answer, Work
-from fes_pin.data.errors import InputError
-from fes_pin.data.libraries import optional_library
+from fes_pin.data.errors import InputError, optional_library
 
 STUDIES_EACH = 25
 """Studies that a process diagnoses before a new one takes its place: a bound on what it may have gathered."""

@@ -1,25 +1,65 @@
-"""A cohort from its studies to its tables and its page; a run that was killed goes on where it was."""
+"""A cohort from its studies, each with a name in it, to its tables and its page.
+
+A run that was killed goes on where it was.
+"""
 
 import time
+from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fes_pin.cohort.found import find_studies
-from fes_pin.cohort.keep import STATE, Store
-from fes_pin.cohort.one import Answer, Work, diagnose_one
-from fes_pin.cohort.page import cohort_html
+from fes_pin.cohort.one import STATE, Answer, Store, Work, diagnose_one
 from fes_pin.cohort.processes import Task, in_processes, on_cluster
-from fes_pin.cohort.tables import ERRORS, Row, tables_of
+from fes_pin.cohort.tables import ERRORS, Row, cohort_html, tables_of
 from fes_pin.data.errors import InputError
 from fes_pin.data.outputs import Outputs
 from fes_pin.data.results import Saveable
-from fes_pin.data.tabular import SUFFIXES, table_bytes
+from fes_pin.data.table import SUFFIXES, table_bytes
 from fes_pin.infer.result import shown
 from fes_pin.models.catalogue import load_library
-from fes_pin.verdict.files import OF_ALL, OF_WALKS
+from fes_pin.verdict.ask import OF_ALL, OF_WALKS
+
+STUDY = "study.toml"
+
+
+def find_studies(places: Sequence[Path]) -> dict[str, Path]:
+    """Every study that is named or lies beneath a folder that is named, by its name in the cohort, in order of names.
+
+    A study is called by its folder, and where two folders have one name by as many of the folders above as tell them
+    apart: `anna-knee`, `ben-knee`.
+
+    Raises
+    ------
+    InputError
+        A place that is not there, or holds no study.
+    """
+    found: dict[Path, None] = {}
+    for place in places:
+        folder = place.parent if place.name == STUDY else place
+        if not folder.is_dir():
+            raise InputError("no such folder; expected a study, or a folder that holds studies", file=place)
+        own = [folder] if (folder / STUDY).exists() else sorted(p.parent for p in folder.rglob(STUDY))
+        if not own:
+            raise InputError(f"expected a study, or a folder that holds studies; no {STUDY} in it", file=place)
+        found.update(dict.fromkeys(p.resolve() for p in own))
+    return dict(sorted(_named(list(found)).items()))
+
+
+def _named(folders: Sequence[Path]) -> dict[str, Path]:
+    parts = [tuple(p for p in f.parts if p not in ("/", "\\")) for f in folders]
+    count = Counter(own[-d:] for own in parts for d in range(1, len(own) + 1))
+    ends = [next((own[-d:] for d in range(1, len(own)) if count[own[-d:]] == 1), own) for own in parts]
+    names = ["-".join(end) or "study" for end in ends]
+    many = Counter(names)
+    return {_unique(n, k, many): f for k, (n, f) in enumerate(zip(names, folders, strict=True))}
+
+
+def _unique(name: str, number: int, count: Counter[str]) -> str:
+    safe = "".join(c if c.isalnum() or c in "-_.+" else "_" for c in name).lstrip(".")
+    return safe if safe and count[name] == 1 else f"{safe}-{number + 1}"
 
 
 @dataclass(frozen=True)

@@ -1,14 +1,23 @@
-"""A cohort as tables: a row a study, a row a parameter of a cause, a row a pooled value."""
+"""A cohort as tables, and their page: a row a study, a row a parameter of a cause, a row a pooled value.
+
+The page says which causes are in which studies, what is common to them, and links each study's own report.
+"""
 
 import math
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from fes_pin.cohort.keep import Kept
+from fes_pin.cohort.one import Kept
 from fes_pin.cohort.pool import discovery_rates, pooled, share_interval
-from fes_pin.identify.error_measures import MEASURES
-from fes_pin.infer.levels import UNUSUAL_LEVEL
+from fes_pin.data.provenance import Provenance, today, versions
+from fes_pin.identify.error_measures import E_WORDS, MEASURES
+from fes_pin.infer.levels import CONFIDENCE_95, UNUSUAL_LEVEL
+from fes_pin.infer.text import percent, probability, rounded
+from fes_pin.view.drawing import Drawing
+from fes_pin.view.page import Content, Markup, document, element, figure, folded, html_table, joined, section
+from fes_pin.view.plots import intervals_drawing
+from fes_pin.view.sections import header, provenance_parts, stage_mark
 
 Row = Mapping[str, Any]
 
@@ -130,3 +139,143 @@ def prevalence_rows(causes: Sequence[Row], studies: int) -> list[Row]:
             }
         )
     return sorted(out, key=lambda r: (-r["studies"], r["cause"]))
+
+
+FOREST = 40
+"""Studies of one forest plot; of more only the pooled value is drawn."""
+MODELS = (
+    "Of the nominal, then of the extended model, on trials held out where there are such. Free: from the inputs alone; "
+    "ahead: each sample from what was measured up to the study's horizon before it. Of walking E is that of the ground "
+    "reaction which the motion requires."
+)
+"""Words about the errors of studies."""
+
+
+def cohort_html(tables: Mapping[str, Sequence[Row]], seed: int, command: str = "") -> str:
+    """The page of the tables of a cohort, complete in one file; it links the reports that lie next to it."""
+    studies, prevalence = tables["studies"], tables["prevalence"]
+    good = [r for r in studies if r["verdict"] != "failed"]
+    parts = [
+        _head(studies, good, prevalence),
+        section("Which causes, and in how many studies", *_prevalence(prevalence, len(good))),
+        section("How large they are in the population", *_pooled(tables["causes"], tables["pooled"])),
+        section("Studies", *_studies(studies)),
+        section("Where this comes from", *provenance_parts(Provenance(today(), versions(), {}, seed, command))),
+    ]
+    return document("Cohort", parts)
+
+
+def _head(studies: Sequence[Row], good: Sequence[Row], prevalence: Sequence[Row]) -> Markup:
+    counts = Counter(r["verdict"] for r in good)
+    failed = len(studies) - len(good)
+    if prevalence:
+        first = prevalence[0]
+        name = first["cause"].replace("_", " ")
+        title = f"{name[0].upper()}{name[1:]} in {first['studies']} of {len(good)} studies"
+    else:
+        title = f"No cause is named in {len(good)} studies"
+    rows: list[tuple[Content, Content]] = [
+        ("A cause was named", f"in {counts['causes_found']} of {len(good)} studies"),
+        ("The model is adequate", f"in {counts['adequate']}"),
+        ("Something stays unexplained", f"in {sum(bool(r['unexplained']) for r in good)}"),
+    ]
+    if counts["stopped"]:
+        rows.append(("The search was stopped", f"in {counts['stopped']}: the causes are the best set so far"))
+    if failed:
+        rows.append(("Could not be diagnosed", f"{failed}: see the table of studies"))
+    return header(f"cohort of {len(studies)} studies", title, "causes_found", rows)
+
+
+def _prevalence(rows: Sequence[Row], studies: int) -> list[Markup]:
+    if not rows:
+        return [element("p", "None.")]
+    found = ("share [95 %]", "median gain", "only cause in its set in", "false discovery rate below 5 % in")
+    head = ("cause", "stage", "studies", *found)
+    cells: list[list[Content]] = [
+        [
+            element("code", r["cause"]),
+            stage_mark(r["stage"]),
+            f"{r['studies']} of {studies}",
+            f"{r['share_percent']:.0f} % [{r['share_low']:.0f}, {r['share_high']:.0f}]",
+            percent(r["median_gain_percent"]),
+            str(r["alone"]),
+            str(r["certain"]),
+        ]
+        for r in rows
+    ]
+    words = (
+        "A study in which a cause was not named may still have it: small, or such as its trials cannot show. The false "
+        "discovery rate is over all causes that were looked for in all studies."
+    )
+    return [html_table(head, cells, (2, 3, 4, 5, 6)), element("p", words, class_="soft")]
+
+
+def _pooled(causes: Sequence[Row], rows: Sequence[Row]) -> list[Markup]:
+    if not rows:
+        return [element("p", "No value is known from two studies or more.")]
+    words = (
+        "Random-effects means over the studies, with the interval of the mean, how much the value differs from study "
+        "to study beyond their own uncertainty (tau), and where the next would lie. A cause's size is of the studies "
+        "in which it was named: where it is small it was not, so that the mean is that of those who have it, and "
+        "somewhat too large."
+    )
+    head = ("of", "parameter", "studies", "mean [95 %]", "tau", "next study [95 %]", "I²", "all alike")
+    out = [element("p", words, class_="soft"), html_table(head, [_pooled_cells(r) for r in rows], (2, 3, 4, 5, 6, 7))]
+    means = {(r["cause"], r["parameter"]): r for r in rows}
+    drawn, shown = [], set()
+    for (cause, parameter), many in by_parameter(causes).items():
+        if len(many) > 1 and cause not in shown:
+            shown.add(cause)  # the first parameter is what gives a cause its size
+            forest = _forest(parameter, many, means.get((cause, parameter)))
+            drawn.append(figure(forest, f"{cause}, {parameter}", file=f"{cause}_{parameter}"))
+    return [*out, element("div", joined(drawn), class_="grid")] if drawn else out
+
+
+def _pooled_cells(r: Row) -> list[Content]:
+    error = (r["high"] - r["low"]) / 4.0
+    bounds = [rounded(r[n], error) for n in ("next_low", "next_high") if math.isfinite(r[n])]
+    return [
+        element("code", r["cause"]) if r["cause"] else "the rig",
+        element("code", r["parameter"]),
+        f"{r['studies']} of {r['of']}",
+        f"{rounded(r['mean'], error)} [{rounded(r['low'], error)}, {rounded(r['high'], error)}]",
+        rounded(r["between"], error),
+        f"[{', '.join(bounds)}]" if bounds else "-",
+        f"{r['heterogeneity']:.0f} %",
+        probability(r["p_alike"]),
+    ]
+
+
+def _forest(parameter: str, rows: Sequence[Row], mean: Row | None) -> Drawing:
+    """Values of a parameter study by study with their 95 % intervals, and the pooled mean below."""
+    known = [r for r in rows if math.isfinite(r["value"])]
+    drawn = [r for r in known if math.isfinite(r["std"])] if len(known) <= FOREST else []
+    lines = []
+    for r in drawn:
+        half = CONFIDENCE_95 * r["std"]
+        lines.append((r["study"], r["value"], r["value"] - half, r["value"] + half, "measured"))
+    if mean is not None:
+        lines.append(("pooled", mean["mean"], mean["low"], mean["high"], "extended"))
+    return intervals_drawing(lines, parameter)
+
+
+def _studies(rows: Sequence[Row]) -> list[Markup]:
+    head = ("study", "verdict", "causes", "E free", "E ahead", "left")
+    cells: list[list[Content]] = []
+    for r in rows:
+        if r["verdict"] == "failed":
+            cells.append([r["study"], "failed", r["error"], "-", "-", "-"])
+            continue
+        link = element("a", r["study"], href=f"studies/{r['study']}/report.html")
+        free = _errors(r, "fit" if math.isnan(r["nominal_held_out_percent"]) else "held_out")
+        left = "something" if r["unexplained"] else "nothing"
+        cells.append([link, r["verdict"].replace("_", " "), r["causes"] or "-", free, _errors(r, "horizon"), left])
+    made = html_table(head, cells, (3, 4))
+    about = element("p", f"{E_WORDS} {MODELS}", class_="soft")
+    return [about, made if len(rows) <= FOREST else folded(f"All {len(rows)} studies", made)]
+
+
+def _errors(row: Row, name: str) -> str:
+    """E of the nominal and of the extended model; of one alone where both are the same."""
+    pair = [percent(row[f"{model}_{name}_percent"]) for model in ("nominal", "extended")]
+    return " \u2192 ".join(dict.fromkeys(pair))

@@ -19,14 +19,12 @@ import numpy as np
 
 from fes_pin.control.angles import LARGEST_RAD, hint
 from fes_pin.control.angles import reading as read
-from fes_pin.control.dynamics import PULSE_S, AnkleDynamics
+from fes_pin.control.dynamics import PULSE_S, AnkleDynamics, JointObserver
 from fes_pin.control.endurance import EnduranceWatch, fatigue_of
 from fes_pin.control.faults import FaultMonitor, Status
 from fes_pin.control.given import GivenAnkle, RunningAnkle
-from fes_pin.control.limits import StimulationLimits
-from fes_pin.control.observer import JointObserver
 from fes_pin.control.oscillation import OscillationWatch
-from fes_pin.control.pulse import PulseWidth
+from fes_pin.control.pulse import PulseWidth, StimulationLimits
 from fes_pin.control.reference import LOOKAHEAD, ReferenceWindow, coming, trajectory
 from fes_pin.control.timing import PulseClock
 from fes_pin.control.tuning import Gains, tune

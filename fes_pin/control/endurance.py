@@ -15,7 +15,7 @@ import numpy as np
 from fes_pin.control.dynamics import ANGLES_RAD, PULSE_S, AnkleDynamics
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import between, numbers, whole
-from fes_pin.data.tabulated import Tabulated
+from fes_pin.data.show import Tabulated
 from fes_pin.models.effects.fatigue import FLOOR, Fatigue
 from fes_pin.models.model import Model
 

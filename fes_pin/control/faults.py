@@ -20,8 +20,7 @@ from enum import Enum
 
 from scipy.special import chdtri, erf
 
-from fes_pin.control.dynamics import PULSE_S, AnkleDynamics
-from fes_pin.control.observer import GATE, JointObserver
+from fes_pin.control.dynamics import GATE, PULSE_S, AnkleDynamics, JointObserver
 
 FALSE_STOPS_PER_HOUR = 1e-3
 """Rate at which noise alone trips the test of frozen readings, and at most that of innovations: clipping leaves 1.3e-4

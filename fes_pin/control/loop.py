@@ -9,7 +9,7 @@ import numpy as np
 
 from fes_pin.control.control import PositionController
 from fes_pin.control.dynamics import PULSE_S
-from fes_pin.data.tabulated import Tabulated
+from fes_pin.data.show import Tabulated
 
 
 class StimulatedJoint(Protocol):

@@ -9,11 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fes_pin.control.dynamics import PULSE_S, AnkleDynamics
-from fes_pin.control.observer import JointObserver
+from fes_pin.control.dynamics import PULSE_S, AnkleDynamics, JointObserver
 from fes_pin.control.tuning import Gains, Loop, corners, loop_at
 from fes_pin.data.numbers import instance
-from fes_pin.data.tabulated import Tabulated
+from fes_pin.data.show import Tabulated
 
 FREQUENCIES = 4000
 """Up to half the pulse rate."""

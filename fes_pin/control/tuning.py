@@ -18,12 +18,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.linalg
 
-from fes_pin.control.dynamics import PULSE_S, AnkleDynamics
+from fes_pin.control.dynamics import PULSE_S, AnkleDynamics, JointObserver
 from fes_pin.control.given import GivenAnkle, Sampled, held
-from fes_pin.control.observer import JointObserver
 from fes_pin.data.errors import InputError
-from fes_pin.data.show import DataFrame, frame
-from fes_pin.data.tabulated import Tabulated
+from fes_pin.data.show import DataFrame, Tabulated, frame
 
 DEGREE = math.pi / 180.0
 LADDER = (0.5, 0.35, 0.25, 0.18, 0.12, 0.08, 0.05, 0.03)

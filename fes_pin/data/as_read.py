@@ -1,14 +1,15 @@
-"""What was read, as it was then: hashes of the bytes, and files that are held.
+"""What was read, as it was then: hashes of the bytes, files that are held, and files that nothing may write over.
 
-What becomes of a file after it was read changes nothing of what was made of it.
+What becomes of a file after it was read changes nothing of what was made of it. A file's identity is its device and its
+number on that, so that links, hard links and names that the file system takes for the same are one file.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Iterable, Mapping
-from contextlib import AbstractContextManager
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path, PosixPath
@@ -16,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from fes_pin.data.errors import InputError
 from fes_pin.data.read_only import ReadOnly
 from fes_pin.settings import while_set
 
@@ -86,3 +88,60 @@ def digest_of(parts: Iterable[Any]) -> bytes:
     for part in parts:
         made.update(part.tobytes() if isinstance(part, np.ndarray) else repr(part).encode())
     return made.digest()
+
+
+_read: dict[tuple[int, int], str] = {}
+"""The name under which each was read, by identity."""
+_written: dict[tuple[int, int], tuple[int, int]] = {}
+"""Size and time of change of what this process wrote: to read that again does not make it an input."""
+
+
+def note_read(path: str | Path) -> None:
+    """Remember a file as an input, unless this process wrote it as it is."""
+    known = os.stat(path)
+    if _written.get((known.st_dev, known.st_ino)) != (known.st_size, known.st_mtime_ns):
+        _read[known.st_dev, known.st_ino] = os.path.abspath(path)
+
+
+def note_written(path: str | Path) -> None:
+    """Remember a file as one that this process wrote."""
+    known = os.stat(path)
+    _written[known.st_dev, known.st_ino] = known.st_size, known.st_mtime_ns
+
+
+def was_read(path: str | Path) -> str:
+    """The name under which a file was read; "" for one that was not."""
+    try:
+        known = os.stat(path)
+        place = _read.get((known.st_dev, known.st_ino), "")
+        return place if place and os.path.samestat(os.stat(place), known) else ""  # numbers go to new files
+    except (OSError, ValueError):
+        return ""
+
+
+def refuse_inputs(paths: Iterable[Path]) -> None:
+    """Raise where one of the files that are to be written was read.
+
+    Raises
+    ------
+    InputError
+        With the file, and the name under which it was read.
+    """
+    for path in paths:
+        if place := was_read(path):
+            other = "" if place == os.path.abspath(path) else f" as {place}"
+            raise InputError(f"was read{other}, and no output is written over it; expected another place", file=path)
+
+
+@contextmanager
+def one_command() -> Iterator[None]:
+    """What is read and written inside is of one command: what was read before is not its input."""
+    before: list[tuple[dict[Any, Any], dict[Any, Any]]] = [(known, dict(known)) for known in (_read, _written)]
+    for known, _ in before:
+        known.clear()
+    try:
+        yield
+    finally:
+        for known, then in before:
+            known.clear()
+            known.update(then)

@@ -14,9 +14,11 @@ import tomli_w
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import read_json
 from fes_pin.data.recorded.formats import matlab_vectors
+from fes_pin.data.table import format_csv
 from fes_pin.data.templates import arm_urdf, slide_urdf
 from fes_pin.data.units import INCH, POUND
 
+SHORT = "{:.6g}".format
 Files = dict[str, str]
 
 SERVO_LOGS = tuple(
@@ -53,7 +55,7 @@ def servo_pendulum(folder: Path) -> Files:
         row = np.searchsorted(t - t[0], time + 1e-12, side="right") - 1
         name = f"{log['trajectory']}_kp{log['kp']}"
         columns = {"time_s": time, "effort": effort[row], "position": np.interp(time, t - t[0], q)}
-        files[f"trials/{name}.csv"] = _csv(columns)
+        files[f"trials/{name}.csv"] = format_csv(columns, SHORT)
         role = "fit" if log["trajectory"] in ("lift_and_drop", "sin_sin") else "held_out"
         trials.append({"file": f"trials/{name}.csv", "role": role})
     what = "0.49 kg at 0.1 m on the horn of the servo; the arm and the servo's reflected inertia are not in here."
@@ -102,7 +104,7 @@ def friction_damper(folder: Path) -> Files:
         time = np.arange(int((t[-1] - t[0]) * DAMPER_RATE_HZ + 1e-9) + 1) / DAMPER_RATE_HZ
         columns = {"position": INCH * inches, "velocity": INCH * rate, "effort": 1e3 * POUND * kips}
         at = {n: np.interp(time, t - t[0], v) for n, v in columns.items()}
-        files[f"trials/{name}.csv"] = _csv({"time_s": time, **at})
+        files[f"trials/{name}.csv"] = format_csv({"time_s": time, **at}, SHORT)
         role = "fit" if "_0.5hz" in name else "held_out"
         trials.append({"file": f"trials/{name}.csv", "kind": "imposed", "group": group, "role": role})
     what = "The damper's rod, driven horizontally. The moving mass is not published: 20 kg is a guess."
@@ -150,11 +152,6 @@ CONVERTERS: Mapping[str, tuple[Callable[[Path], Files], tuple[str, ...]]] = {
     "servo_pendulum": (servo_pendulum, SERVO_LOGS),
 }
 """By data set what makes a study of it, and the upstream files that this needs."""
-
-
-def _csv(columns: Mapping[str, np.ndarray]) -> str:
-    rows = zip(*(v.tolist() for v in columns.values()), strict=True)
-    return "\n".join([",".join(columns), *(",".join(f"{x:.6g}" for x in row) for row in rows)]) + "\n"
 
 
 def _study(name: str, rig: Mapping[str, Any], start: Mapping[str, float], trials: list[dict[str, str]]) -> str:

@@ -15,8 +15,7 @@ from pathlib import Path
 from urllib.parse import quote
 
 from fes_pin.data.conversions import CONVERTERS, Files
-from fes_pin.data.errors import InputError, fault_at
-from fes_pin.data.libraries import optional_library
+from fes_pin.data.errors import InputError, fault_at, optional_library
 from fes_pin.data.outputs import Outputs
 from fes_pin.data.schema import check_known
 

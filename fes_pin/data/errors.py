@@ -1,8 +1,13 @@
-"""The one error that bad input raises: a line that says where it is and what was expected."""
+"""The one error that bad input raises: a line that says where it is and what was expected.
 
+A library that comes with an extra of the package, and is not installed, raises it as well.
+"""
+
+import importlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 
 class InputError(ValueError):
@@ -73,3 +78,29 @@ def errors_of(file: str | Path | None) -> Iterator[None]:
 def _short(name: str, most: int = 500) -> str:
     """A name without its middle, if it is longer than a line can hold."""
     return name if len(name) <= most else f"{name[: most // 2]}...{name[-most // 2 :]}"
+
+
+def optional_library(
+    module: str, extra: str, needed: str, *, file: str | Path | None = None, column: str | None = None
+) -> Any:
+    """A module of a library that an extra brings.
+
+    Parameters
+    ----------
+    module, extra
+        Its name, and that of the extra.
+    needed
+        What needs it, as in "frames need pandas".
+    file, column
+        Where an error is.
+
+    Raises
+    ------
+    InputError
+        It is not installed; the message says how to install it.
+    """
+    try:
+        return importlib.import_module(module)
+    except ImportError:
+        message = f"{needed}: pip install 'fes-pin[{extra}]'"
+        raise InputError(message, file=file, column=column) from None

@@ -11,9 +11,8 @@ from itertools import takewhile
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from fes_pin.data.as_read import HeldFile, note_bytes
+from fes_pin.data.as_read import HeldFile, note_bytes, note_read, note_written, refuse_inputs
 from fes_pin.data.errors import InputError
-from fes_pin.data.read_files import note_read, note_written, refuse_inputs
 
 MAX_BYTES = 1 << 30
 SCRATCH = ".fes_pin-"

@@ -15,7 +15,7 @@ from fes_pin.data.as_read import HeldFile
 from fes_pin.data.errors import InputError, fault_at
 from fes_pin.data.files import inside, read_bytes
 from fes_pin.data.recorded.columns import INTERPOLATE
-from fes_pin.data.recorded.propose import Proposal, propose
+from fes_pin.data.recorded.sniff import Proposal, propose
 from fes_pin.data.recorded.text import TextForm
 from fes_pin.data.schema import NumberKey, check_known, one_of, unknown
 from fes_pin.data.study_text import HEADER, columns_text, form_in_words, source_from_option, source_in_words, toml_table

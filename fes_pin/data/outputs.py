@@ -9,9 +9,9 @@ from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from fes_pin.data.as_read import refuse_inputs, was_read
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import check_folder, own_json, write_bytes, write_files
-from fes_pin.data.read_files import refuse_inputs, was_read
 
 RECORD = ".fes_pin.json"
 """In each folder that a command writes into: by name of a file which command wrote it, and its SHA-256."""

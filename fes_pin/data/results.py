@@ -1,7 +1,5 @@
 """Base of results: read-only, comparable, copied, shown as a table, saved as JSON and loaded again."""
 
-from __future__ import annotations
-
 import html
 import json
 import time

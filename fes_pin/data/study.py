@@ -24,7 +24,7 @@ from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.recorded.columns import Columns
 from fes_pin.data.schema import Rigs, RigSchema, check_conditions, check_known, checked_numbers, known_rigs, schema_of
 from fes_pin.data.show import DataFrame, by_columns, frame, table_html
-from fes_pin.data.study_tables import HORIZON, StudyTables, check_files, checked_horizon
+from fes_pin.data.study_text import HORIZON, StudyTables, check_files, checked_horizon
 from fes_pin.data.table import format_csv
 from fes_pin.data.toml import Document, document_of, read_toml
 from fes_pin.data.trial import Trial, check_trial, read_body_trial, read_trial, trial_csv

@@ -1,13 +1,20 @@
-"""Numbers by named column, with what is asked of their times."""
+"""Numbers by named column, with what is asked of their times; tables of the package, and tables that are written.
 
+These are CSV, or Parquet by the suffix of the file, where pyarrow is installed.
+"""
+
+import csv
+import io
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from fes_pin.data.errors import InputError
+from fes_pin.data.errors import InputError, optional_library
+from fes_pin.data.outputs import check_ending
 
 MIN_ROWS = 3
 STEP_TOLERANCE = 0.01  # a step may vary by 1 %
@@ -139,7 +146,66 @@ def _half_digit(time: np.ndarray) -> float:
     return 0.5 * 10.0 ** -next(decimals, math.inf)
 
 
-def format_csv(columns: Mapping[str, np.ndarray]) -> str:
-    """CSV text of equally long columns; each number is the shortest text that reads back as the same number."""
-    rows = zip(*(map(repr, np.asarray(values, dtype=float).tolist()) for values in columns.values()), strict=True)
+def format_csv(columns: Mapping[str, np.ndarray], form: Callable[[float], str] = repr) -> str:
+    """CSV text of equally long columns; each number is the shortest text that reads back as it, or as `form` has it."""
+    rows = zip(*(map(form, np.asarray(values, dtype=float).tolist()) for values in columns.values()), strict=True)
     return "\n".join([",".join(columns), *map(",".join, rows)]) + "\n"
+
+
+def own_table(path: Path) -> list[dict[str, str]]:
+    """Rows of a table that comes with the package; lines that begin with # say what is in it."""
+    lines = path.read_text("utf-8").splitlines()
+    return list(csv.DictReader(line for line in lines if not line.startswith("#")))
+
+
+SUFFIXES = (".csv", ".parquet")
+
+
+def check_table(path: str | Path) -> None:
+    """Raise where `table_bytes` would, before the work that makes the table.
+
+    Raises
+    ------
+    InputError
+        A suffix that is none of `SUFFIXES`; Parquet without pyarrow.
+    """
+    check_ending(path, SUFFIXES)
+    if Path(path).suffix.lower() == ".parquet":
+        optional_library("pyarrow.parquet", "parquet", "Parquet needs pyarrow", file=path)
+
+
+def table_bytes(columns: Mapping[str, Sequence[Any] | np.ndarray], path: str | Path) -> bytes:
+    """A table as the file's suffix says.
+
+    Parameters
+    ----------
+    columns
+        Numbers as an array of shape (n,), or a list of n numbers, words, or truths; None and NaN are written as
+        nothing.
+
+    Raises
+    ------
+    InputError
+        As `check_table`.
+    """
+    check_table(path)
+    cells = {n: v.astype(float).tolist() if isinstance(v, np.ndarray) else v for n, v in columns.items()}
+    if Path(path).suffix.lower() == ".parquet":
+        import pyarrow  # noqa: PLC0415
+        from pyarrow.parquet import write_table  # noqa: PLC0415
+
+        kinds = {bool: pyarrow.bool_(), int: pyarrow.int64(), float: pyarrow.float64(), str: pyarrow.string()}
+        known = {n: next((type(x) for x in v if x is not None), str) for n, v in cells.items()}
+        sink = io.BytesIO()
+        made = {n: pyarrow.array(v, kinds[known[n]], from_pandas=True) for n, v in cells.items()}
+        write_table(pyarrow.table(made), sink)
+        return sink.getvalue()
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(cells)
+    writer.writerows(zip(*(["" if _is_unknown(x) else x for x in v] for v in cells.values()), strict=True))
+    return stream.getvalue().encode()
+
+
+def _is_unknown(value: Any) -> bool:
+    return value is None or (isinstance(value, float) and math.isnan(value))

@@ -1,25 +1,10 @@
 """URDF templates of the commonest one-joint rigs, to be written and then improved upon by hand."""
 
+from pathlib import Path
+
 from fes_pin.data.errors import InputError
 
-_URDF = """<?xml version="1.0"?>
-<!-- {what} -->
-<robot name="{name}">
-  <link name="base"/>
-  <link name="{link}">
-    <inertial>
-      <origin xyz="0 0 {height}"/>
-      <mass value="{mass}"/>
-      <inertia ixx="{across}" ixy="0" ixz="0" iyy="{across}" iyz="0" izz="{along}"/>
-    </inertial>
-  </link>
-  <joint name="{joint}" type="{kind}">
-    <parent link="base"/>
-    <child link="{link}"/>
-    <axis xyz="{direction}"/>
-{limit}  </joint>
-</robot>
-"""
+_URDF = Path(__file__).with_name("one_joint.urdf").read_text("utf-8")
 LIMIT = '    <limit lower="-{reach}" upper="{reach}" effort="1e6" velocity="1e6"/>\n'
 _WRITTEN = """
      Written by `fes-pin new-study`: better values of mass, centre (origin) and inertia about it go in below."""

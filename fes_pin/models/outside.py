@@ -11,8 +11,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
 
+from fes_pin.data.as_read import note_read
 from fes_pin.data.errors import InputError
-from fes_pin.data.read_files import note_read
 from fes_pin.data.schema import RigSchema
 from fes_pin.models.rigs.base import Rig
 from fes_pin.models.stage import Effect, Stage

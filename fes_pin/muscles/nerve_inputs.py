@@ -1,7 +1,9 @@
-"""Nerves as inputs of a linearized body: by name, with the strength of the body's size, sex and years."""
+"""Nerves as inputs of a linearized body: by name, with the strength of the body's size, sex and years, as measured."""
 
 from collections.abc import Iterable
 from dataclasses import replace
+
+import numpy as np
 
 from fes_pin.body.build import Body
 from fes_pin.body.controllability import ModalControllability
@@ -12,10 +14,23 @@ from fes_pin.body.linearize import LinearBody
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import instance, known_word
 from fes_pin.muscles.nerves import SUBJECT_HEIGHT, Nerves, nerve_names
-from fes_pin.muscles.published import share_of_a_young_mans
+from fes_pin.muscles.paths import read_table
+
+_MEASURED = (row.values() for row in read_table("peaks.csv"))
+PEAKS_2007 = {(who, years): tuple(map(float, peaks)) for who, years, *peaks in _MEASURED}
+"""Peak torques, per body weight times height, of hip extension and flexion, knee extension and flexion, plantarflexion
+and dorsiflexion, by sex and years: D. E. Anderson, M. L. Madigan, M. A. Nussbaum, J. Biomech. 40:3105-3113, 2007, table
+3 (as the muscle add-on of RBDL has it; the article was not at hand)."""
+
+
+def share_of_a_young_mans(who: str, years: str) -> float:
+    """Strength of a group over that of men of 18 to 25, of the same weight and height: mean of six actions."""
+    young = np.array(PEAKS_2007["man", "18 to 25"])
+    return float(np.mean(np.array(PEAKS_2007[who, years]) / young))
+
 
 YEARS = ("18 to 25", "55 to 65", "over 65")
-"""Groups of years whose strength has been measured (`fes_pin.muscles.published.PEAKS_2007`)."""
+"""Groups of years whose strength has been measured (`PEAKS_2007`)."""
 
 
 def _who(body: Body) -> str:

@@ -6,11 +6,10 @@ joints of the body (`fes_pin.body.joints`), each about its own axis, so that a m
 length along a joint's angle, is the torque about that joint per unit of force.
 """
 
-import csv
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from importlib.resources import files
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,6 +18,7 @@ from scipy.interpolate import CubicSpline
 from fes_pin.body.gait import turn
 from fes_pin.body.joints import axis_of
 from fes_pin.data.read_only import ReadOnly
+from fes_pin.data.table import own_table
 
 BODIES = ("pelvis", "femur", "tibia", "calcaneus", "toes")
 
@@ -87,8 +87,7 @@ _STEP = 1e-20
 
 def read_table(name: str) -> list[dict[str, str]]:
     """Rows of one of the tables that ship with the package."""
-    text = (files("fes_pin.muscles") / "tables" / name).read_text()
-    return list(csv.DictReader(text.splitlines()))
+    return own_table(Path(__file__).parent / "tables" / name)
 
 
 def _spline(curve: Any, x: np.ndarray) -> np.ndarray:

@@ -14,7 +14,7 @@ import scipy.optimize
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import between, number, numbers, positive_number
-from fes_pin.data.tabulated import Tabulated
+from fes_pin.data.show import Tabulated
 from fes_pin.paper.equation_1 import antagonist_n, halved, static_torque_nm
 
 NAMES = ("f0_n", "f1_per_rad", "theta_r_rad")

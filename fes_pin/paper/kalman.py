@@ -23,7 +23,7 @@ import numpy as np
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import between, instance, number, positive_number
-from fes_pin.data.tabulated import Tabulated
+from fes_pin.data.show import Tabulated
 from fes_pin.data.trial import Trial
 from fes_pin.muscles.recruitment import LinearRecruitment
 

@@ -1,4 +1,4 @@
-"""The check and the diagnosis of a study, of a rig or of a walk."""
+"""The check and the diagnosis of a study, of a rig or of a walk, and the names of the files of an answer."""
 
 from __future__ import annotations
 
@@ -7,12 +7,23 @@ from typing import TYPE_CHECKING
 
 from fes_pin.data.asked import asked
 from fes_pin.data.errors import InputError
-from fes_pin.data.results import ModelResult
+from fes_pin.data.results import NEXT_FILE, ModelResult
 from fes_pin.data.study import Study
 from fes_pin.models.catalogue import Source
 
 if TYPE_CHECKING:
     from fes_pin.diagnosis.checked import Checked
+
+
+REPORT_FILE = "report.html"
+OF_ALL = ("diagnosis.json", "model.toml", REPORT_FILE, NEXT_FILE)
+OF_WALKS = ("body.urdf", "playback.html")
+"""Files of a study at most, and further files of a walk; the next trial where one is proposed."""
+
+
+def answer_names(study: Study) -> tuple[str, ...]:
+    """Names of the files that `view.report.answer_files` may give of a study."""
+    return OF_ALL if study.schema.owner is not None else (*OF_ALL, *OF_WALKS)
 
 
 def check(study: Study, *, library: Source | Sequence[Source] | None = None) -> Checked:

@@ -22,10 +22,10 @@ from fes_pin.data.imposed import imposed_motion
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
 from fes_pin.infer.noise import thin
+from fes_pin.models.free_run import measured_motion, tracking_effort
 from fes_pin.models.model import Model
 from fes_pin.models.rigs.base import Rig
 from fes_pin.models.stage import Signals
-from fes_pin.models.tracking import measured_motion, tracking_effort
 
 MAX_POINTS = 1200
 """Instants of the estimate: a longer trial is averaged down to it first."""

@@ -12,9 +12,9 @@ from fes_pin.identify.error_measures import E_WORDS
 from fes_pin.infer.result import ON, Cause, Change, Named
 from fes_pin.infer.text import percent, probability
 from fes_pin.models.describe import equation, remark, sentence
-from fes_pin.view.intervals import intervals_drawing, rivals_drawing
 from fes_pin.view.mathml import equations_mathml
 from fes_pin.view.page import Content, Markup, document, element, figure, html_table, section, unit_text
+from fes_pin.view.plots import intervals_drawing, rivals_drawing
 from fes_pin.view.sections import UNIT_IN_NAME, Parts, header, provenance_parts, stage_mark, value_and_interval
 
 OWN = {"Diagnosis": "report_rig", "WalkDiagnosis": "report_walk", "Contrast": "report_groups"}

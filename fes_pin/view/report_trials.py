@@ -6,7 +6,7 @@ from fes_pin.data.schema import IMPOSED
 from fes_pin.diagnosis.replay import Replay
 from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.infer.text import percent
-from fes_pin.models.tracking import can_track
+from fes_pin.models.free_run import can_track
 from fes_pin.view.missing import Missing, missing_input
 from fes_pin.view.page import Markup, element, figure, folded, joined, key
 from fes_pin.view.plots import missing_drawing, share, trial_drawing

@@ -1,4 +1,7 @@
-"""A study of walking made ready: the body that is believed, its motion, and the plates on the motion's clock."""
+"""A study of walking made ready: the body that is believed, its motion, and the plates on the motion's clock.
+
+Plates and motion that cannot be of one walk are errors; part of a record may be used.
+"""
 
 import json
 from dataclasses import replace
@@ -6,16 +9,103 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from fes_pin.body.build import Body
+from fes_pin.body.joints import SIDES
 from fes_pin.data.errors import InputError, errors_of
 from fes_pin.data.smooth import CUTOFF_HZ
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
-from fes_pin.walk.motion import Session, has_rates, motion_of, pelvis_to_hip
-from fes_pin.walk.plates import plates_of
-from fes_pin.walk.plausible import carried_along, check_together
-from fes_pin.walk.walk_trial import WalkTrial
+from fes_pin.walk.motion import Motion, Session, has_rates, motion_of, pelvis_to_hip
+from fes_pin.walk.walk_trial import LOADED_N, Plates, WalkTrial, plates_of, stretches
+
+FAR_M = 1.5
+"""No centre of pressure lies further from the body than this, level: a long step is 1 m."""
+CARRIED = 0.6
+"""Share of the required vertical force below which plates do not carry the whole body: errors of plates and masses are
+below a third (`fits.POSSIBLE`)."""
+NEARER = 0.6
+"""Share of its distance to one ankle at which a centre of pressure is the other foot's; one who stands may share it."""
+FULLY = 0.9
+"""Share of what they usually carry that plates carry all through a stretch; else a foot next to them carries."""
+NEARLY_ALL = 0.95
+"""Share of a trial that plates carry from which on all of it is used."""
+ENOUGH_S = 0.3
+"""Most of a single support, s: less is no record of walking."""
+MEAN_S = 0.15
+"""Time over which forces are averaged before they are compared, s: a foot next to a plate stands there for longer, and
+accelerations of noisy markers are as large as the weight from sample to sample."""
+
+
+def check_together(motion: Motion, plates: Plates) -> None:
+    """Refuse plates that push down, that lie elsewhere than the feet, or whose feet are exchanged.
+
+    Raises
+    ------
+    InputError
+        With what was expected.
+    """
+    up = plates.total[:, 2]
+    if np.mean(up) < 0.0:
+        raise InputError(f"the ground pushes up: the mean vertical force is {np.mean(up):.0f} N", column="r_Fy")
+    for side in SIDES:
+        rows = plates.loaded[side]
+        apart = np.linalg.norm((plates.pressure[side] - motion.centre)[rows, :2], axis=1)
+        if len(apart) and np.median(apart) > FAR_M:
+            raise InputError(
+                f"the {side} foot's centre of pressure lies {np.median(apart):.3g} m from the body: expected m, in the "
+                "coordinates' frame (belt_speed_mps on a treadmill)",
+                column=f"{side[0]}_copx",
+            )  # fmt: skip
+    _check_sides(motion, plates)
+
+
+def _check_sides(motion: Motion, plates: Plates) -> None:
+    """The foot that stands alone stands on its own plate."""
+    supports = plates.single_supports()
+    if not supports:
+        return
+    above = {name: "shank" if name == motion.body.stance else "hindfoot" for name in SIDES}  # links begin at the joint
+    ankles = {name: motion.poses[f"{name}_{link}"][1] for name, link in above.items()}  # towards the ground
+
+    def apart(name: str, side: str, rows: slice) -> float:
+        return float(np.sum(np.linalg.norm((ankles[name] - plates.pressure[side])[rows, :2], axis=1)))
+
+    own = sum(apart(side, side, rows) for side, rows in supports)
+    cross = sum(apart(SIDES[1 - SIDES.index(side)], side, rows) for side, rows in supports)
+    if cross < NEARER * own:
+        raise InputError("the right plate's centre of pressure lies under the left foot: the feet are exchanged")
+
+
+def carried_along(motion: Motion, plates: Plates) -> slice:
+    """The longest stretch in which the plates carry the whole body; all of the record, if it is most of it.
+
+    Over ground a walk begins and ends next to the plates, and with one plate every other step is not measured.
+
+    Raises
+    ------
+    InputError
+        No stretch is long enough.
+    """
+    size = max(1, round(MEAN_S / motion.dt))
+    needed, up = (uniform_filter1d(x[:, 2], size, mode="nearest") for x in (motion.required, plates.total))
+    share = up / np.maximum(needed, LOADED_N)
+    in_the_air = needed < LOADED_N  # where nothing is to be carried
+    carried = (share > CARRIED) & (up > LOADED_N)
+    if np.mean(carried | in_the_air) > NEARLY_ALL:
+        return slice(0, len(up))
+    fully = carried & (share > FULLY * np.median(share[carried])) if carried.any() else carried
+    longest = max(stretches(fully | in_the_air), key=lambda rows: rows.stop - rows.start, default=slice(0, 0))
+    start, stop = longest.start, longest.stop
+    if (stop - start) * motion.dt < ENOUGH_S:
+        raise InputError(
+            f"the plates carry the whole body for {(stop - start) * motion.dt:.2f} s at a time at most, "
+            f"{ENOUGH_S:g} s are needed: does a foot step next to them?",
+            column="r_Fy" if plates.loaded["right"].mean() < plates.loaded["left"].mean() else "l_Fy",
+        )
+    return longest
+
 
 MASS_SHARE = 0.01
 """Share by which the mass that a study states may differ from that of its segments."""

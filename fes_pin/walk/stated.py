@@ -19,10 +19,9 @@ from fes_pin.data.study import Study
 from fes_pin.infer.levels import POSSIBLE_SIZES, SEEN_DEVIATIONS
 from fes_pin.walk.effect import AXES
 from fes_pin.walk.likelihood import MEAN_FORCE
-from fes_pin.walk.plates import ORDINARY_N, stretches
 from fes_pin.walk.recording import MASS_SHARE, recordings_of
 from fes_pin.walk.strides import Strides, strides_of
-from fes_pin.walk.walk_trial import WalkTrial
+from fes_pin.walk.walk_trial import ORDINARY_N, WalkTrial, stretches
 
 SETTLED_S = 0.1
 """s; how far from a step the low pass no longer carries it."""

@@ -13,8 +13,7 @@ from fes_pin.infer.verdict import State, Verdict, Weighed
 from fes_pin.walk.designs import Designs
 from fes_pin.walk.effect import STAGE
 from fes_pin.walk.effects.stated_mass import StatedMass
-from fes_pin.walk.errors import StrideErrors
-from fes_pin.walk.judge import lack_of_fit, other_leg
+from fes_pin.walk.judge import StrideErrors, lack_of_fit, other_leg
 from fes_pin.walk.models import WalkFit, WalkModels, WalkSearch
 from fes_pin.walk.white_noise import white_noise
 

@@ -1,4 +1,7 @@
-"""A trial of walking: the residual of the ground reaction, and the regressors of its possible causes."""
+"""A trial of walking: the measured ground reaction of both feet, its residual, and the regressors of its causes.
+
+Forces are wrenches in our axes, low-passed like the motion.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +10,133 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.ndimage import distance_transform_edt, find_objects, label
 
-from fes_pin.walk.dynamics import Motion, about
-from fes_pin.walk.motion import Session
-from fes_pin.walk.plates import Plates
+from fes_pin.body.joints import SIDES
+from fes_pin.body.skeleton import TO_WORLD
+from fes_pin.data.smooth import low_pass
+from fes_pin.walk.motion import Motion, Session, about
+
+LOADED_N = 20.0
+"""A foot stands where its vertical force is above this: the usual threshold on instrumented treadmills."""
+ORDINARY_N = 1.5
+"""Standard deviation of the force of calibrated plates: its mean errors were 2.5 to 5 N (A. Cappello et al., Gait
+Posture 33:724, 2011)."""
+SHORTEST_S = 0.1
+"""A single support shorter than this is no step."""
+SWINGS = 0.2
+"""Share of the time that a foot which steps is in the air, at least: it swings for 0.4 of a stride (J. Perry, Gait
+Analysis, 1992). The load of one who sways by a quarter of the weight each way is within `LOADED_N` of its least for
+less than 0.16."""
+LEAST = 0.05
+"""Quantile that is taken as the least reading: a few samples may be spikes (a round figure)."""
+
+
+@dataclass(frozen=True)
+class Plates:
+    """Ground reaction of both feet, on one clock.
+
+    Attributes
+    ----------
+    time
+        (n,) s.
+    way
+        (n, 3) m: the place of the plates relative to a treadmill's belt; zeros over ground.
+    feet
+        By side, (n, 6): force, N, and moment about the world's origin, N m; x forward, y left, z up.
+    pressure
+        By side, (n, 3) m: the recorded centre of pressure; held while the plate reads nearly nothing, where it means
+        nothing.
+    loaded
+        By side, (n,) bool: the vertical force is above that of the foot in the air by `LOADED_N`.
+    """
+
+    time: np.ndarray = field(repr=False)
+    way: np.ndarray = field(repr=False)
+    feet: dict[str, np.ndarray] = field(repr=False)
+    pressure: dict[str, np.ndarray] = field(repr=False)
+    loaded: dict[str, np.ndarray] = field(repr=False)
+
+    @property
+    def total(self) -> np.ndarray:
+        """Both feet together: (n, 6)."""
+        return self.feet["left"] + self.feet["right"]
+
+    def part(self, rows: slice) -> Plates:
+        """Some of the samples."""
+        cut = ({side: values[rows] for side, values in one.items()} for one in (self.feet, self.pressure, self.loaded))
+        return Plates(self.time[rows], self.way[rows], *cut)
+
+    def single_supports(self) -> list[tuple[str, slice]]:
+        """Return single supports in the order of time: the foot and its samples."""
+        left, right = self.loaded["left"], self.loaded["right"]
+        dt = float(self.time[-1] - self.time[0]) / (len(self.time) - 1)
+        alone = (("left", left & ~right), ("right", right & ~left))
+        found = [(side, rows) for side, where in alone for rows in stretches(where)]
+        long = [(side, rows) for side, rows in found if (rows.stop - rows.start) * dt >= SHORTEST_S]
+        return sorted(long, key=lambda one: one[1].start)
+
+
+def stretches(where: np.ndarray) -> list[slice]:
+    """Return the stretches of samples in which something holds, in the order of time."""
+    return [rows for (rows,) in find_objects(label(where)[0])]
+
+
+def plates_of(
+    time: np.ndarray, columns: Mapping[str, np.ndarray], at: np.ndarray, session: Session, later_s: float = 0.0
+) -> Plates:
+    """Return the ground reaction at the motion's times; where the plates were not recorded, as at their nearest time.
+
+    Parameters
+    ----------
+    time, columns
+        (m,) s; `r_` and `l_`: `F[xyz]`, `cop[xyz]`, `T[xyz]` as `fes_pin.data.motion.read_ground_reaction` gives them.
+    at
+        (n,) s; times of the motion.
+    session
+        Low pass, which forces and moments about the origin go through, and treadmill.
+    later_s
+        How much later than their clock says the plates are read, s.
+    """
+    time, dt = time - later_s, float(time[-1] - time[0]) / (len(time) - 1)
+    feet, pressure, loaded, total = {}, {}, {}, columns["r_Fy"] + columns["l_Fy"]
+    for side in SIDES:
+        force, point, free = (
+            np.stack([columns[f"{side[0]}_{kind}{c}"] for c in "xyz"], axis=1) @ TO_WORLD.T
+            for kind in ("F", "cop", "T")
+        )
+        point = point + session.way(time)
+        wrench = np.hstack([force, np.cross(point, force) + free])
+        smooth = low_pass(wrench, dt, session.cutoff_hz)
+        feet[side] = _at(at, time, smooth)
+        level = level_in_the_air(force[:, 2], total)
+        loaded[side] = _at(at, time, force[:, 2:]).ravel() > LOADED_N + level
+        pressure[side] = _held(_at(at, time, point), loaded[side] | (2.0 * abs(level) > LOADED_N))
+    return Plates(np.asarray(at, dtype=float), session.way(at), feet, pressure, loaded)
+
+
+def level_in_the_air(up: np.ndarray, total: np.ndarray) -> float:
+    """Return the vertical force that a plate reads while its foot is in the air, N; 0 of a foot that does not step.
+
+    Parameters
+    ----------
+    up, total
+        Vertical force of this plate and of both, (n,) N. A foot that steps carries half of the mean total at least.
+    """
+    least = up < np.quantile(up, LEAST) + LOADED_N
+    level = float(np.median(up[least]))
+    return level if np.mean(least) > SWINGS and 2.0 * (np.max(up) - level) > np.mean(total) else 0.0
+
+
+def _at(at: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    return np.stack([np.interp(at, time, column) for column in values.T], axis=1)
+
+
+def _held(point: np.ndarray, loaded: np.ndarray) -> np.ndarray:
+    """Points of loaded samples; others as at the nearest loaded one in time."""
+    if not loaded.any():
+        return np.zeros_like(point)
+    return point[distance_transform_edt(~loaded, return_distances=False, return_indices=True)[0]]
 
 
 @dataclass(frozen=True)

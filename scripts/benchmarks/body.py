@@ -6,8 +6,8 @@ import time
 
 import numpy as np
 
-from fes_pin.body.attainable import attainable
 from fes_pin.body.build import Body
+from fes_pin.body.catchable import attainable
 from fes_pin.body.controllability import modal_controllability
 from fes_pin.body.gait import posture_angles, posture_names
 from fes_pin.body.inputs import Inputs

@@ -5,8 +5,8 @@ import pinocchio as pin
 import pytest
 from scipy import optimize
 
-from fes_pin.body.attainable import attainable
 from fes_pin.body.balance import balance, soles_of
+from fes_pin.body.catchable import attainable
 from fes_pin.body.ground import centre_of_pressure, ground_wrench, support
 from fes_pin.body.inputs import Inputs
 from fes_pin.body.linearize import linearize

@@ -5,9 +5,8 @@ import itertools
 import numpy as np
 import pytest
 
-from fes_pin.body.attainable import attainable
 from fes_pin.body.build import Body
-from fes_pin.body.catchable import catchable
+from fes_pin.body.catchable import attainable, catchable
 from fes_pin.body.controllability import modal_controllability
 from fes_pin.body.inputs import Inputs
 from fes_pin.body.joints import mirrored

@@ -7,9 +7,8 @@ import pinocchio as pin
 import pytest
 from scipy import integrate, linalg
 
-from fes_pin.body.attainable import attainable
 from fes_pin.body.balance import balance, place_of_weight
-from fes_pin.body.catchable import catchable, modal_bound, plans_of
+from fes_pin.body.catchable import attainable, catchable, modal_bound, plans_of
 from fes_pin.body.closed_loop import close_the_loop
 from fes_pin.body.gait import posture_names
 from fes_pin.body.ground import centre_of_pressure, ground_wrench, support

@@ -12,8 +12,7 @@ from pathlib import Path
 import pytest
 from cohort.fakes import calls, quick, studies
 
-from fes_pin.cohort.found import find_studies
-from fes_pin.cohort.run import HEADS, run_cohort
+from fes_pin.cohort.run import HEADS, find_studies, run_cohort
 from fes_pin.data.errors import InputError
 
 DEMO = Path(__file__).parents[2] / "analysis/studies/ankle_demo"

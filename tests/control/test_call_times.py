@@ -16,8 +16,7 @@ from paper_ankle.twin import RunningTwin
 from fes_pin.control.control import PositionController
 from fes_pin.control.dynamics import PULSE_S
 from fes_pin.control.faults import Status
-from fes_pin.control.limits import StimulationLimits
-from fes_pin.control.pulse import PulseWidth
+from fes_pin.control.pulse import PulseWidth, StimulationLimits
 from fes_pin.control.timing import NEAR_S, PulseClock
 from fes_pin.data.errors import InputError
 from fes_pin.muscles.recruitment import LinearRecruitment

@@ -11,12 +11,11 @@ from paper_ankle.twin import RunningTwin
 
 import fes_pin as fp
 from fes_pin.control.control import PositionController
-from fes_pin.control.dynamics import PULSE_S, AnkleDynamics
+from fes_pin.control.dynamics import PULSE_S, AnkleDynamics, JointObserver
 from fes_pin.control.faults import Status
 from fes_pin.control.given import GivenAnkle, RunningAnkle
 from fes_pin.control.loop import sine, track
 from fes_pin.control.margins import margins
-from fes_pin.control.observer import JointObserver
 from fes_pin.control.tuning import Loop, loop_at, plant, swinging, tune
 from fes_pin.data.errors import InputError
 from fes_pin.models.catalogue import shipped

@@ -14,9 +14,8 @@ from paper_ankle.twin import RunningTwin
 from fes_pin.control.control import PositionController
 from fes_pin.control.dynamics import PULSE_S
 from fes_pin.control.faults import Status
-from fes_pin.control.limits import RANGES, Limiter, StimulationLimits
 from fes_pin.control.loop import sine, track
-from fes_pin.control.pulse import PulseWidth
+from fes_pin.control.pulse import RANGES, Limiter, PulseWidth, StimulationLimits
 from fes_pin.data.errors import InputError
 from fes_pin.muscles.recruitment import LinearRecruitment
 

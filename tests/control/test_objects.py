@@ -25,12 +25,11 @@ from paper_ankle.twin import AnkleTwin, RunningTwin, record
 
 import fes_pin as fp
 from fes_pin.control.control import PositionController
-from fes_pin.control.dynamics import AnkleDynamics
+from fes_pin.control.dynamics import AnkleDynamics, JointObserver
 from fes_pin.control.endurance import Budget, muscle_budget
-from fes_pin.control.limits import StimulationLimits
 from fes_pin.control.loop import sine, track
 from fes_pin.control.margins import margins
-from fes_pin.control.observer import JointObserver
+from fes_pin.control.pulse import StimulationLimits
 from fes_pin.control.tuning import Gains, loop_at
 from fes_pin.data.errors import InputError
 from fes_pin.paper.antagonist import fit_antagonist

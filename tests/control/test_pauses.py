@@ -15,10 +15,9 @@ from paper_ankle.twin import RunningTwin, record, staircase
 
 import fes_pin as fp
 from fes_pin.control.control import RISE_PULSES, START_RAD, START_READINGS, PositionController
-from fes_pin.control.dynamics import PULSE_S, AnkleDynamics
+from fes_pin.control.dynamics import PULSE_S, AnkleDynamics, JointObserver
 from fes_pin.control.faults import Status
 from fes_pin.control.loop import track
-from fes_pin.control.observer import JointObserver
 from fes_pin.control.timing import CLOCK_PAUSE_S, PAUSE_S
 from fes_pin.data.errors import InputError
 

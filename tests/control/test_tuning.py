@@ -11,10 +11,9 @@ from paper_ankle.ratios import RatioProblem, ankle_of, least_error
 from paper_ankle.twin import RunningTwin, record, staircase
 
 from fes_pin.control.control import PositionController
-from fes_pin.control.dynamics import PULSE_S, AnkleDynamics
+from fes_pin.control.dynamics import PULSE_S, AnkleDynamics, JointObserver
 from fes_pin.control.loop import sine, track
 from fes_pin.control.margins import delay_margin, margins
-from fes_pin.control.observer import JointObserver
 from fes_pin.control.oscillation import OscillationWatch
 from fes_pin.control.tuning import LADDER, corners, loop_at, plant, swinging, tune
 from fes_pin.data.errors import InputError

@@ -5,7 +5,7 @@ import struct
 import numpy as np
 import pytest
 
-from fes_pin.data import libraries
+from fes_pin.data import errors
 from fes_pin.data.as_read import HeldFile
 from fes_pin.data.errors import InputError
 from fes_pin.data.new_study import new_study
@@ -147,7 +147,7 @@ def test_what_is_not_installed_is_said(tmp_path, monkeypatch, suffix, extra):
     def missing(module):
         raise ImportError(module)
 
-    monkeypatch.setattr(libraries.importlib, "import_module", missing)
+    monkeypatch.setattr(errors.importlib, "import_module", missing)
     with pytest.raises(InputError, match=rf"pip install 'fes-pin\[{extra}\]'"):
         read_recording(path)
 

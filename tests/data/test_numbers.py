@@ -8,7 +8,7 @@ import pytest
 
 from fes_pin.allocation.allocator import Allocator
 from fes_pin.allocation.horizon import Horizon, StrengthFatigue
-from fes_pin.control.limits import StimulationLimits
+from fes_pin.control.pulse import StimulationLimits
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import as_number, between, in_full, number, positive_number, whole
 from fes_pin.data.study_text import toml_value

@@ -8,15 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from fes_pin.models.compile import disk_cache
-from fes_pin.models.compile.disk_cache import read_cached, write_cached
+from fes_pin.models.compile.program import read_cached, say_unsafe, write_cached
 
 
 @pytest.fixture
 def folder(monkeypatch, tmp_path):
     """A cache that does not exist yet."""
     monkeypatch.setenv("FES_PIN_CACHE", str(tmp_path / "deep" / "cache"))
-    disk_cache.say_unsafe.cache_clear()
+    say_unsafe.cache_clear()
     return tmp_path / "deep" / "cache"
 
 

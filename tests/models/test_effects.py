@@ -17,7 +17,7 @@ from fes_pin.data.trial import Trial
 from fes_pin.models import effects
 from fes_pin.models.compile.equations import derive
 from fes_pin.models.compile.layout import make_layout
-from fes_pin.models.compile.virtual import VirtualProgram
+from fes_pin.models.compile.program import VirtualProgram
 from fes_pin.models.effects import EFFECTS, effect_named, effects_for
 from fes_pin.models.model import Model
 from fes_pin.models.rigs import Joint

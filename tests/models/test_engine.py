@@ -14,7 +14,7 @@ from fes_pin.data.errors import InputError
 from fes_pin.models.compile import machine, native, program
 from fes_pin.models.compile.equations import derive
 from fes_pin.models.compile.layout import WIDE, WIDTH, make_layout
-from fes_pin.models.compile.virtual import VirtualProgram
+from fes_pin.models.compile.program import VirtualProgram
 from fes_pin.models.effects.sensor_offset import SensorOffset
 from fes_pin.models.model import Model
 from fes_pin.models.simulate import Simulator, max_step, simulate, substeps

@@ -5,10 +5,10 @@ import pytest
 from view.reported import joint_study
 
 from fes_pin.models.effects import effect_named
+from fes_pin.models.free_run import TrackingEffort, can_track, measured_motion, tracking_effort
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.simulate import simulated_trial
-from fes_pin.models.tracking import TrackingEffort, can_track, measured_motion, tracking_effort
 
 A_FIFTH = 8e-4
 """Of the hidden effort; it is a thousandth of what the servo would ask for to hold the motion still."""

@@ -9,9 +9,8 @@ from yardsticks.strength import ANDERSON_2007
 from fes_pin.body.build import Body
 from fes_pin.body.linearize import linearize
 from fes_pin.data.errors import InputError
-from fes_pin.muscles.nerve_inputs import YEARS, controllability, subject_nerves, whose_strength
+from fes_pin.muscles.nerve_inputs import PEAKS_2007, YEARS, controllability, subject_nerves, whose_strength
 from fes_pin.muscles.nerves import Nerves
-from fes_pin.muscles.published import PEAKS_2007
 
 
 def test_names_stand_for_both_sides_and_scale_with_the_body():

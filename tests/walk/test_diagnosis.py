@@ -15,9 +15,9 @@ from fes_pin.cohort.one import Work, diagnose_one
 from fes_pin.data.study import read_study
 from fes_pin.view.report import report_html
 from fes_pin.walk.diagnosis import diagnose_walk
-from fes_pin.walk.extended import extended_body, with_segments
 from fes_pin.walk.likelihood import WalkNoise, fit_many
 from fes_pin.walk.motion import Session, motion_of
+from fes_pin.walk.result import extended_body, with_segments
 from fes_pin.walk.white_noise import white_level
 
 pytestmark = pytest.mark.shared

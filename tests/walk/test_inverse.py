@@ -10,8 +10,7 @@ from yardsticks.walking import joint_torques, pressure_and_free_moment, rooted_m
 from fes_pin.body.build import Body
 from fes_pin.body.skeleton import TO_WORLD
 from fes_pin.data.errors import InputError
-from fes_pin.walk.dynamics import about
-from fes_pin.walk.motion import PELVIS_TO_HIP, Session, motion_of
+from fes_pin.walk.motion import PELVIS_TO_HIP, Session, about, motion_of
 
 pytestmark = pytest.mark.shared
 CARRIERS = {"trunk": "torso", "pelvis": "pelvis", "right_thigh": "femur_r", "left_thigh": "femur_l"}

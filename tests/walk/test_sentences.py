@@ -9,7 +9,7 @@ import pytest
 
 import fes_pin as fp
 from fes_pin.infer.result import Remainder
-from fes_pin.walk.errors import StrideErrors
+from fes_pin.walk.judge import StrideErrors
 from fes_pin.walk.models import WalkFit
 from fes_pin.walk.verdict import WalkVerdict
 

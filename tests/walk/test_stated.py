@@ -7,9 +7,9 @@ import pytest
 
 import fes_pin as fp
 from fes_pin.walk.likelihood import WalkNoise, fit_many
-from fes_pin.walk.plates import LOADED_N, level_in_the_air
 from fes_pin.walk.recording import recordings_of
 from fes_pin.walk.strides import strides_of
+from fes_pin.walk.walk_trial import LOADED_N, level_in_the_air
 
 
 @pytest.fixture

@@ -18,9 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from fes_pin.data.errors import InputError
+from fes_pin.data.errors import InputError, optional_library
 from fes_pin.data.files import as_path, read_bytes
-from fes_pin.data.libraries import optional_library
 from fes_pin.data.markers import TIME, c3d_points, trc_points
 from fes_pin.data.motion import STORAGE, read_motion
 from fes_pin.data.recorded.text import TextForm, read_text_recording, without_twins

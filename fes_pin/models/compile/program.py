@@ -1,27 +1,172 @@
-"""The program of a model: compiled once for its structure, kept in memory and on disk."""
+"""The program of a model: compiled once for its structure, kept in memory and on disk.
 
+A program on CasADi's virtual machine is the oracle of the machine code, and runs where that cannot be made. Where code
+on disk cannot be used it costs time; executed is what this user alone can write.
+"""
+
+import hashlib
 import json
 import logging
+import os
+import stat
+import sys
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
+import casadi as ca
 import numpy as np
 
 from fes_pin import settings
+from fes_pin.data.errors import InputError
+from fes_pin.data.files import write_bytes
 from fes_pin.data.sources import code_hash
-from fes_pin.models.compile.disk_cache import read_cached, write_cached
 from fes_pin.models.compile.equations import Equations, derive
-from fes_pin.models.compile.layout import Layout
+from fes_pin.models.compile.layout import REST_ITERATIONS, REST_STEP, Layout
 from fes_pin.models.compile.predictor import derive_predictor
-from fes_pin.models.compile.virtual import VirtualProgram
 from fes_pin.models.model import Model
 from fes_pin.models.outside import in_one_line
 from fes_pin.models.rigs.base import Rig
 from fes_pin.models.stage import Effect
+
+_OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
+
+
+def cache_folder() -> Path:
+    """Return the folder of compiled models: `FES_PIN_CACHE`, else the user's cache folder.
+
+    Raises
+    ------
+    RuntimeError
+        The user has no home.
+    """
+    if chosen := os.environ.get("FES_PIN_CACHE"):
+        return Path(chosen)
+    usual = Path.home() / ("Library/Caches" if sys.platform == "darwin" else ".cache")
+    return Path(os.environ.get("XDG_CACHE_HOME") or usual) / "fes_pin"
+
+
+def read_cached(key: str) -> bytes | None:
+    """Return the entry of a key, or None; an entry that is damaged, or that others can write, counts as none."""
+    try:
+        with _own(cache_folder(), os.O_DIRECTORY) as folder, _own(_entry(key), os.O_NOFOLLOW, folder) as handle:
+            data = b"".join(iter(lambda: os.read(handle, 1 << 24), b""))
+    except (OSError, RuntimeError):
+        return None
+    digest, body = data[:32], data[32:]
+    return body if hashlib.sha256(body).digest() == digest else None
+
+
+def write_cached(key: str, body: bytes) -> None:
+    """Keep `body`; a cache that cannot be written, or that others can write, is no error: it is not used."""
+    try:
+        folder = cache_folder()
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        path = folder / _entry(key)
+        with _own(folder, os.O_DIRECTORY):
+            if not path.is_symlink() and (path.is_file() or not path.exists()):
+                write_bytes(path, hashlib.sha256(body).digest() + body, mode=0o600)
+    except (OSError, RuntimeError, InputError):
+        return
+
+
+def _entry(key: str) -> str:
+    return f"{hashlib.sha256(key.encode()).hexdigest()[:40]}.program"
+
+
+@contextmanager
+def _own(path: str | Path, flags: int, folder: int | None = None) -> Iterator[int]:
+    """A handle of a file or folder that this user owns and nobody else can write.
+
+    What is checked is what is open, so nothing can come between the check and the reading.
+
+    Raises
+    ------
+    OSError
+        Not there, not of the kind that the flags ask for, or others can write it.
+    """
+    handle = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK | flags, dir_fd=folder)
+    try:
+        status = os.fstat(handle)
+        if status.st_uid != os.geteuid() or status.st_mode & _OTHERS_WRITE:
+            say_unsafe(f"{path} in the cache" if folder is not None else str(path))
+            raise PermissionError(f"others can write {path}")
+        yield handle
+    finally:
+        os.close(handle)
+
+
+@cache
+def say_unsafe(place: str) -> None:
+    """A warning, once for each place."""
+    _LOG.warning("compiled models are not read from %s: it is not this user's alone to write", place)
+
+
+class VirtualProgram:
+    """The same equations and time loop as the machine code, interpreted lane by lane."""
+
+    def __init__(self, equations: Equations) -> None:
+        self.layout, self.equations = equations.layout, equations
+        self._trajectory = cache(lambda n, substeps: self._sample(substeps).mapaccum("trajectory", n, 2))
+
+    def run(
+        self, inputs: np.ndarray, values: np.ndarray, constants: np.ndarray, guess: np.ndarray, substeps: int
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Simulate all lanes; see `Program`."""
+        width, n, lead, channels = self.layout.width, inputs.shape[0], self.layout.reported, self.layout.channels
+        out = np.empty((n, self.equations.sizes.reading, width))
+        for lane in range(width):
+            p, c = values[:, lane], constants[:, lane]
+            state, memory = self.equations.functions["start"](self._rest(float(guess[lane]), p, c), p, c)
+            trajectory = self._trajectory(n, substeps)
+            times = self._times(c, n)
+            ended = trajectory(state, memory, inputs[:, :, lane].T, times, ca.repmat(p, 1, n), ca.repmat(c, 1, n))
+            out[:, :, lane] = np.array(ended[2]).T
+        return out[:, :lead], out[:, lead:].reshape(n, channels, len(self.layout.columns), width)
+
+    def _times(self, constants: np.ndarray, n: int) -> np.ndarray:
+        """Time of every sample, shape (1, n)."""
+        names = self.layout.constants
+        return (constants[names.index("t0")] + np.arange(n) * constants[names.index("dt")])[None, :]
+
+    def _rest(self, z: float, p: np.ndarray, c: np.ndarray) -> float:
+        for _ in range(REST_ITERATIONS):
+            g, slope = self.equations.functions["rest"](z, p, c)
+            with np.errstate(all="ignore"):
+                z -= float(np.clip(np.float64(g) / np.float64(slope), -REST_STEP, REST_STEP))
+        return z
+
+    def _sample(self, substeps: int) -> ca.Function:
+        """From one sample to the next, by classical Runge-Kutta steps of order four."""
+        e, layout, f = self.equations, self.layout, self.equations.functions
+        names = ("state", "memory", "u", "t", "p", "c")
+        sizes = (e.sizes.state, e.sizes.memory, len(layout.inputs), 1, len(layout.values), len(layout.constants))
+        state, memory, u, t, p, c = given = [ca.MX.sym(n, k) for n, k in zip(names, sizes, strict=True)]
+        held = f["sample"](state, memory, u, t, p, c)
+        if "correct" in f:
+            state, y = f["correct"](state, held, u, t, p, c)
+        else:
+            y = f["output"](state, held, u, t, p, c)
+        h = c[layout.constants.index("step")]
+        for j in range(substeps):
+
+            def rates(x: Any, at: float, since: Any = j * h, begun: Any = (state,) if "follow" in f else ()) -> Any:
+                return f["rates"](x, *begun, held, u, t, since, at * h, p, c)
+
+            begun = state[: e.sizes.integrated]
+            first = rates(begun, 0.0)
+            second = rates(begun + 0.5 * h * first, 0.5)
+            third = rates(begun + 0.5 * h * second, 0.5)
+            fourth = rates(begun + h * third, 1.0)
+            end = begun + h / 6.0 * (first + 2.0 * second + 2.0 * third + fourth)
+            state = f["follow"](state, end, held, u, t, j * h, 0.5 * h, p, c) if "follow" in f else end
+        return ca.Function("sample", given, [state, held, y])
+
 
 _LOG = logging.getLogger("fes_pin")
 

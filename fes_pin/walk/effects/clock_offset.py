@@ -4,8 +4,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from fes_pin.walk.dynamics import about
 from fes_pin.walk.effect import Form, WalkEffect
+from fes_pin.walk.motion import about
 from fes_pin.walk.walk_trial import WalkTrial
 
 

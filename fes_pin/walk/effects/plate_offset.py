@@ -7,8 +7,7 @@ import numpy as np
 
 from fes_pin.body.joints import SIDES
 from fes_pin.walk.effect import AXES, PLATES, Form, WalkEffect
-from fes_pin.walk.plates import ORDINARY_N
-from fes_pin.walk.walk_trial import WalkTrial
+from fes_pin.walk.walk_trial import ORDINARY_N, WalkTrial
 
 ORDINARY_M = 0.004
 """Standard deviation of the centre of pressure of calibrated plates: its errors were 0.6 to 2.3 mm after and 2 to 14 mm
