@@ -143,9 +143,10 @@ class Gain:
         """Whether the low end of its interval is above `NOTHING_PERCENT`, or most of what other causes leave is.
 
         Next to a large cause a smaller one removes little of the nominal error, but perhaps most of what remains. Of
-        data that were fitted, it may remove most of a negligible error by chance.
+        data that were fitted, a flexible form may remove most of a negligible remainder.
         """
-        return self.low > NOTHING_PERCENT or (self.is_held_out and self.given > MOST_PERCENT)
+        is_felt = self.is_held_out or self.percent > NOTHING_PERCENT
+        return self.low > NOTHING_PERCENT or (is_felt and self.given > MOST_PERCENT)
 
     @property
     def is_held_out(self) -> bool:
