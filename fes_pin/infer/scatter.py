@@ -18,7 +18,7 @@ import numpy as np
 
 from fes_pin.infer.covariance import covariance_of, scattered, widened
 from fes_pin.infer.distributions import chi2_quantile, normal_quantile
-from fes_pin.infer.levels import CLAIM_LEVEL, SEPARABLE, SURE, UNUSUAL_LEVEL
+from fes_pin.infer.levels import CLAIM_LEVEL, SEPARABLE, SURE, UNFELT, UNUSUAL_LEVEL
 from fes_pin.infer.optimum import Optimum
 from fes_pin.infer.problem import Linearized, normal_equations
 from fes_pin.infer.projection import without_locals
@@ -151,8 +151,11 @@ def at_rest(parts: Sequence[Linearized]) -> list[Linearized]:
     """Return the trials of a fit with sensitivities made orthogonal to the residual as a whole.
 
     A slope at an optimum from which no step gains is roughness of the cost, as by friction that jumps. It carries no
-    information on a parameter.
+    information on a parameter. Trials in which a parameter is not felt have no part in its slope.
     """
-    power = sum(float(p.residual @ p.residual) for p in parts)
-    along = sum(p.residual @ p.jacobian for p in parts) / max(power, 1e-300)
-    return [replace(p, jacobian=p.jacobian - np.outer(p.residual, along)) for p in parts]
+    power = np.array([float(p.residual @ p.residual) for p in parts])
+    squares = np.array([np.sum(np.square(p.jacobian), axis=0) for p in parts])
+    felt = squares >= UNFELT * squares.max(axis=0)
+    along = sum(p.residual @ p.jacobian for p in parts) / np.maximum(power @ felt, 1e-300)
+    each = zip(parts, felt, strict=True)
+    return [replace(p, jacobian=p.jacobian - np.outer(p.residual, along * own)) for p, own in each]

@@ -12,8 +12,10 @@ FOUND = {
     23: {"quadratic_damping"},  # the same, without noise
     63: {"quadratic_damping"},
     64: {"coulomb_friction"},  # one swing, read in counts; then the joint rests, which identifies nothing
+    45: {"threshold_shift", "coulomb_friction"},  # first fits end where the ankle has no inertia
     98: {"sensor_offset", "second_order_activation", "electromechanical_delay"},  # twitches on a resting force
     322: {"sensor_offset", "second_order_activation"},  # without noise: a lag of the sensor does the same
+    9088: {"passive_relaxation"},  # one swing: half of it would begin with a stretch that no reading shows
 }
 """What is hidden in a study, by its number."""
 NULLS = (21, 28, 327)

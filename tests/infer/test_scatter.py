@@ -11,6 +11,7 @@ from fes_pin.infer.problem import Linearized
 from fes_pin.infer.scatter import (
     as_wide_as_estimates_differ,
     as_wide_as_trials_differ,
+    at_rest,
     excess_scatter,
     with_honest_intervals,
 )
@@ -187,3 +188,14 @@ def test_a_parameter_that_the_other_estimate_has_not_keeps_its_interval():
     one = level(np.random.default_rng(0).normal(size=400), np.ones(400))
     other = replace(one, values={"level": 9.0}, free=("another",))
     assert as_wide_as_estimates_differ(one, other).covariance == one.covariance
+
+
+def test_a_trial_in_which_a_parameter_does_not_act_has_no_part_in_its_slope():
+    """A stop that one trial of three reaches: the others, with its slope, would gain all their squares by a step."""
+    rng = np.random.default_rng(0)
+    parts = [Linearized(rng.normal(size=50), rng.normal(size=(50, 2)), np.empty((50, 0))) for _ in range(3)]
+    for part in parts[1:]:
+        part.jacobian[:, 1] = 0.0
+    rested = at_rest(parts)
+    assert np.allclose(sum(p.residual @ p.jacobian for p in rested), 0.0)
+    assert all(not p.jacobian[:, 1].any() for p in rested[1:])

@@ -26,6 +26,8 @@ from fes_pin.infer.covariance import least_squares_step
 from fes_pin.infer.fits import Names
 from fes_pin.infer.levels import PARAMETER_PENALTY
 from fes_pin.infer.problem import normal_equations
+from fes_pin.infer.scatter import at_rest
+from fes_pin.infer.scoring import LITTLE
 
 
 @dataclass(frozen=True)
@@ -90,7 +92,8 @@ def _step(trials: Sequence[_Trial]) -> tuple[np.ndarray, np.ndarray, np.ndarray]
 def _by_trial(fitted: LikelihoodFit) -> list[_Trial]:
     """Return each trial's part, of the parameters that are not at a bound."""
     moving = [k for k, n in enumerate(fitted.free) if n not in fitted.at_bound]
-    each = [(p, normal_equations([p])) for p in fitted.parts]
+    has_ended = fitted.together and fitted.gradient_norm < LITTLE
+    each = [(p, normal_equations([p])) for p in (at_rest(fitted.parts) if has_ended else fitted.parts)]
     return [
         _Trial(
             len(p.residual),
