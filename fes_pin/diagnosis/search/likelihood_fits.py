@@ -285,22 +285,24 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
                 self.fits[names] = self._from_least_squares(self.least_squares.fits[names])
         return best
 
-    def approach(self) -> Names:
-        """Return the smallest set whose E is negligible, or the nearest set of at most `MOST_CAUSES`.
+    def approach(self, least: float = NOTHING_PERCENT) -> Names:
+        """Return the smallest set whose E is no more than the least, or the nearest set of at most `MOST_CAUSES`.
 
-        Forms of the nearest sets of several causes are refined before a further cause is tried.
+        Each further cause lessens E by a tenth, or an E that is negligible by half. Forms of the nearest sets of several
+        causes are refined before a further cause is tried.
         """
         best: Names = ()
         fits = self.fits
         self.nominal()
-        while self.misfit(fits[best]) > NOTHING_PERCENT and len(best) < MOST_CAUSES:
+        while (now := self.misfit(fits[best])) > least and len(best) < MOST_CAUSES:
+            most = now / MORE if now < NOTHING_PERCENT else (1.0 - SMALL_SHARE) * now
             for k, names in enumerate(self._nearest(len(best))):
                 self.extend(names, FITTED if k else None)
             larger = self._nearest(len(best) + 1)
             if best and larger and self.is_far(fits[larger[0]]):
                 in_parallel(self._refine, larger)
                 larger.sort(key=lambda n: self.misfit(fits[n]))
-            if not larger or self.misfit(fits[larger[0]]) > (1.0 - SMALL_SHARE) * self.misfit(fits[best]):
+            if not larger or self.misfit(fits[larger[0]]) > most:
                 break
             best = larger[0]
         if best:
