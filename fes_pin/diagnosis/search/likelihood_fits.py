@@ -288,8 +288,8 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
     def approach(self, least: float = NOTHING_PERCENT) -> Names:
         """Return the smallest set whose E is no more than the least, or the nearest set of at most `MOST_CAUSES`.
 
-        Each further cause lessens E by a tenth, or an E that is negligible by half. Forms of the nearest sets of several
-        causes are refined before a further cause is tried.
+        Each further cause lessens E by a tenth, or an E that is negligible by half. Forms of the nearest sets of
+        several causes are refined before a further cause is tried.
         """
         best: Names = ()
         fits = self.fits
