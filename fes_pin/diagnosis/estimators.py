@@ -48,7 +48,7 @@ def least_error(search: LikelihoodSearch) -> tuple[LikelihoodSearch, Found] | No
     Where a model is wrong, a likelihood with process noise or autoregressive measurement noise takes its error for
     noise. Least squares give the model that predicts best from the inputs alone (Ljung, System Identification,
     2nd ed., section 8.3). Causes are chosen by their predictions of trials left out. Where there are too few trials,
-    they are those that bring a model near the data.
+    they are those that bring a model near the data; where process noise acts, negligible errors are random.
     """
     if search.models.answered or search.was_stopped:
         return None
@@ -56,7 +56,7 @@ def least_error(search: LikelihoodSearch) -> tuple[LikelihoodSearch, Found] | No
 
     def chosen() -> Found:
         if len(search.models.trials) < FEWEST:
-            return other.result(other.models.approach(0.0))
+            return other.result(other.models.approach(0.0 if search.models.noise == MEASUREMENT else NOTHING_PERCENT))
         return other.result(best_predicting(other, other.run().best.names))
 
     return _ended(other, attempted(chosen, None, search.seconds_left))
