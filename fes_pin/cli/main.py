@@ -1,4 +1,4 @@
-"""The command line: `fes-pin new-study | check | diagnose | contrast | compare | predict | effects | ...`."""
+"""The command line: `fes-pin new-study | check | diagnose | predict | effects | ...`."""
 
 from pathlib import Path
 from typing import Annotated
@@ -8,93 +8,16 @@ import typer
 from fes_pin.cli.allocate import allocate
 from fes_pin.cli.body import app as body
 from fes_pin.cli.cohort import cohort
+from fes_pin.cli.compare import compare
+from fes_pin.cli.contrast import contrast
 from fes_pin.cli.datasets import datasets
-from fes_pin.cli.group import App, needs, python_names
+from fes_pin.cli.group import App
 from fes_pin.cli.options import Exclude, Force, Libraries, Limit, Seed, Trials, output, study_of
+from fes_pin.cli.out import pulses, urdf
 from fes_pin.cli.own import check, new_study
-from fes_pin.cli.predict import predict, pulses, urdf
+from fes_pin.cli.predict import predict
 from fes_pin.cli.progress import catalogue_with, print_result, progress, say_whose_code
 from fes_pin.data.errors import InputError
-from fes_pin.data.outputs import Outputs
-
-FILE = "compare.json"
-
-
-@python_names(horizon_s="--horizon", given_s="--given", library="--library")
-def compare(
-    study: Annotated[Path, typer.Argument(help="Folder of a study of a muscle or an ankle, or its study.toml.")],
-    models: Annotated[
-        str | None, typer.Option(help="Names with commas between them: nominal,ding2003,hill ... [default: all]")
-    ] = None,
-    model: Annotated[
-        list[Path] | None, typer.Option("--model", help="model.toml of a diagnosis, too; may be repeated.")
-    ] = None,
-    horizon: Annotated[
-        float | None, typer.Option(metavar="SECONDS", help="How far ahead. [default: as a diagnosis looks]")
-    ] = None,
-    given: Annotated[
-        float | None, typer.Option(metavar="SECONDS", help="Also predict each trial from its first seconds.")
-    ] = None,
-    out: Annotated[Path | None, output("Folder for compare.json.")] = None,
-    trials: Trials = None,
-    exclude: Exclude = None,
-    library: Libraries = None,
-    force: Force = False,
-) -> None:
-    """Rank models from the literature by their errors on whole trials left out."""
-    from fes_pin.comparison.compare import compare as find
-
-    catalogue = catalogue_with(library)
-    measured = study_of(study, catalogue, trials, exclude)
-    outputs = Outputs("compare", force)
-    if out is not None:
-        outputs.check(out, (FILE,))  # what cannot be read or written is said before any work
-    names = None if models is None else [n.strip() for n in models.split(",") if n.strip()]
-    own = {str(path): path for path in model or ()}
-    with progress() as tell:
-        found = find(measured, names, extended=own, horizon_s=horizon, given_s=given, library=catalogue, progress=tell)
-    if out is not None:
-        outputs.write(out, {FILE: found.to_json()})
-    say_whose_code(catalogue)
-    print_result(found)
-
-
-@needs(by="not after", trials="not after", exclude="not after")
-def contrast(
-    study: Annotated[Path, typer.Argument(help="Folder of a study whose trials have groups, or of what was before.")],
-    out: Annotated[Path, output("Folder for contrast.json and report.html.")],
-    after: Annotated[Path | None, typer.Argument(help="A study of the same rig: what is now.")] = None,
-    by: Annotated[
-        str | None, typer.Option(help="group, or a condition that every trial states. [default: group]")
-    ] = None,
-    groups: Annotated[str | None, typer.Option(help="Which groups, with commas between them.")] = None,
-    seed: Seed = 0,
-    limit: Limit = None,
-    trials: Trials = None,
-    exclude: Exclude = None,
-    library: Libraries = None,
-    force: Force = False,
-) -> None:
-    """Say what differs between groups of trials, by how much, and what did not change."""
-    from fes_pin.contrasts.contrast import contrast as find
-    from fes_pin.data.provenance import this_command
-    from fes_pin.view.report import answer_files
-
-    catalogue = catalogue_with(library)
-    before = study_of(study, catalogue, trials, exclude)
-    now = None if after is None else study_of(after, catalogue)
-    outputs = Outputs("contrast", force)
-    outputs.check(out, ("contrast.json", "report.html"))  # what cannot be read or written is said before any work
-    wanted = [g.strip() for g in groups.split(",") if g.strip()] if groups is not None else None
-    with progress() as tell:
-        found = find(
-            before, now, by=by or "group", groups=wanted, library=catalogue, seed=seed, limit=limit, progress=tell
-        )
-    outputs.write(out, answer_files(found.by_command(this_command())))
-    say_whose_code(catalogue)
-    print_result(found)
-    typer.echo(f"report: {out / 'report.html'}")
-
 
 app = App(pretty_exceptions_enable=False)
 app.add_typer(body, name="body")
@@ -140,6 +63,7 @@ def diagnose(
     force: Force = False,
 ) -> None:
     """Show what the study's model gets wrong, name the cause, extend the model, measure the gain."""
+    from fes_pin.data.outputs import Outputs
     from fes_pin.data.provenance import this_command
     from fes_pin.data.results import NEXT_FILE
     from fes_pin.data.table import SUFFIXES, check_table, table_bytes

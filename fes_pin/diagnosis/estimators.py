@@ -6,6 +6,7 @@ from fes_pin.diagnosis.decide.rivals import not_excluded
 from fes_pin.diagnosis.errors_ahead import squared_errors
 from fes_pin.diagnosis.search.likelihood_fits import MEASUREMENT, PROCESS
 from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodModels, LikelihoodSearch
+from fes_pin.identify.afar import is_rounding
 from fes_pin.identify.likelihood_fit import LikelihoodFit, with_white_process_noise
 from fes_pin.identify.process_noise import step_s
 from fes_pin.infer.held_out import held_out_gain
@@ -23,10 +24,11 @@ def searched(search: LikelihoodSearch) -> tuple[LikelihoodSearch, Found]:
     """Run a search and return it with its result: without process noise first where the rig is not in closed loop.
 
     Without process noise every prediction is a free simulation, which takes a third of the time. The search is made
-    again with process noise only if that improves the penalised likelihood of the best set.
+    again with process noise only if that improves the penalised likelihood of the best set. Errors of rounding are no
+    process noise.
     """
     found = search.run()
-    if search.was_stopped or search.models.noise != MEASUREMENT:
+    if search.was_stopped or search.models.noise != MEASUREMENT or is_rounding(found.best):
         return search, found
     acting = attempted(lambda: search.models.with_process_noise(found.best), found.best, search.seconds_left)
     if not acting.criterion < found.best.criterion:
@@ -56,7 +58,8 @@ def least_error(search: LikelihoodSearch) -> tuple[LikelihoodSearch, Found] | No
 
     def chosen() -> Found:
         if len(search.models.trials) < FEWEST:
-            return other.result(other.models.approach(0.0 if search.models.noise == MEASUREMENT else NOTHING_PERCENT))
+            is_calm = search.models.noise == MEASUREMENT
+            return other.result(other.models.approach(0.0 if is_calm else NOTHING_PERCENT))
         return other.result(best_predicting(other, other.run().best.names))
 
     return _ended(other, attempted(chosen, None, search.seconds_left))

@@ -95,3 +95,11 @@ def test_what_all_trials_promise_together_and_no_step_has_kept_counts_for_no_fol
     for held in folds_of(offset.trials):
         same = gained(as_likely(offset, noise), held)
         assert gained(as_likely(free, noise), held) == pytest.approx(same, abs=1e-3)
+
+
+def test_a_pair_is_chosen_of_which_neither_cause_is_significant_alone(fits):
+    """A tilt and dry friction of a swing: the errors that either leaves are those of a model that is far away."""
+    nominal, friction, pair = fits[()], fits["coulomb_friction",], ("coulomb_friction", "effort_offset")
+    alone = {(n,): nominal for n in pair}
+    again = ChosenAgain({(): nominal, **alone, pair: friction}, lambda larger, smaller, gain, explained: gain > 1.0)
+    assert again.without([0]) is friction

@@ -42,6 +42,11 @@ def test_what_is_stated_of_the_start_is_said_of_the_first_part_alone():
     assert all(t.conditions == {"load_kg": 2.0} for t in others)
 
 
+def test_a_trial_that_no_controller_answers_is_not_cut():
+    whole = trial(20.0)
+    assert in_parts(RIGS["joint"], [whole], answered=False) == [whole]
+
+
 def test_a_rig_that_begins_at_rest_is_not_cut():
     whole = trial(20.0, kind="isometric")
     assert in_parts(RIGS["muscle"], [whole]) == [whole]

@@ -251,3 +251,9 @@ def test_a_contact_stretches_by_little_of_the_motion():
     assert effects.CoulombFriction().limits(moved)["stretch"] == (0.0, pytest.approx(0.05))
     assert max(effects.CoulombFriction.grids(moved)["stretch"]) < 0.05
     assert "stretch" not in effects.CoulombFriction().limits({"time": moved["time"]})
+
+
+def test_a_threshold_may_shift_by_the_widest_pulse():
+    """A shift of 417 us was hidden where 400 us were the bound."""
+    assert effects.ThresholdShift().limits({"pulse_width_us": np.array([0.0, 957.0])}) == {"shift_us": (-957.0, 957.0)}
+    assert effects.ThresholdShift().limits({"time": np.zeros(2)}) == {}

@@ -12,7 +12,7 @@ from fes_pin.data.templates import pendulum, rod, slide
 from fes_pin.models.effects import CoulombFriction, SensorOffset
 from fes_pin.models.model import Model
 from fes_pin.models.rigs.joint import joint_model
-from fes_pin.models.store import extended_urdf
+from fes_pin.models.urdf_out import extended_urdf
 
 TURNED = """<robot name="r"><link name="base"/>
   <link name="arm"><inertial><origin xyz="0.05 0.02 -0.2" rpy="0.3 -0.5 0.9"/><mass value="0.7"/>

@@ -15,7 +15,7 @@ from fes_pin.diagnosis.search.likelihood_maxima import less, likeliest, look, ma
 from fes_pin.diagnosis.search.possible import is_possible
 from fes_pin.diagnosis.search.score import Scored, best_by_effect
 from fes_pin.diagnosis.search.starts import STARTED, STARTS, at_null, from_afar, refinements, started
-from fes_pin.identify.afar import at_a_bound, followed, following, freed, is_rounding, misfit_percent, with_beliefs
+from fes_pin.identify.afar import at_a_bound, followed, following, freed, misfit_percent, with_beliefs
 from fes_pin.identify.ahead import default_horizon
 from fes_pin.identify.correlation_time import with_new_noise
 from fes_pin.identify.likelihood import LikelihoodProblem
@@ -154,9 +154,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         calm = self.calm.get(()) or maximum_from_afar(self.model, self.trials, none)
         calm = calm if self.noise == WHITE or () in self.calm else self._coloured(calm)
         self._calm = calm.noise
-        if self.noise != PROCESS or is_rounding(calm):
-            return calm
-        return min(calm, self.with_process_noise(calm), key=lambda f: f.criterion)
+        return min(calm, self.with_process_noise(calm), key=lambda f: f.criterion) if self.noise == PROCESS else calm
 
     def with_process_noise(self, calm: LikelihoodFit) -> LikelihoodFit:
         """Return a fit without process noise again with it, from the likeliest of several sizes of process noise."""
