@@ -17,14 +17,12 @@ from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
 from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodSearch
 from fes_pin.diagnosis.verdict import RigState, RigVerdict
-from fes_pin.identify.afar import misfit_percent
 from fes_pin.identify.correlation_time import words_of_reading
 from fes_pin.identify.fit import rough_noise
 from fes_pin.identify.likelihood import is_simulated
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.result import CROSS_VALIDATED, FITTED, HELD_OUT, STOPPED, Cause, Remainder
 from fes_pin.infer.scatter import as_wide_as_estimates_differ, as_wide_as_trials_differ, with_honest_intervals
-from fes_pin.infer.text import percent
 from fes_pin.infer.verdict import share_in, word_of
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
@@ -82,8 +80,8 @@ def diagnosis_of(
 
 def _words_of_far(models: LikelihoodFits, nominal: LikelihoodFit) -> list[str]:
     """Return a warning where the nominal model does not follow the data."""
-    far = f"the nominal model does not follow the data (E {percent(misfit_percent(nominal))})"
-    return [f"{far}: causes were fitted from least squares"] if models.is_far(nominal) else []
+    far = "the nominal model does not follow the data: causes were fitted from least squares"
+    return [far] if models.is_far(nominal) else []
 
 
 def unfitted(study: Study, nominal: LikelihoodFit, reason: str, test: Sequence[Trial]) -> Diagnosis:
