@@ -161,11 +161,10 @@ def _screen(whole: Fit, wanted: Sequence[Pick], sizes: Mapping[str, float]) -> l
     projection = Projection(white.parts)
 
     def score(pick: Pick, near: _Near) -> float:
-        columns = np.zeros((len(projection.residual), 1))
-        columns[projection.trials[pick[0]], 0] = near.column
-        left = projection(columns)[:, 0]
-        power, before = float(left @ left), float(np.sum(columns**2))
-        return float(left @ projection.residual) ** 2 / power if power > 1e-9 * max(before, 1e-300) else 0.0
+        left, shared = (own[:, 0] for own in projection.within(pick[0], near.column[:, None]))
+        power, before = float(left @ left - shared @ shared), float(near.column @ near.column)
+        along = float(left @ projection.residual[projection.trials[pick[0]]])
+        return along**2 / power if power > 1e-9 * max(before, 1e-300) else 0.0
 
     near = _near(white, [(white.trials[i], name) for i, name in wanted], sizes)
     scores = [score(*one) for one in zip(wanted, near, strict=True)]

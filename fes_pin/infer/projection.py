@@ -76,6 +76,15 @@ class Projection:
         partly = self._without_locals(columns)
         return np.asarray(partly - self.shared @ (self.shared.T @ partly))
 
+    def within(self, k: int, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return columns that are zero outside trial k, of shape (m_k, any), with the trial's unknowns projected off.
+
+        The second array holds their inner products with the basis that all trials share, shape (rank, any).
+        """
+        own = self._own[k]
+        left = columns - own @ (own.T @ columns)
+        return left, self.shared[self.trials[k]].T @ left
+
     def taken(self, rows: np.ndarray) -> list[np.ndarray]:
         """Return the orthonormal vectors, cut to rows of one trial, that are projected off columns of that trial."""
         own = [
@@ -96,12 +105,10 @@ class Projection:
     def _partly(self, columns: Sequence[np.ndarray], k: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return one trial's part of all columns with its own unknowns projected off, its squared norm before, and its
         part of the inner products with the basis that all trials share."""
-        rows, own = self.trials[k], self._own[k]
-        joined = np.concatenate([c[rows] for c in columns], axis=1)
+        joined = np.concatenate([c[self.trials[k]] for c in columns], axis=1)
         joined[~(np.abs(joined) < LARGEST)] = 0.0
-        before = np.einsum("mi,mi->i", joined, joined)
-        joined -= own @ (own.T @ joined)
-        return joined, before, self.shared[rows].T @ joined
+        left, shared = self.within(k, joined)
+        return left, np.einsum("mi,mi->i", joined, joined), shared
 
     def _left(self, partly: np.ndarray, shared: np.ndarray, k: int) -> tuple[np.ndarray, np.ndarray]:
         """Return one trial's part of the Gram matrix of projected columns, and of their products with the residual."""

@@ -36,20 +36,28 @@ def slip_p_value(fitted: Fit, projection: Projection) -> float:
     measured = np.clip(projection.residual, -CLIP, CLIP)
     noise = projection(np.random.default_rng(0).standard_normal((len(measured), DRAWS)))
     vectors = np.column_stack([measured, noise])
-    found = [_one(np.array([_largest(one, projection, vectors) for one in group])) for group in channels(fitted)]
+    shared = projection.shared.T @ vectors
+    found = [_one(np.array([_largest(e, projection, vectors, shared) for e in group])) for group in channels(fitted)]
     return min(1.0, len(found) * min(found))
 
 
-def _largest(one: Innovations, projection: Projection, vectors: np.ndarray) -> np.ndarray:
-    """Return the largest z_t^2 of one trial along each of some vectors, shape (k,)."""
-    count = len(one.trial)
-    columns = np.zeros((len(vectors), TIMES))
+def _largest(one: Innovations, projection: Projection, vectors: np.ndarray, shared: np.ndarray) -> np.ndarray:
+    """Return the largest z_t^2 of one trial along each of some vectors, shape (k,).
+
+    Parameters
+    ----------
+    shared
+        Inner products of the vectors with the basis that all trials share.
+    """
+    count, rows = len(one.trial), projection.trials[one.number]
+    columns = np.zeros((rows.stop - rows.start, TIMES))
     at = count * np.linspace(TRIM, 1.0 - TRIM, TIMES)
-    columns[one.rows] = one.whitened((np.arange(count)[:, None] >= at).astype(float))
-    left = projection(columns)
-    norms = np.linalg.norm(left, axis=0)
-    felt = norms > IDENTIFIABLE_SHARE * np.linalg.norm(columns, axis=0)
-    return np.asarray(np.max(((left[:, felt] / norms[felt]).T @ vectors) ** 2, axis=0, initial=0.0))
+    columns[one.rows - rows.start] = one.whitened((np.arange(count)[:, None] >= at).astype(float))
+    left, along = projection.within(one.number, columns)
+    squares = np.einsum("mt,mt->t", left, left) - np.einsum("rt,rt->t", along, along)
+    felt = squares > IDENTIFIABLE_SHARE**2 * np.einsum("mt,mt->t", columns, columns)
+    z = left[:, felt].T @ vectors[rows] - along[:, felt].T @ shared
+    return np.asarray(np.max(z**2 / squares[felt, None], axis=0, initial=0.0))
 
 
 def _one(largest: np.ndarray) -> float:
