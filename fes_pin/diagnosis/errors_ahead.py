@@ -14,6 +14,7 @@ from fes_pin.identify.process_noise import driving_size, first_guess
 from fes_pin.infer.held_out import FOLDS, Errors
 from fes_pin.infer.levels import AVERAGED_S, SMALL_SHARE
 from fes_pin.infer.noise import NoiseModel
+from fes_pin.infer.problem import Unknowns
 from fes_pin.infer.result import shown
 from fes_pin.models.autoregression import weights_ahead
 from fes_pin.models.model import Model
@@ -120,14 +121,16 @@ def squared_errors(pairs: Pairs, ahead_s: float | None) -> Errors:
         trials, each is divided into tenths.
     """
     if ahead_s is None:
-        each = [free_errors(f.model, trials, noise_that_is_small(floor)) for f, floor, trials in pairs]
+        each = [free_errors(f.model, trials, noise_that_is_small(floor), f) for f, floor, trials in pairs]
         return Errors(*np.concatenate([[e.squares, e.spread, e.noise] for e in each], axis=1))
     work = [(fitted, floor, trial) for fitted, floor, trials in pairs for trial in trials]
     found = in_parallel(lambda w: _squares(*w, ahead_s), work)
     return Errors(*np.concatenate(found, axis=1))
 
 
-def free_errors(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> Errors:
+def free_errors(
+    model: Model, trials: Sequence[Trial], noise: NoiseModel, fitted: LikelihoodFit | None = None
+) -> Errors:
     """Return squared errors of a model that is simulated from the inputs of each trial alone, by trials.
 
     Where there are few trials, each is divided into tenths. Amplitudes of a trial's own are estimated from other parts
@@ -137,15 +140,24 @@ def free_errors(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> Err
     ----------
     noise
         Its variances are the unit, by output column.
+    fitted
+        The fit of the model: its own trials are simulated from their fitted initial states.
     """
     pieces = 1 if len(trials) >= FOLDS else TENTHS
-    found = in_parallel(lambda t: _free_squares(model, t, noise, pieces), trials)
+    found = in_parallel(lambda t: _free_squares(model, t, noise, pieces, _known(fitted, t)), trials)
     return Errors(*np.concatenate(found, axis=1))
 
 
-def _free_squares(model: Model, trial: Trial, noise: NoiseModel, pieces: int) -> np.ndarray:
+def _known(fitted: LikelihoodFit | None, trial: Trial) -> Unknowns | None:
+    """Return the unknowns of a trial that was fitted by free simulation; none of another."""
+    if fitted is None or not is_simulated(fitted.noise, [trial]):
+        return None
+    return [dict(u) for t, u in zip(fitted.trials, fitted.unknowns, strict=True) if t is trial] or None
+
+
+def _free_squares(model: Model, trial: Trial, noise: NoiseModel, pieces: int, known: Unknowns | None) -> np.ndarray:
     """Return squared errors, spread and number of readings of a free simulation of a trial, shape (3, pieces)."""
-    missed = free_residuals(model, trial, noise)
+    missed = free_residuals(model, trial, noise, known)
     lines = sum((_lines(trial[n], m, noise[n].std ** 2) for n, m in missed.items()), np.zeros((3, len(trial))))
     return np.array([p.sum(axis=1) for p in np.array_split(lines, pieces, axis=1)]).T
 
@@ -202,9 +214,13 @@ def _predict(fitted: LikelihoodFit, trial: Trial, horizon_s: float) -> _Predicte
     return {n: one.values for n, one in predicted.items()}, noise
 
 
+def _left(fitted: LikelihoodFit, trial: Trial) -> dict[str, np.ndarray]:
+    return free_residuals(fitted.model, trial, fitted.noise, _known(fitted, trial))
+
+
 def _predict_freely(fitted: LikelihoodFit, trial: Trial, horizon_s: float) -> _Predicted:
     """Return the same without process noise: a free simulation plus the prediction of autoregressive noise."""
-    predicted, variances = free_ahead(fitted.model, trial, fitted.noise, horizon_s), {}
+    predicted, variances = free_ahead(fitted.model, trial, fitted.noise, horizon_s, _known(fitted, trial)), {}
     steps = max(1, round(horizon_s / trial.dt))
     for name in predicted:
         noise = fitted.noise[name]
@@ -252,7 +268,7 @@ def _sums(fitted: LikelihoodFit, floor: LikelihoodFit, trial: Trial, horizon_s: 
     name = fitted.model.rig.output(trial.kind)
     measured, (predicted, noise) = trial[name], _predicted(fitted, trial, horizon_s)
     none = not (simulated := is_simulated(fitted.noise, [trial])) and falling
-    free = np.full(len(trial), np.nan) if none else free_residuals(fitted.model, trial, fitted.noise)[name]
+    free = np.full(len(trial), np.nan) if none else _left(fitted, trial)[name]
     if simulated:
         next_one = free - forecast(np.nan_to_num(free), fitted.noise[name], trial.dt, 0.0)
     else:

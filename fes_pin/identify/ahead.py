@@ -22,6 +22,7 @@ from fes_pin.identify.per_trial import cross_fitted_unknowns, predictions
 from fes_pin.infer.held_out import within
 from fes_pin.infer.levels import HORIZON_S, RUNAWAY
 from fes_pin.infer.noise import Noise, NoiseModel, thin, thinning
+from fes_pin.infer.problem import Unknowns
 from fes_pin.models.autoregression import weights_ahead
 from fes_pin.models.model import Model
 from fes_pin.models.predictions import PredictedOutput
@@ -88,12 +89,19 @@ def predict_ahead(model: Model, trial: Trial, random: NoiseModel, horizon_s: flo
     return free_ahead(model, trial, {n: random.get(n, Noise(1.0)) for n in outputs}, horizon_s)
 
 
-def free_residuals(model: Model, trial: Trial, noise: NoiseModel) -> dict[str, np.ndarray]:
+def free_residuals(
+    model: Model, trial: Trial, noise: NoiseModel, known: Unknowns | None = None
+) -> dict[str, np.ndarray]:
     """Return measured minus freely simulated, shape (n,), by output column of a trial; NaN where unmeasured.
 
     The error of a simulation that diverges is limited to `RUNAWAY` times the largest reading.
+
+    Parameters
+    ----------
+    known
+        The unknowns of the trial where it was fitted; by default the simulation starts from the first readings.
     """
-    (readings,) = predictions(model, [trial], noise)
+    (readings,) = predictions(model, [trial], noise, known)
     out = {}
     for k, name in enumerate(model.rig.outputs(trial.kind)):
         if name in trial.columns and name in noise:
@@ -102,9 +110,14 @@ def free_residuals(model: Model, trial: Trial, noise: NoiseModel) -> dict[str, n
     return out
 
 
-def free_ahead(model: Model, trial: Trial, noise: NoiseModel, horizon_s: float) -> dict[str, np.ndarray]:
-    """Return a free simulation with the prediction of autoregressive noise over a horizon, shape (n,), by output."""
-    left = free_residuals(model, trial, noise)
+def free_ahead(
+    model: Model, trial: Trial, noise: NoiseModel, horizon_s: float, known: Unknowns | None = None
+) -> dict[str, np.ndarray]:
+    """Return a free simulation with the prediction of autoregressive noise over a horizon, shape (n,), by output.
+
+    The parameter `known` is as of `free_residuals`.
+    """
+    left = free_residuals(model, trial, noise, known)
     ahead = {n: forecast(np.nan_to_num(missed), noise[n], trial.dt, horizon_s) for n, missed in left.items()}
     return {n: trial[n] - missed + ahead[n] for n, missed in left.items()}
 

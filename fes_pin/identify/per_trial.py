@@ -22,7 +22,7 @@ from fes_pin.infer.covariance import covariance_of, least_squares_step
 from fes_pin.infer.levels import RUNAWAY
 from fes_pin.infer.noise import NoiseModel
 from fes_pin.infer.optimum import Optimum, minimise
-from fes_pin.infer.problem import Linearized, normal_equations
+from fes_pin.infer.problem import Linearized, Unknowns, completed, normal_equations
 from fes_pin.infer.scatter import with_honest_intervals
 from fes_pin.models.least_squares import least_squares
 from fes_pin.models.model import Model
@@ -37,7 +37,9 @@ STEPS = 12
 """Most Gauss-Newton steps, each as long as lowers the cost most; amplitudes that are nearly linear take three."""
 
 
-def predictions(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> list[np.ndarray]:
+def predictions(
+    model: Model, trials: Sequence[Trial], noise: NoiseModel, known: Unknowns | None = None
+) -> list[np.ndarray]:
     """Return the readings that a model predicts of measured trials, shape (n, outputs) each; see the module.
 
     A simulation starts from the first readings; that of a rig that falls, from an initial state that is fitted.
@@ -46,12 +48,16 @@ def predictions(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> lis
     ----------
     noise
         Noise by output column, by which channels are weighted.
+    known
+        Unknowns of each trial, of a fit to these trials; by default none is known.
     """
     simulator, values = Simulator(model, trials), model.parameters()
     outputs = {n for t in trials for n in model.rig.outputs(t.kind)}
     white = StateSpaceNoise({n: max(noise[n].std, 1e-12) if n in noise else math.inf for n in outputs})
     start = simulator.start(values)
-    if falls(model, trials):
+    if known:
+        start = completed(start, known)
+    elif falls(model, trials):
         problem = Problem(model, trials, white, ())
         start = from_beginnings(problem, fit_problem(problem, values), partial(fit_problem, problem)).unknowns
     if not model.own_unknowns():
