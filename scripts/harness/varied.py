@@ -209,14 +209,15 @@ def started(study: fp.Study, truth: Truth, rng: np.random.Generator) -> fp.Study
 def decimated(trial: fp.Trial, every: int) -> fp.Trial:
     """Every so many samples of a trial.
 
-    A pulse is in the sample that is kept before it; an effort that moves a joint is the mean of those it was held for.
+    A pulse is in the sample that is kept before it. An effort that moves a joint, or a pulse width, is the mean of the
+    samples it was held for: a recruitment curve is linear between threshold and saturation.
     """
     columns, kept = {}, np.arange(0, len(trial), every)
     for name, values in trial.columns.items():
         columns[name] = values[kept]
         if name == "stim":
             columns[name] = np.maximum.reduceat(values, kept)
-        elif name == "effort" and trial.kind == "motion":
+        elif name == "pulse_width_us" or (name == "effort" and trial.kind == "motion"):
             columns[name] = np.add.reduceat(values, kept) / np.diff(np.append(kept, len(trial)))
     return replace(trial, columns=columns, time=trial.time[::every])
 
