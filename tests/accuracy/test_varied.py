@@ -56,7 +56,7 @@ def test_no_pulse_and_no_impulse_of_an_effort_is_lost_between_samples():
     half = decimated(study().trials[0], 2)
     assert np.flatnonzero(half["stim"]).tolist() == [6] and np.array_equal(half["force_n"], TIME[::2])
     third = decimated(study(pulse_width_us=1e6 * TIME, force_n=TIME).trials[0], 3)
-    assert np.array_equal(third["pulse_width_us"], 1e6 * TIME[::3])
+    assert third["pulse_width_us"][:5] == pytest.approx(1e6 * TIME[1:15:3])
     moved_by = fp.Trial("j", "motion", {"effort": np.sin(90.0 * TIME[:59]), "position": TIME[:59]}, TIME[:59])
     slow = decimated(moved_by, 3)
     lengths = np.append(np.full(19, 3), 2)
