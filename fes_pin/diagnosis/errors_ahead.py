@@ -144,15 +144,9 @@ def free_errors(
         The fit of the model: its own trials are simulated from their fitted initial states.
     """
     pieces = 1 if len(trials) >= FOLDS else TENTHS
-    found = in_parallel(lambda t: _free_squares(model, t, noise, pieces, _known(fitted, t)), trials)
+    known = [None if fitted is None else fitted.unknowns_of(t) for t in trials]
+    found = in_parallel(lambda k: _free_squares(model, trials[k], noise, pieces, known[k]), range(len(trials)))
     return Errors(*np.concatenate(found, axis=1))
-
-
-def _known(fitted: LikelihoodFit | None, trial: Trial) -> Unknowns | None:
-    """Return the unknowns of a trial that was fitted by free simulation; none of another."""
-    if fitted is None or not is_simulated(fitted.noise, [trial]):
-        return None
-    return [dict(u) for t, u in zip(fitted.trials, fitted.unknowns, strict=True) if t is trial] or None
 
 
 def _free_squares(model: Model, trial: Trial, noise: NoiseModel, pieces: int, known: Unknowns | None) -> np.ndarray:
@@ -215,12 +209,12 @@ def _predict(fitted: LikelihoodFit, trial: Trial, horizon_s: float) -> _Predicte
 
 
 def _left(fitted: LikelihoodFit, trial: Trial) -> dict[str, np.ndarray]:
-    return free_residuals(fitted.model, trial, fitted.noise, _known(fitted, trial))
+    return free_residuals(fitted.model, trial, fitted.noise, fitted.unknowns_of(trial))
 
 
 def _predict_freely(fitted: LikelihoodFit, trial: Trial, horizon_s: float) -> _Predicted:
     """Return the same without process noise: a free simulation plus the prediction of autoregressive noise."""
-    predicted, variances = free_ahead(fitted.model, trial, fitted.noise, horizon_s, _known(fitted, trial)), {}
+    predicted, variances = free_ahead(fitted.model, trial, fitted.noise, horizon_s, fitted.unknowns_of(trial)), {}
     steps = max(1, round(horizon_s / trial.dt))
     for name in predicted:
         noise = fitted.noise[name]

@@ -79,7 +79,8 @@ def _predicted(
     if ahead is not None:
         moves = [over_horizon(model, t, fitted.noise, ahead.horizon_s) for t in trials]
         return [derived_trial(t, columns={**t.columns, **m}) for t, m in zip(trials, moves, strict=True)]
-    for trial, readings in zip(trials, predictions(model, trials, noise), strict=True):
+    for trial in trials:
+        (readings,) = predictions(model, [trial], noise, fitted.unknowns_of(trial))
         names = model.rig.outputs(trial.kind)
         shown = {n: _shown(readings[:, k], trial, n) for k, n in enumerate(names)}
         out.append(derived_trial(trial, columns={**trial.columns, **shown}))

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit, ended
-from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.identify.likelihood import LikelihoodProblem, is_simulated
 from fes_pin.identify.process_noise import without_memory
 from fes_pin.infer.levels import CLAIM_LEVEL, DRIVEN_LEVEL, PARAMETER_PENALTY
 from fes_pin.infer.maximise import ROUNDS, alternate, together
@@ -43,6 +43,17 @@ class LikelihoodFit(Fit):
         It is stricter with process noise, which is of first order in the model, while that of the rig is not known.
         """
         return DRIVEN_LEVEL if self.noise.acting else CLAIM_LEVEL
+
+    def unknowns_of(self, trial: Trial) -> Unknowns | None:
+        """Return the unknowns of a trial that was fitted by free simulation, from its first sample on; else None.
+
+        Its initial state is among them. A trial may have been fitted without its spikes, or its later samples.
+        """
+        if not is_simulated(self.noise, [trial]):
+            return None
+        begun = trial.name, trial.time[0]
+        fits = zip(self.trials, self.unknowns, strict=True)
+        return [dict(u) for t, u in fits if (t.name, t.time[0]) == begun] or None
 
 
 def fit_of(problem: LikelihoodProblem, found: Optimum) -> LikelihoodFit:

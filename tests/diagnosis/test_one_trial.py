@@ -9,6 +9,7 @@ import scipy.integrate
 from fes_pin.data.study import Study, read_study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.diagnosis import diagnose_joint
+from fes_pin.diagnosis.replay import replayed_trials
 from fes_pin.identify.afar import misfit_percent
 from fes_pin.infer.result import FITTED
 from fes_pin.view.report import report_html
@@ -78,6 +79,7 @@ def test_errors_of_a_fitted_trial_start_from_its_fitted_state(tmp_path):
     assert [c.name for c in found.causes] == ["quadratic_damping"]
     assert found.causes[0].gain_held_out.low > 50.0
     assert found.extended_error[0] == pytest.approx(misfit_percent(found.extended), rel=0.05)
+    assert replayed_trials(found)[0].extended_error == pytest.approx(found.extended_error[0], rel=0.05)
 
 
 @pytest.mark.shared
