@@ -63,8 +63,22 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
     def first(self) -> Names:
         """Return the causes of all groups that are found where each group has nominal values of its own.
 
-        A change is judged in the model that has them: an error of the model in all groups can hide one. Where one
-        nominal parameter alone need differ, the set has that change; several may be mistaken for the change of a cause.
+        A change is judged in the model that has them: an error of the model in all groups can hide one. Where no score
+        is significant in the nominal model, they are not searched.
+        """
+        nominal = self.fits[()]
+        known = self.leaves_noise(nominal) and self.extension_p_value(nominal) > UNUSUAL_LEVEL
+        begun = nominal if known else self._common()
+        names = tuple(sorted(map(str, begun.items)))
+        if names:
+            self.family = self.screen.family(begun, self.seed)
+        self._act(names, max((s.net_gain for s in self.screen.scores(begun).scored), default=0.0))
+        return names
+
+    def _common(self) -> Grouped:
+        """Return the nominal model with causes of all groups, and one changed nominal parameter where it needs one.
+
+        Changes of several may be mistaken for the change of a cause.
         """
         apart = Search(CommonModels(self), lambda share, words: None, Policy(beam=1)).run().best
         alike = self._without(apart, apart.changes) if apart.items - set(apart.changes) else self.fits[()]
@@ -74,12 +88,7 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
                 break
             apart = less
         self.fits |= {tuple(sorted(map(str, f.items))): f for f in (apart, alike)}
-        begun = apart if len(apart.changes) == 1 else alike
-        names = tuple(sorted(map(str, begun.items)))
-        if names:
-            self.family = self.screen.family(begun, self.seed)
-        self._act(names, max((s.net_gain for s in self.screen.scores(begun).scored), default=0.0))
-        return names
+        return apart if len(apart.changes) == 1 else alike
 
     def _without(self, one: Grouped, items: Collection[Item]) -> Grouped:
         """Return the fit of a set without some items, from its noise or from that of the nominal model."""

@@ -17,8 +17,8 @@ from fes_pin.infer.covariance import covariance_of
 from fes_pin.infer.family import Family
 from fes_pin.infer.levels import PARAMETER_PENALTY
 from fes_pin.infer.problem import Unknowns
-from fes_pin.infer.projection import Projection, slices
-from fes_pin.infer.spread import ByUnit, Spread, usual_spread
+from fes_pin.infer.projection import BlockColumns, Projection, slices
+from fes_pin.infer.spread import ByUnit, Spread, units, usual_spread
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
 from fes_pin.workers import in_parallel
@@ -68,19 +68,11 @@ class ItemScore:
 
 @dataclass(frozen=True)
 class ItemScores:
-    """The scores of items, and the Gram matrix of their columns with the parameters of the set projected off.
-
-    Attributes
-    ----------
-    gram
-        Shape (k, k).
-    blocks
-        The rows of `gram` of each change.
-    """
+    """The scores of items, and the columns of all changes."""
 
     scored: list[ItemScore]
-    gram: np.ndarray
-    blocks: list[slice]
+    columns: BlockColumns
+    changes: Sequence[Mapping[str, slice]]
 
     @cached_property
     def usual_spread(self) -> Spread:
@@ -89,21 +81,21 @@ class ItemScores:
 
 
 @dataclass(frozen=True)
-class _Column:
+class _Probe:
     """An item with one choice of shapes.
 
     Attributes
     ----------
     amplitudes
         For each amplitude by name, its value without the item, and its bounds.
-    columns
-        Whitened sensitivities to them, zero in the rows of groups that the item does not concern.
+    pieces
+        Whitened sensitivities to them of the trials of each group that the item concerns.
     """
 
     item: Item
     effect: Effect | None
     amplitudes: Mapping[str, tuple[float, float, float]]
-    columns: np.ndarray
+    pieces: Mapping[str, np.ndarray]
 
 
 class Screen:
@@ -134,27 +126,31 @@ class Screen:
     def family(self, base: Grouped, seed: int) -> Family:
         """Return the family of the tests of all changes, of which a set has some."""
         scores = self.scores(base)
-        return Family(scores.gram, scores.blocks, seed, len(base.changes))
+        gram, blocks = scores.columns.gram(scores.changes)
+        return Family(gram, blocks, seed, len(base.changes))
 
     def _scored(self, base: Grouped) -> ItemScores:
-        projection, made = Projection(base.parts), list(self._columns(base))
-        left = np.concatenate([projection(np.nan_to_num(c.columns)) for c in made], axis=1)
-        gram, along = left.T @ left, left.T @ projection.residual
-        blocks = slices(c.columns.shape[1] for c in made)
-        spreads = [ByUnit.of(left[:, b.start], projection.residual, base.parts).spread(FITTED) for b in blocks]
-        each = zip(made, blocks, spreads, strict=True)
-        scored = [_score(c, gram[b, b], along[b], spread) for c, b, spread in each]
-        return ItemScores(scored, gram, [b for c, b in zip(made, blocks, strict=True) if c.item.group is not None])
+        probes, columns = list(self._probes(base)), BlockColumns(Projection(base.parts), self._rows(base))
+        places = [{g: columns.added(g, piece) for g, piece in p.pieces.items()} for p in probes]
+        by_unit = zip(*(x.T for x in columns.by_unit(places, units(base.parts))), strict=True)
+        spreads = [ByUnit.felt(sizes, along).spread(FITTED) for sizes, along in by_unit]
+        each = zip(probes, places, spreads, strict=True)
+        scored = [_score(p, *columns.products(place), spread) for p, place, spread in each]
+        changes = [place for p, place in zip(probes, places, strict=True) if p.item.group is not None]
+        return ItemScores(scored, columns, changes)
 
-    def _columns(self, base: Grouped) -> Iterator[_Column]:
-        """Yield every item that a set does not have."""
+    def _rows(self, base: Grouped) -> dict[str, slice]:
+        """Return the rows of each group."""
         ends = slices(sum(len(p.residual) for p in own) for own in by_group(base.parts, self._trials).values())
-        rows = dict(zip(self._trials, ends, strict=True))
+        return dict(zip(self._trials, ends, strict=True))
+
+    def _probes(self, base: Grouped) -> Iterator[_Probe]:
+        """Yield every item that a set does not have."""
         for item in self._differing(base):
-            yield _own(base, item, rows[str(item.group)])
+            yield _own(base, item, self._rows(base)[str(item.group)])
         unknowns = by_group(base.unknowns, self._trials)
         wanted = [e for e in self._effects if Item(e.name) not in base.items]
-        for many in in_parallel(lambda e: list(self._of_cause(e, base, unknowns, rows)), wanted):
+        for many in in_parallel(lambda e: list(self._of_cause(e, base, unknowns)), wanted):
             yield from many
 
     def _differing(self, base: Grouped) -> Iterator[Item]:
@@ -169,15 +165,13 @@ class Screen:
             if len(taken) < len(groups) - 1:
                 yield from (Item(name, g) for g in free if g not in taken)
 
-    def _of_cause(
-        self, kind: type[Effect], base: Grouped, unknowns: Mapping[str, Unknowns], rows: Mapping[str, slice]
-    ) -> Iterator[_Column]:
+    def _of_cause(self, kind: type[Effect], base: Grouped, unknowns: Mapping[str, Unknowns]) -> Iterator[_Probe]:
         """Yield a cause in all groups that lack it, and in each of them; in the form that other groups have, if any.
 
         If one group alone lacks it, that group has no item of its own: with it the cause acts in all.
         """
-        has = [g for g in rows if Item(kind.name, g) in base.items]
-        lacks = [g for g in rows if g not in has]
+        has = [g for g in self._trials if Item(kind.name, g) in base.items]
+        lacks = [g for g in self._trials if g not in has]
         wanted: list[tuple[Item, list[str]]] = [(Item(kind.name), lacks)]
         wanted += [(Item(kind.name, g), [g]) for g in lacks if len(lacks) > 1]
         for one in [_at_null(base.grouped.models[has[0]], kind)] if has else self._library.grid(kind):
@@ -185,10 +179,7 @@ class Screen:
             info = one.parameters()
             amplitudes = {n: (float(info[n].null or 0.0), info[n].lower, info[n].upper) for n in one.amplitudes()}
             for item, groups in wanted:
-                columns = np.zeros((max(r.stop for r in rows.values()), len(amplitudes)))
-                for g in groups:
-                    columns[rows[g]] = pieces[g]
-                yield _Column(item, one, amplitudes, columns)
+                yield _Probe(item, one, amplitudes, {g: pieces[g] for g in groups})
 
     def _sensitivities(self, one: Effect, base: Grouped, group: str, unknowns: Unknowns) -> np.ndarray:
         """Return sensitivities of the trials of a group to the amplitudes of a cause, whitened as in a fit."""
@@ -205,31 +196,31 @@ def _at_null(model: Model, kind: type[Effect]) -> Effect:
     return replace(effect, **nulls)
 
 
-def _own(base: Grouped, item: Item, rows: slice) -> _Column:
+def _own(base: Grouped, item: Item, rows: slice) -> _Probe:
     """Return a parameter, or a cause's amplitudes, in one group alone."""
     model, group = base.grouped, str(item.group)
     effects = (e for e in model.models[group].effects if e.name == item.name)
     names = [f"{e.name}.{n}" for e in effects for n in e.amplitudes()] or [item.name]
     paths = [model.path(n, group) for n in names]
-    every = np.concatenate([p.jacobian for p in base.parts])[:, [model.free.index(p) for p in paths]]
-    columns = np.zeros_like(every)
-    columns[rows] = every[rows]
+    every = np.concatenate([p.jacobian for p in base.parts])[rows]
     values, info = model.parameters(), model.parameter_info()
     amplitudes = {n: (values[p], info[p].lower, info[p].upper) for n, p in zip(names, paths, strict=True)}
-    return _Column(item, None, amplitudes, columns)
+    return _Probe(item, None, amplitudes, {group: every[:, [model.free.index(p) for p in paths]]})
 
 
-def _score(one: _Column, gram: np.ndarray, along: np.ndarray, spread: Spread) -> ItemScore:
+def _score(one: _Probe, gram: np.ndarray, along: np.ndarray, norms: np.ndarray, spread: Spread) -> ItemScore:
     """Return the score of an item from its columns with the parameters of the set projected off.
 
     Parameters
     ----------
     gram, along
         Inner products of the projected columns, with each other and with the residual.
+    norms
+        Of its columns before.
     spread
         Spread of its first amplitude between trials.
     """
-    size, norms = np.sqrt(np.maximum(np.diag(gram), 0.0)), np.linalg.norm(one.columns, axis=0)
+    size = np.sqrt(np.maximum(np.diag(gram), 0.0))
     kept = float(np.max(size / np.where(norms > 0.0, norms, np.inf), initial=0.0))
     degrees = len(one.amplitudes) if one.effect is None else len(one.effect.fitted_parameters())
     if kept < LEAST_KEPT:

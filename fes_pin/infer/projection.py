@@ -3,9 +3,12 @@
 C. R. Rao, Math. Proc. Camb. Phil. Soc. 44:50 (1948).
 """
 
+from __future__ import annotations
+
 import itertools
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -114,6 +117,114 @@ class Projection:
         """Return one trial's part of the Gram matrix of projected columns, and of their products with the residual."""
         left = partly - self.shared[self.trials[k]] @ shared
         return left.T @ left, left.T @ self.residual[self.trials[k]]
+
+
+class BlockColumns:
+    """Columns that are each zero outside one block of trials, with the fitted parameters projected off.
+
+    With c such a column, the unknowns of its trials projected off, and B the basis that all trials share, the projected
+    column is c - B B'c. Two of them have the inner product c'd - (B'c)' (B'd), where c'd is 0 between blocks.
+    A sum of columns of several blocks is given as the place in each block: block -> slice.
+
+    Parameters
+    ----------
+    projection
+        Of the fit.
+    rows
+        Rows of each block, by name: whole trials.
+    """
+
+    def __init__(self, projection: Projection, rows: Mapping[str, slice]) -> None:
+        self._projection, self._rows = projection, rows
+        self._pieces: dict[str, dict[int, tuple[slice, np.ndarray]]] = {name: {} for name in rows}
+
+    def added(self, block: str, columns: np.ndarray) -> slice:
+        """Return the place of columns of a block, shape (m of the block, any); an array is added once."""
+        known = self._pieces[block]
+        if id(columns) not in known:
+            end = max((at.stop for at, _ in known.values()), default=0)
+            known[id(columns)] = slice(end, end + columns.shape[1]), columns
+        return known[id(columns)][0]
+
+    @cached_property
+    def _blocks(self) -> dict[str, _Block]:
+        """The columns of each block that has some, with their inner products."""
+        pieces = {b: [columns for _, columns in known.values()] for b, known in self._pieces.items() if known}
+        return {b: self._block(self._rows[b], np.concatenate(many, axis=1)) for b, many in pieces.items()}
+
+    def _block(self, rows: slice, columns: np.ndarray) -> _Block:
+        columns[~(np.abs(columns) < LARGEST)] = 0.0
+        norms = np.linalg.norm(columns, axis=0)
+        shared = np.zeros((self._projection.shared.shape[1], columns.shape[1]))
+        for k, trial in enumerate(self._projection.trials):
+            if rows.start <= trial.start < rows.stop:
+                own = slice(trial.start - rows.start, trial.stop - rows.start)
+                columns[own], part = self._projection.within(k, columns[own])
+                shared += part
+        return _Block(columns, columns.T @ columns, columns.T @ self._projection.residual[rows], norms, shared)
+
+    def products(self, place: Mapping[str, slice]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the Gram matrix of a sum of columns, their products with the residual, and their norms before."""
+        each = [(self._blocks[b], at) for b, at in place.items()]
+        shared = np.sum([one.shared[:, at] for one, at in each], axis=0)
+        gram = np.sum([one.gram[at, at] for one, at in each], axis=0) - shared.T @ shared
+        along = np.sum([one.along[at] for one, at in each], axis=0)
+        return gram, along, np.sqrt(np.sum([one.norms[at] ** 2 for one, at in each], axis=0))
+
+    def gram(self, places: Sequence[Mapping[str, slice]]) -> tuple[np.ndarray, list[slice]]:
+        """Return the Gram matrix of columns of one block each, and the rows of each of the places."""
+        each = [(b, self._blocks[b], np.arange(at.start, at.stop)) for place in places for b, at in place.items()]
+        shared = np.concatenate([one.shared[:, at] for _, one, at in each], axis=1)
+        blocks, out = slices(len(at) for _, _, at in each), -shared.T @ shared
+        for name, block in self._blocks.items():
+            own = [(rows, at) for rows, (b, _, at) in zip(blocks, each, strict=True) if b == name]
+            if own:
+                here = np.concatenate([np.arange(rows.start, rows.stop) for rows, _ in own])
+                there = np.concatenate([at for _, at in own])
+                out[np.ix_(here, here)] += block.gram[np.ix_(there, there)]
+        return out, blocks
+
+    def by_unit(self, places: Sequence[Mapping[str, slice]], units: Sequence[slice]) -> tuple[np.ndarray, np.ndarray]:
+        """Return squares of the first projected column of each place, and products with the residual, by unit of rows.
+
+        Returns
+        -------
+        two of ndarray, shape (units, places)
+        """
+        firsts = [{b: at.start for b, at in place.items()} for place in places]
+        shared = np.stack([sum(self._blocks[b].shared[:, k] for b, k in one.items()) for one in firsts], axis=1)
+        own = {b: [(i, one[b]) for i, one in enumerate(firsts) if b in one] for b in self._blocks}
+        sizes, along = np.zeros((2, len(units), len(places)))
+        for u, cut in enumerate(units):
+            moved = -self._projection.shared[cut] @ shared
+            for b, pairs in own.items():
+                begins = self._rows[b].start
+                if begins <= cut.start < self._rows[b].stop:
+                    here, there = np.array(pairs).T
+                    moved[:, here] += self._blocks[b].columns[cut.start - begins : cut.stop - begins, there]
+            sizes[u], along[u] = np.einsum("mi,mi->i", moved, moved), self._projection.residual[cut] @ moved
+        return sizes, along
+
+
+@dataclass(frozen=True)
+class _Block:
+    """Columns of a block with its trials' unknowns projected off, shape (m, k), and their inner products.
+
+    Attributes
+    ----------
+    gram, along
+        Shape (k, k) and (k,): with each other, and with the residual.
+    norms
+        Shape (k,): before the unknowns were projected off.
+    shared
+        Shape (rank, k): with the basis that all trials share.
+    """
+
+    columns: np.ndarray
+    gram: np.ndarray
+    along: np.ndarray
+    norms: np.ndarray
+    shared: np.ndarray
 
 
 def slices(lengths: Iterable[int]) -> list[slice]:
