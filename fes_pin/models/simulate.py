@@ -24,6 +24,11 @@ Values = Mapping[str, float] | EachTrial
 """Every parameter of a model by name: one mapping for all trials, or one for each."""
 MAX_STEP_S = 2.5e-3
 """Longest integration step, s: 1/20 of a muscle's time constant; at 1/17 s of damping RK4 errs by 1e-6 rad a swing."""
+STABLE = 2.0
+"""Longest step in time constants of a decay: RK4 is stable up to 2.785 (Hairer and Wanner, Solving Ordinary
+Differential Equations II, Springer, 1996, section IV.2)."""
+FINEST = 1e-2
+"""Shortest step of a stiff model, in units of `MAX_STEP_S`: a start value may be wrong a thousandfold."""
 FIRST_S = 0.2
 """Time from whose samples a rate that was not measured is estimated, s: the error of a line's slope falls with its
 power 3/2, and a nominal model is accurate for so short a time."""
@@ -271,7 +276,8 @@ def spread(sensitivities: np.ndarray, places: tuple[int, ...], width: int) -> np
 
 def max_step(model: Model) -> float:
     """Return the longest integration step that resolves the model, s."""
-    return min([MAX_STEP_S, *(e.max_step_s for e in model.effects)])
+    stable = max(STABLE * model.rig.decay_s(), FINEST * MAX_STEP_S)
+    return min([MAX_STEP_S, stable, *(e.max_step_s for e in model.effects)])
 
 
 def substeps(model: Model, dt: float, max_step_s: float) -> int:

@@ -15,7 +15,7 @@ from fes_pin.models.effects.sensor_offset import SensorOffset
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.rigs import Joint
-from fes_pin.models.simulate import Simulator, simulate, substeps
+from fes_pin.models.simulate import MAX_STEP_S, STABLE, Simulator, max_step, simulate, substeps
 
 GAIN, TAU = RIGS["muscle"].gain, RIGS["muscle"].time_constant_s
 LOW, HIGH = MUSCLE["threshold_us"], MUSCLE["saturation_us"]
@@ -189,3 +189,22 @@ def test_a_prediction_starts_where_the_sensor_reads_the_first_sample(of_sensor):
     assert start["initial_velocity"] == pytest.approx(0.0, abs=1e-6)
     (told,) = Simulator(model, [known]).start(model.parameters())
     assert (told["initial_position"], told["initial_velocity"]) == (0.4, 0.0), "told as the angle, not as read"
+
+
+@pytest.mark.parametrize("damping", [2.0, 20.0, 200.0])
+def test_a_decay_of_any_time_constant_is_stable(damping):
+    """A joint without gravity comes to rest v0 time constants from where it began."""
+    joint = Joint(1.0, damping, 0.0, constants=RIGS["joint"].constants)
+    moving = Trial("decay", "motion", {}, np.arange(100) * 1e-2, {"position0": 0.3, "velocity0": 1.0})
+    (run,) = Simulator(Model(joint), [moving]).run(Model(joint).parameters())
+    angle = run.readings[:, 0]
+    assert joint.decay_s() == pytest.approx(0.02 / damping)
+    assert angle[-1] - 0.3 == pytest.approx(joint.decay_s(), rel=1e-9)
+
+
+def test_only_a_stiff_model_has_shorter_steps():
+    slack = Joint(1.0, 10.0, 0.0, constants=RIGS["joint"].constants)
+    stiff = Joint(1.0, 200.0, 0.0, constants=RIGS["joint"].constants)
+    free = Joint(1.0, 0.0, 0.0, constants=RIGS["joint"].constants)
+    assert [max_step(Model(j)) for j in (free, slack, stiff)] == [MAX_STEP_S, MAX_STEP_S, STABLE * stiff.decay_s()]
+    assert [max_step(Model(RIGS[name])) for name in RIGS] == [MAX_STEP_S] * 3

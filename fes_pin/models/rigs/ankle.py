@@ -79,6 +79,9 @@ class Ankle(Rig):
     )
     needed = (*schema.constants, *schema.passive)
 
+    def decay_s(self) -> float:
+        return self.inertia_kgm2 / self.damping_nms if self.damping_nms > 0.0 else math.inf
+
     @classmethod
     def of_study(cls, study: Study) -> Ankle:
         start: dict[str, Any] = dict(study.start)

@@ -122,6 +122,10 @@ class Rig(ReadOnly):
         muscle = getattr(self, "time_constant_s", None)
         return {} if muscle is None else {"the muscle's time constant": muscle}
 
+    def decay_s(self) -> float:
+        """Return the time constant in s by which damping slows its motion at its own parameters."""
+        return math.inf
+
     def check_prediction(self, trial: Trial) -> None:
         """Make sure that a trial holds what a prediction begins with.
 

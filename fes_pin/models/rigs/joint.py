@@ -88,12 +88,18 @@ class Joint(Rig):
     def time_constants(self, kinds: Collection[str]) -> dict[str, float]:
         if set(kinds) == {IMPOSED}:
             return {}
-        inertia = self.inertia_scale * self.constants["inertia"]
         weight = math.hypot(self.constants["gravity_cos"], self.constants["gravity_sin"])
         stiffness = abs(self.gravity_scale) * weight
         if self.constants["revolute"] and stiffness > 0.0:
-            return {"the swing's period over a turn": math.sqrt(inertia / stiffness)}
-        return {RUN_OUT: inertia / self.damping} if self.damping > 0.0 else {}
+            return {"the swing's period over a turn": math.sqrt(self._inertia / stiffness)}
+        return {RUN_OUT: self.decay_s()} if self.damping > 0.0 else {}
+
+    @property
+    def _inertia(self) -> float:
+        return self.inertia_scale * self.constants["inertia"]
+
+    def decay_s(self) -> float:
+        return self._inertia / self.damping if self.damping > 0.0 else math.inf
 
     def check_prediction(self, trial: Trial) -> None:
         if trial.kind == IMPOSED:
