@@ -2,9 +2,7 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-
-from fes_pin.models.stage import Bounds, Effect, Measured, Scalar, Signals, Stage, parameter, symmetric
+from fes_pin.models.stage import Effect, Scalar, Signals, Stage, parameter
 
 
 @dataclass(frozen=True)
@@ -22,10 +20,6 @@ class EffortOffset(Effect):
 
     name, stage, signal, rigs = "effort_offset", Stage.JOINT, "effort", ("joint",)
     of_record = True
-
-    def limits(self, measured: Measured) -> Bounds:
-        """Return bounds by the largest commanded effort: a larger offset is implausible."""
-        return {"offset": symmetric(float(np.max(np.abs(measured.get("effort", np.zeros(1))))))}
 
     def apply(self, value: Scalar, s: Signals) -> Scalar:
         return value + self.offset
