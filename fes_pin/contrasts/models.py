@@ -67,8 +67,8 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
         is significant in the nominal model, they are not searched.
         """
         nominal = self.fits[()]
-        known = self.leaves_noise(nominal) and self.extension_p_value(nominal) > UNUSUAL_LEVEL
-        begun = nominal if known else self._common()
+        is_adequate = self.leaves_noise(nominal) and self.extension_p_value(nominal) > UNUSUAL_LEVEL
+        begun = nominal if is_adequate else self._common()
         names = tuple(sorted(map(str, begun.items)))
         if names:
             self.family = self.screen.family(begun, self.seed)

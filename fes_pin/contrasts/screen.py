@@ -68,11 +68,19 @@ class ItemScore:
 
 @dataclass(frozen=True)
 class ItemScores:
-    """The scores of items, and the columns of all changes."""
+    """The scores of items, and the Gram matrix of the columns of changes with the parameters of the set projected off.
+
+    Attributes
+    ----------
+    gram
+        Shape (k, k).
+    blocks
+        The rows of `gram` of each change.
+    """
 
     scored: list[ItemScore]
-    columns: BlockColumns
-    changes: Sequence[Mapping[str, slice]]
+    gram: np.ndarray
+    blocks: list[slice]
 
     @cached_property
     def usual_spread(self) -> Spread:
@@ -126,28 +134,24 @@ class Screen:
     def family(self, base: Grouped, seed: int) -> Family:
         """Return the family of the tests of all changes, of which a set has some."""
         scores = self.scores(base)
-        gram, blocks = scores.columns.gram(scores.changes)
-        return Family(gram, blocks, seed, len(base.changes))
+        return Family(scores.gram, scores.blocks, seed, len(base.changes))
 
     def _scored(self, base: Grouped) -> ItemScores:
-        probes, columns = list(self._probes(base)), BlockColumns(Projection(base.parts), self._rows(base))
+        ends = slices(sum(len(p.residual) for p in own) for own in by_group(base.parts, self._trials).values())
+        rows = dict(zip(self._trials, ends, strict=True))
+        probes, columns = list(self._probes(base, rows)), BlockColumns(Projection(base.parts), rows)
         places = [{g: columns.added(g, piece) for g, piece in p.pieces.items()} for p in probes]
         by_unit = zip(*(x.T for x in columns.by_unit(places, units(base.parts))), strict=True)
-        spreads = [ByUnit.felt(sizes, along).spread(FITTED) for sizes, along in by_unit]
+        spreads = [ByUnit.of_products(sizes, along).spread(FITTED) for sizes, along in by_unit]
         each = zip(probes, places, spreads, strict=True)
         scored = [_score(p, *columns.products(place), spread) for p, place, spread in each]
         changes = [place for p, place in zip(probes, places, strict=True) if p.item.group is not None]
-        return ItemScores(scored, columns, changes)
+        return ItemScores(scored, *columns.gram(changes))
 
-    def _rows(self, base: Grouped) -> dict[str, slice]:
-        """Return the rows of each group."""
-        ends = slices(sum(len(p.residual) for p in own) for own in by_group(base.parts, self._trials).values())
-        return dict(zip(self._trials, ends, strict=True))
-
-    def _probes(self, base: Grouped) -> Iterator[_Probe]:
-        """Yield every item that a set does not have."""
+    def _probes(self, base: Grouped, rows: Mapping[str, slice]) -> Iterator[_Probe]:
+        """Yield every item that a set does not have; `rows` are those of each group."""
         for item in self._differing(base):
-            yield _own(base, item, self._rows(base)[str(item.group)])
+            yield _own(base, item, rows[str(item.group)])
         unknowns = by_group(base.unknowns, self._trials)
         wanted = [e for e in self._effects if Item(e.name) not in base.items]
         for many in in_parallel(lambda e: list(self._of_cause(e, base, unknowns)), wanted):

@@ -124,7 +124,8 @@ class BlockColumns:
 
     With c such a column, the unknowns of its trials projected off, and B the basis that all trials share, the projected
     column is c - B B'c. Two of them have the inner product c'd - (B'c)' (B'd), where c'd is 0 between blocks.
-    A sum of columns of several blocks is given as the place in each block: block -> slice.
+    A sum of columns of several blocks is given as the place in each block: block -> slice. All columns are added before
+    products are asked for.
 
     Parameters
     ----------
@@ -164,7 +165,7 @@ class BlockColumns:
         return _Block(columns, columns.T @ columns, columns.T @ self._projection.residual[rows], norms, shared)
 
     def products(self, place: Mapping[str, slice]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the Gram matrix of a sum of columns, their products with the residual, and their norms before."""
+        """Return products of k sums of columns, shape (k, k), those with the residual, (k,), and norms before, (k,)."""
         each = [(self._blocks[b], at) for b, at in place.items()]
         shared = np.sum([one.shared[:, at] for one, at in each], axis=0)
         gram = np.sum([one.gram[at, at] for one, at in each], axis=0) - shared.T @ shared
@@ -174,7 +175,8 @@ class BlockColumns:
     def gram(self, places: Sequence[Mapping[str, slice]]) -> tuple[np.ndarray, list[slice]]:
         """Return the Gram matrix of columns of one block each, and the rows of each of the places."""
         each = [(b, self._blocks[b], np.arange(at.start, at.stop)) for place in places for b, at in place.items()]
-        shared = np.concatenate([one.shared[:, at] for _, one, at in each], axis=1)
+        none = np.zeros((self._projection.shared.shape[1], 0))
+        shared = np.concatenate([none, *(one.shared[:, at] for _, one, at in each)], axis=1)
         blocks, out = slices(len(at) for _, _, at in each), -shared.T @ shared
         for name, block in self._blocks.items():
             own = [(rows, at) for rows, (b, _, at) in zip(blocks, each, strict=True) if b == name]
@@ -193,14 +195,13 @@ class BlockColumns:
         """
         firsts = [{b: at.start for b, at in place.items()} for place in places]
         shared = np.stack([sum(self._blocks[b].shared[:, k] for b, k in one.items()) for one in firsts], axis=1)
-        own = {b: [(i, one[b]) for i, one in enumerate(firsts) if b in one] for b in self._blocks}
+        own = {b: np.array([(i, one[b]) for i, one in enumerate(firsts) if b in one]).T for b in self._blocks}
         sizes, along = np.zeros((2, len(units), len(places)))
         for u, cut in enumerate(units):
             moved = -self._projection.shared[cut] @ shared
-            for b, pairs in own.items():
+            for b, (here, there) in own.items():
                 begins = self._rows[b].start
                 if begins <= cut.start < self._rows[b].stop:
-                    here, there = np.array(pairs).T
                     moved[:, here] += self._blocks[b].columns[cut.start - begins : cut.stop - begins, there]
             sizes[u], along[u] = np.einsum("mi,mi->i", moved, moved), self._projection.residual[cut] @ moved
         return sizes, along

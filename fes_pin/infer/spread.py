@@ -79,11 +79,11 @@ class ByUnit:
         """Return the products of vectors over all rows of some trials, end to end."""
         cuts = units(parts)
         sizes = np.array([float(moved[c] @ moved[c]) for c in cuts])
-        return cls.felt(sizes, np.array([float(moved[c] @ residual[c]) for c in cuts]))
+        return cls.of_products(sizes, np.array([float(moved[c] @ residual[c]) for c in cuts]))
 
     @classmethod
-    def felt(cls, sizes: np.ndarray, along: np.ndarray) -> ByUnit:
-        """Return the products of the units that the candidate changes, from those of all units."""
+    def of_products(cls, sizes: np.ndarray, along: np.ndarray) -> ByUnit:
+        """Return the units that a candidate changes, from the products of all units, shape (units,) each."""
         along = along - sizes * (along.sum() / max(float(sizes.sum()), 1e-300))
         felt = sizes > UNFELT * max(float(sizes.max()), 1e-300)
         return cls(sizes[felt], along[felt])

@@ -1,4 +1,4 @@
-"""Columns that are zero outside a block of trials have the products of the whole columns that they stand for."""
+"""Inner products of columns that concern the trials of one group, compared with those of full columns."""
 
 import numpy as np
 import pytest
@@ -60,6 +60,7 @@ def test_the_gram_matrix_of_several_blocks_is_that_of_the_whole_columns(
     left = projection(np.concatenate([whole(pieces, "after"), whole(pieces, "before")], axis=1))
     assert np.allclose(gram, left.T @ left, rtol=1e-12, atol=1e-12)
     assert blocks == slices([2, 2])
+    assert columns.gram([])[0].shape == (0, 0)
 
 
 def test_an_array_that_two_items_share_is_added_once(projection: Projection, pieces: dict[str, np.ndarray]) -> None:

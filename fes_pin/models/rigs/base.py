@@ -123,7 +123,7 @@ class Rig(ReadOnly):
         return {} if muscle is None else {"the muscle's time constant": muscle}
 
     def decay_s(self) -> float:
-        """Return the time constant in s by which damping slows its motion at its own parameters."""
+        """Return the time constant in s of its motion by damping alone; infinite where nothing damps it."""
         return math.inf
 
     def check_prediction(self, trial: Trial) -> None:
