@@ -373,17 +373,6 @@ class FromAPlace(Effect):
         return {**super().grids(measured), "place": (1.0, 0.0, 2.0) if anywhere else (0.0,)}
 
 
-def reading_range(measured: Measured) -> float:
-    """Return the largest difference between first readings; 0 where there are none."""
-    reading = measured.get("reading", np.zeros(1))
-    return float(np.nanmax(reading) - np.nanmin(reading))
-
-
-def symmetric(size: float) -> tuple[float, float]:
-    """Return bounds from -size to size, or none for a size of 0."""
-    return (-size, size) if size > 0.0 else (-math.inf, math.inf)
-
-
 def span(measured: Measured, name: str) -> float:
     """Return the range of a column; 0 where it was not measured."""
     return float(np.ptp(measured.get(name, np.zeros(1))))

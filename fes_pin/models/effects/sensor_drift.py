@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fes_pin.models.maths import TURN
 from fes_pin.models.parameters import parameter, refinement
-from fes_pin.models.stage import Bounds, Effect, Measured, Scalar, Signals, Stage, reading_range, symmetric
+from fes_pin.models.stage import Bounds, Effect, Measured, Scalar, Signals, Stage
 
 
 @dataclass(frozen=True)
@@ -24,10 +25,14 @@ class SensorDrift(Effect):
     name, stage, signal, rigs = "sensor_drift", Stage.SENSOR, "reading", ("ankle", "joint", "muscle")
 
     def limits(self, measured: Measured) -> Bounds:
-        """Within a trial the sensor drifts by no more than its readings differ."""
-        low, high = symmetric(reading_range(measured))
-        longest = float(np.max(measured.get("time", np.zeros(1))))
-        return {"rate_per_s": (low / longest, high / longest)} if longest > 0.0 and high > 0.0 else {}
+        """Return bounds of the rate: within a trial no more than its readings differ, and no angle by more than a turn.
+
+        An absolute angle sensor repeats after a turn, and an incremental one counts.
+        """
+        time, reading = measured.get("time", np.zeros(1)), measured.get("reading", np.zeros(1))
+        longest, most = float(np.max(time)), float(np.nanmax(reading) - np.nanmin(reading))
+        most = min(most, TURN) if "position" in measured else most
+        return {"rate_per_s": (-most / longest, most / longest)} if longest > 0.0 and most > 0.0 else {}
 
     def apply(self, value: Scalar, s: Signals) -> Scalar:
         return value + self.rate_per_s * s.time / (1.0 + self.settling_per_s * s.time)

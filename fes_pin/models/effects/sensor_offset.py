@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from fes_pin.models.stage import Bounds, Effect, Measured, Scalar, Signals, Stage, parameter, reading_range, symmetric
+from fes_pin.models.stage import Effect, Scalar, Signals, Stage, parameter
 
 
 @dataclass(frozen=True)
@@ -19,10 +19,6 @@ class SensorOffset(Effect):
 
     name, stage, signal, rigs = "sensor_offset", Stage.SENSOR, "reading", ("ankle", "joint", "muscle")
     of_record = True
-
-    def limits(self, measured: Measured) -> Bounds:
-        """Return bounds by the range of the sensor's readings: a larger offset is implausible."""
-        return {"offset": symmetric(reading_range(measured))}
 
     def apply(self, value: Scalar, s: Signals) -> Scalar:
         return value + self.offset
