@@ -359,6 +359,14 @@ class Grouped(Fit):
         values = next(iter(self.grouped.models.values())).parameters()
         return {n: s / abs(values[n]) for n, s in self.weights.deviations.items() if values[n]}
 
+    def certainty(self, change: Item) -> float:
+        """Return by how many deviations a parameter of one group differs from the others'; 0 where that has none."""
+        at = [self.place(change.name), self.place(f"{change.name}@{change.group}")]
+        (common, _), (both, own) = self.covariance[np.ix_(at, at)]
+        away = abs(self.values[change.name] - self.values[f"{change.name}@{change.group}"])
+        variance = common + own - 2.0 * both
+        return float(away / np.sqrt(variance)) if 0.0 < variance < np.inf else 0.0
+
     def leaning(self, moved: np.ndarray) -> float:
         """Return the part of the squares of a change that depends on the scatter of repeats.
 

@@ -83,7 +83,7 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
         apart = Search(CommonModels(self), lambda share, words: None, Policy(beam=1)).run().best
         alike = self._without(apart, apart.changes) if apart.items - set(apart.changes) else self.fits[()]
         while apart.changes and apart.criterion < alike.criterion:
-            less = min((self._without(apart, [i]) for i in apart.changes), key=lambda f: f.criterion)
+            less = self._without(apart, [min(apart.changes, key=apart.certainty)])
             if not less.criterion < apart.criterion:
                 break
             apart = less
