@@ -34,7 +34,7 @@ from fes_pin.workers import Progress, noting_stops, one_thread_each, time_limit
 GroupsRestated = Restated[Grouped, ContrastModels]
 Searched = tuple[ContrastSearch, Found, GroupsRestated | None]
 
-UNCONFIRMED = "{} is significant in the fitted trials, but the held-out trials do not confirm it"
+UNCONFIRMED = "{} is significant in the fitted trials, but {}"
 
 
 def contrast(
@@ -176,7 +176,7 @@ class _Work:
         unchanged, excluded, untestable = not_changed(models, best)
         smoothed = max(best.weights.noise.values(), key=lambda n: n.correlation_s)
         said += [*state.weighed.said, *words_of_reading(smoothed, best.grouped.rig, best.trials)]
-        said += [UNCONFIRMED.format(n) for n in state.rejected]
+        said += [UNCONFIRMED.format(n, one.reason) for n, one in state.rejected.items()]
         if left.unexplained:
             said.append("with a lack of fit in one group no change can be excluded")
         if left.unexplained or self.stops:  # excluded sizes hold for a right model and a whole search only

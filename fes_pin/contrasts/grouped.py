@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -360,12 +361,24 @@ class Grouped(Fit):
         return {n: s / abs(values[n]) for n, s in self.weights.deviations.items() if values[n]}
 
     def certainty(self, change: Item) -> float:
-        """Return by how many deviations a parameter of one group differs from the others'; 0 where that has none."""
-        at = [self.place(change.name), self.place(f"{change.name}@{change.group}")]
-        (common, _), (both, own) = self.covariance[np.ix_(at, at)]
-        away = abs(self.values[change.name] - self.values[f"{change.name}@{change.group}"])
-        variance = common + own - 2.0 * both
-        return float(away / np.sqrt(variance)) if 0.0 < variance < np.inf else 0.0
+        """Return by how many deviations one group differs from the others, in the amplitude where that is most.
+
+        Amplitudes that are not identified count as equal.
+        """
+        group, own = str(change.group), self.grouped.models[str(change.group)]
+        names = [f"{e.name}.{n}" for e in own.effects if e.name == change.name for n in e.amplitudes()]
+        return max(self._apart(n, group) for n in names or [change.name])
+
+    def _apart(self, name: str, group: str) -> float:
+        """Return the difference of a parameter of one group from its value in another, or its null, in deviations."""
+        model, here = self.grouped, self.grouped.path(name, group)
+        there = [model.path(name, g) for g, m in model.models.items() if g != group and name in m.parameters()][:1]
+        other = self.values[there[0]] if there else model.models[group].parameter_info()[name].null or 0.0
+        weights = np.array([(n == here) - float(n in there) for n in self.free])
+        felt = weights != 0.0
+        variance = float(weights[felt] @ self.covariance[np.ix_(felt, felt)] @ weights[felt])
+        away = abs(self.values[here] - other)
+        return away / math.sqrt(variance) if 0.0 < variance < math.inf else 0.0
 
     def leaning(self, moved: np.ndarray) -> float:
         """Return the part of the squares of a change that depends on the scatter of repeats.

@@ -11,12 +11,14 @@ from fes_pin.diagnosis.search.library import Library
 from fes_pin.diagnosis.search.likelihood_forms import demanded_form
 from fes_pin.diagnosis.search.possible import are_possible
 from fes_pin.diagnosis.search.starts import STARTS, number_of_forms, refinements
+from fes_pin.identify.afar import misfit_percent
 from fes_pin.infer.distributions import chi2_tail
 from fes_pin.infer.fits import Candidate, FittedSets, Names, more_degrees
-from fes_pin.infer.levels import CLAIM_LEVEL, DRIVEN_LEVEL, MOST_CAUSES, MOST_ITEMS, UNUSUAL_LEVEL
+from fes_pin.infer.levels import CLAIM_LEVEL, CONFIDENCE_95, DRIVEN_LEVEL, MOST_CAUSES, MOST_ITEMS, UNUSUAL_LEVEL
 from fes_pin.infer.scatter import excess_scatter
 from fes_pin.infer.search import Policy, Search, SearchResult
 from fes_pin.infer.spread import ByUnit, Spread
+from fes_pin.infer.text import WHOLE
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
 from fes_pin.workers import in_parallel
@@ -170,6 +172,21 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
             g: {n for n in m.parameters() if model.path(n, g) in fitted.at_bound} for g, m in model.models.items()
         }
         return all(are_possible(m.effects, at_bound[g], measured) for g, m in model.models.items())
+
+    def is_a_model(self, fitted: Grouped) -> bool:
+        """Return whether a fit is better than a constant in every group, no nominal parameter at a bound but 0.
+
+        Where repeats scatter no one simulation is that of all trials, and constants are not compared.
+        """
+        nominal = self.nominal_model.parameters()
+        if any(n.partition("@")[0] in nominal and fitted.values[n] != 0.0 for n in fitted.at_bound):
+            return False
+        return not self.leaves_noise(fitted) or all(misfit_percent(self.maxima.part(fitted, g)) <= WHOLE for g in self.trials)
+
+    def is_certain(self, fitted: Grouped, name: str) -> bool:
+        """Return whether a change is twice its deviation."""
+        (change,) = (i for i in fitted.changes if str(i) == name)
+        return fitted.certainty(change) > CONFIDENCE_95
 
     def is_claimed(self, name: str) -> bool:
         """Return whether an item is a change: a cause of all groups is none."""

@@ -12,14 +12,14 @@ from fes_pin.diagnosis.held_out import folds_of
 from fes_pin.diagnosis.remainder.lack_of_fit import lack_of_fit
 from fes_pin.infer.held_out import FOLDS, marginal_cost
 from fes_pin.infer.levels import CLAIM_LEVEL
-from fes_pin.infer.result import FITTED, Evidence, Gain, Remainder
-from fes_pin.infer.verdict import Claim, State, Verdict, Weighed
+from fes_pin.infer.result import NO_GAIN, Evidence, Remainder
+from fes_pin.infer.verdict import State, Verdict, Weighed
 from fes_pin.workers import in_parallel
 
 
 @dataclass(frozen=True)
 class ContrastWeighed(Weighed):
-    """Evidence of trials on a set; gains are those in twice the log-likelihood.
+    """Evidence of trials on a set, by the likelihood alone: the claims are the changes.
 
     Attributes
     ----------
@@ -27,7 +27,7 @@ class ContrastWeighed(Weighed):
         Warnings about the lack of fit of groups.
     """
 
-    said: Sequence[str]
+    said: Sequence[str] = ()
 
 
 Judgement = State[Grouped, ContrastModels, ContrastWeighed]
@@ -46,24 +46,11 @@ class ContrastVerdict(Verdict[Grouped, ContrastModels, ContrastWeighed]):
         super().__init__(search)
         self._costs: dict[int, tuple[Grouped, float]] = {}
 
-    @property
-    def claims(self) -> Sequence[Claim[Grouped, ContrastModels, ContrastWeighed]]:
-        """The claims in their order: a contrast has one estimator, and its folds do not search."""
-        return self.drop_unsupported, self.settle
-
     def weigh(self, found: Found) -> ContrastWeighed:
         """Return the evidence of held-out trials and of the tests of lack of fit on a set."""
-        models = self.search.models
         evidence = {} if self.search.was_stopped else self._evidence(found)
-        fitted = {n: Evidence(f.sse - found.best.sse, 0.0, FITTED) for n, f in found.without.items()}
-        gains = {n: Gain(one.added, one.low, one.high, on=one.on) for n, one in {**fitted, **evidence}.items()}
-        left, said = left_in_groups(models, found.best)
-        return ContrastWeighed(gains, evidence, left, said)
-
-    def unsupported(self, state: Judgement) -> list[str]:
-        """Return the changes that held-out trials do not confirm."""
-        evidence = state.weighed.evidence
-        return [str(i) for i in state.found.best.changes if evidence and not evidence[str(i)].low > 0.0]
+        left, said = left_in_groups(self.search.models, found.best)
+        return ContrastWeighed(dict.fromkeys(map(str, found.best.changes), NO_GAIN), evidence, left, said=said)
 
     def _evidence(self, found: Found) -> dict[str, Evidence]:
         """Return the evidence for each change in held-out trials; empty without these."""

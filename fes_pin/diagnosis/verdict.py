@@ -26,13 +26,9 @@ from fes_pin.diagnosis.held_out import (
 from fes_pin.diagnosis.rejected import is_moved_by_what_is_recorded, no_noise, with_rejected_causes
 from fes_pin.diagnosis.remainder.lack_of_fit import lack_of_fit
 from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodModels, LikelihoodSearch
-from fes_pin.diagnosis.search.possible import is_certain
-from fes_pin.identify.afar import at_a_bound, misfit_percent
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.per_trial import falls
-from fes_pin.infer.levels import FORM_SHARE
 from fes_pin.infer.result import FITTED, Remainder
-from fes_pin.infer.text import WHOLE
 from fes_pin.infer.verdict import State, Verdict, Weighed
 
 
@@ -50,9 +46,14 @@ class RigWeighed(Weighed):
         Why the error of a simulation cannot be measurement noise; None where it may be.
     """
 
-    folds: Sequence[Fold]
-    random: tuple[RandomPart, ...]
-    no_noise: str | None
+    folds: Sequence[Fold] = ()
+    random: tuple[RandomPart, ...] = ()
+    no_noise: str | None = None
+
+    @property
+    def is_random(self) -> bool:
+        """See `errors_ahead.are_large`."""
+        return are_large(self.random)
 
 
 RigState = State[LikelihoodFit, LikelihoodModels, RigWeighed]
@@ -61,8 +62,8 @@ RigState = State[LikelihoodFit, LikelihoodModels, RigWeighed]
 class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
     """The verdict on what a search by the likelihood found.
 
-    Held-out trials support a cause by `is_supported`, with errors over the horizon or of free simulations: one sample
-    ahead several wrong forms together predict nearly anything.
+    Errors are those over the horizon or of free simulations: one sample ahead several wrong forms together predict
+    nearly anything.
 
     Parameters
     ----------
@@ -100,20 +101,12 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
             found = search.result(())
         return super().of(found, search, replaced)
 
-    def unsupported(self, state: RigState) -> list[str]:
-        """Return the causes that held-out trials do not support.
-
-        Where process noise is large, a cause that explains no more than an error of form is not supported either. Where
-        there is a lack of fit, none is if the sets that folds choose predict no better than the nominal model.
-        """
-        gains = state.weighed.gains
-        if are_large(state.weighed.random) and (form := [n for n in gains if gains[n].low < WHOLE * FORM_SHARE]):
-            return form
-        weak = super().unsupported(state)
-        if weak or not (gains and state.weighed.folds and self.lack_of_fit(state).unexplained):
-            return weak
-        nominal, extended = map(self._judged, self.errors(state)[-1])
-        return [] if extended < nominal else list(gains)
+    def errors_chosen(self, state: RigState) -> tuple[float, float] | None:
+        """See `Verdict.errors_chosen`; None without trials that are held out."""
+        if not state.weighed.folds:
+            return None
+        nominal, chosen = map(self._judged, self.errors(state)[-1])
+        return nominal, chosen
 
     def lack_of_fit(self, state: RigState) -> Remainder:
         """Return the lack of fit: by its tests, process noise that is too large, or a cause that was rejected.
@@ -130,14 +123,6 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
     def is_rarely_chosen(self, state: RigState, name: str) -> bool:
         """Return whether most folds choose neither a cause nor one of its equivalents."""
         return not is_chosen(share_of(self.chosen(state), alike_in(state.found, name)))
-
-    def impossible(self, state: RigState) -> list[str]:
-        """Return all causes of a model that is worse than a constant or at a bound, else those of no certain size."""
-        best = state.found.best
-        worse = self.models.judged_s is None and misfit_percent(best) > WHOLE
-        if worse or at_a_bound(best, self.models.model) or not self.models.is_possible(best):
-            return list(state.names)
-        return [e.name for e in best.model.effects if not is_certain(best, e)]
 
     def by_another_estimator(self, state: RigState) -> RigState | None:
         """Return the verdict with white process noise, or by least squares where there is a lack of fit; else None."""

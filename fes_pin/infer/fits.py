@@ -96,6 +96,14 @@ class Sets(ABC, Generic[F]):
         """Return whether every size of a fit is physically possible."""
         return True
 
+    def is_a_model(self, fitted: F) -> bool:
+        """Return whether a fit is better than a constant, with every nominal parameter off its bounds."""
+        return True
+
+    def is_certain(self, fitted: F, name: str) -> bool:
+        """Return whether the size of a candidate of a fit is twice its deviation."""
+        return True
+
     def is_claimed(self, name: str) -> bool:
         """Return whether a candidate of the best set is a claim, for which rivals are searched."""
         return True

@@ -76,14 +76,14 @@ class Search(Generic[F, M]):
 
     Attributes
     ----------
-    models
-        The sets.
+    models, sets
+        The sets, with the type of their front end and as sets.
     was_stopped
         Whether a limit of time ended the search, so that the result is the best set so far.
     """
 
     def __init__(self, models: Paired[F, M], progress: Progress, policy: Policy | None = None) -> None:
-        self.models, self._sets = models.pair()
+        self.models, self.sets = models.pair()
         self.progress, self.policy = progress, policy or Policy()
         self.was_stopped, self._end = False, math.inf
         self._formed: set[Names] = set()
@@ -94,10 +94,10 @@ class Search(Generic[F, M]):
         self.progress(0.05, "nominal model")
         self._end = time.monotonic() + seconds_left()
         with time_limit(math.inf):
-            self._sets.nominal()
+            self.sets.nominal()
         self._kept: Names = ()
         try:
-            self._kept = self._sets.first()
+            self._kept = self.sets.first()
             given = self.policy.given
             return self.settle(self._backward(self._found_forward() if given is None else given))
         except OutOfTime:
@@ -112,12 +112,12 @@ class Search(Generic[F, M]):
 
     def nominal(self) -> F:
         """Return the fit of the nominal model."""
-        return self._sets.fits[()]
+        return self.sets.fits[()]
 
     def _found_forward(self) -> Names:
         """Return the best set of a forward search, repeated with another kind of noise where that is likelier."""
         self._forward()
-        if self._sets.begin_again(self._kept):
+        if self.sets.begin_again(self._kept):
             self._rejected.clear()
             self._formed.clear()
             self._forward()
@@ -130,8 +130,8 @@ class Search(Generic[F, M]):
             self.progress(min(0.1 + 0.2 * size, 0.7), f"sets of {size}")
             if best and not self._worth_extending(best):
                 break
-            for names in self._sets.near(size - 1)[: self.policy.beam]:
-                self._sets.extend(names, None if size == 1 else self.policy.fitted)
+            for names in self.sets.near(size - 1)[: self.policy.beam]:
+                self.sets.extend(names, None if size == 1 else self.policy.fitted)
             larger = self._first_accepted(size, best)
             if larger is None:
                 break
@@ -139,7 +139,7 @@ class Search(Generic[F, M]):
 
     def _sizes(self) -> Iterable[int]:
         """Return the sizes of sets that are larger than the best so far."""
-        first, most = len(self._kept) + 1, self._sets.most_candidates
+        first, most = len(self._kept) + 1, self.sets.most_candidates
         return itertools.count(first) if most is None else range(first, most + 1)
 
     def improves(self, larger: F, smaller: F, gain: float, explained: float) -> bool:
@@ -150,17 +150,23 @@ class Search(Generic[F, M]):
         gain, explained
             Gain of the larger over the smaller set, and over the nominal model.
         """
-        significant = self._sets.p_value(larger, smaller, gain) < self._sets.level(larger)
-        return significant and not self._sets.is_error_of_form(larger, gain, explained)
+        significant = self.sets.p_value(larger, smaller, gain) < self.sets.level(larger)
+        return significant and not self.sets.is_error_of_form(larger, gain, explained)
 
     def is_accepted(self, larger: F, smaller: F) -> bool:
-        """Return whether a larger fit improves on a smaller one."""
+        """Return whether a larger fit improves on a smaller one, or is possible where the smaller is not.
+
+        The noise of a fit that is no model takes up every error: its likelihood may be large.
+        """
+        possible = self.sets.is_possible(larger)
+        if possible != self.sets.is_possible(smaller):
+            return possible
         return self.improves(larger, smaller, smaller.sse - larger.sse, self.nominal().sse - larger.sse)
 
     def possible(self) -> dict[Names, F]:
-        """Return all fitted sets but those that are physically impossible or were rejected."""
-        models = self._sets
-        return {n: f for n, f in models.fits.items() if n not in self._rejected and models.is_possible(f)}
+        """Return the nominal model and all fitted sets but those that are not possible or were rejected."""
+        models = self.sets
+        return {n: f for n, f in models.fits.items() if not n or (n not in self._rejected and models.is_possible(f))}
 
     def _worth_extending(self, names: Names) -> bool:
         """Return whether the score of a further candidate is significant, or the set has a lack of fit.
@@ -168,8 +174,8 @@ class Search(Generic[F, M]):
         Scores are slopes at the noise of the set. That noise includes the effect of a missing candidate, so that scores
         understate its gain.
         """
-        fitted = self._sets.fits[names]
-        return self._sets.extension_p_value(fitted) < UNUSUAL_LEVEL or not self._sets.leaves_noise(fitted)
+        fitted = self.sets.fits[names]
+        return self.sets.extension_p_value(fitted) < UNUSUAL_LEVEL or not self.sets.leaves_noise(fitted)
 
     def _first_accepted(self, size: int, best: Names) -> Names | None:
         """Return the accepted set of a size of lowest criterion; sets that are not accepted are left out in turn."""
@@ -178,23 +184,23 @@ class Search(Generic[F, M]):
             if self._is_accepted(ranked[0], best):
                 return ranked[0]
             tried.append(ranked[0])
-            self._sets.converge(size, tried)
+            self.sets.converge(size, tried)
         return None
 
     def _in_better_forms(self, size: int, without: Sequence[Names], best: Names) -> list[Names]:
         """Return the best sets of a size except some, lowest criterion first, each in its significant form."""
         most = self.policy.beam
-        while rough := [n for n in self._sets.near(size, without)[:most] if self._is_rough(n, best)]:
+        while rough := [n for n in self.sets.near(size, without)[:most] if self._is_rough(n, best)]:
             self._reform(rough[0])
-        return self._sets.near(size, without)[:most]
+        return self.sets.near(size, without)[:most]
 
     def _is_rough(self, names: Names, best: Names) -> bool:
         """Return whether a set has tried no other form and has half of the required gain, to which a form may add."""
         if names in self._formed:
             return False
-        larger, smaller = self._sets.fits[names], self._sets.fits[best]
+        larger, smaller = self.sets.fits[names], self.sets.fits[best]
         doubled = 2.0 * (smaller.sse - larger.sse)
-        return self._sets.noise_p_value(doubled, more_degrees(larger, smaller)) < self._sets.level(larger)
+        return self.sets.noise_p_value(doubled, more_degrees(larger, smaller)) < self.sets.level(larger)
 
     def _is_accepted(self, names: Names, best: Names) -> bool:
         """Return whether a set is physically possible and improves on the best smaller one.
@@ -202,7 +208,7 @@ class Search(Generic[F, M]):
         A further candidate must also lower the errors of prediction, if the smaller set has no lack of fit. Where it
         has one, yet another candidate may be needed to lower the errors.
         """
-        models = self._sets
+        models = self.sets
         larger, smaller = models.fits[names], models.fits[best]
         accepted = self.is_accepted(larger, smaller)
         if accepted and best and models.leaves_noise(smaller):
@@ -216,18 +222,18 @@ class Search(Generic[F, M]):
 
     def _reform(self, names: Names) -> None:
         """Give a set, once, the form that is significant."""
-        fits = self._sets.fits
-        while names not in self._formed and (better := self._sets.better_form(fits[names])) is not None:
+        fits = self.sets.fits
+        while names not in self._formed and (better := self.sets.better_form(fits[names])) is not None:
             fits[names] = better
         self._formed.add(names)
 
     def _backward(self, names: Names) -> Names:
         """Drop candidates that are not significant given the others."""
         while names:
-            less = {n: self._sets.without(names, n) for n in names}
-            p_values = {n: self._sets.p_value(self._sets.fits[names], less[n]) for n in names}
+            less = {n: self.sets.without(names, n) for n in names}
+            p_values = {n: self.sets.p_value(self.sets.fits[names], less[n]) for n in names}
             weakest = max(names, key=lambda n: (p_values[n], -less[n].sse))
-            if self.is_accepted(self._sets.fits[names], less[weakest]):
+            if self.is_accepted(self.sets.fits[names], less[weakest]):
                 break
             names = tuple(n for n in names if n != weakest)
         return names
@@ -253,12 +259,12 @@ class Search(Generic[F, M]):
     def _best_of_rivals(self, names: Names, rejected: Iterable[str]) -> Names:
         """Fit the rivals of a set, and return the best of all that can be the answer."""
         self.progress(0.75, "rivals")
-        for name in filter(self._sets.is_claimed, names):
+        for name in filter(self.sets.is_claimed, names):
             rest = tuple(n for n in names if n != name)
-            self._sets.without(names, name)
-            self._sets.extend(rest, None if len(names) == 1 else self.policy.fitted)
-            self._sets.converge_rivals(names, name)
-        return next(n for n in self._sets.ranked(len(names)) if n == names or self._may_be(n, rejected))
+            self.sets.without(names, name)
+            self.sets.extend(rest, None if len(names) == 1 else self.policy.fitted)
+            self.sets.converge_rivals(names, name)
+        return next(n for n in self.sets.ranked(len(names)) if n == names or self._may_be(n, rejected))
 
     def _may_be(self, names: Names, rejected: Iterable[str]) -> bool:
         """Return whether a set can be the answer: none of its candidates is rejected, and each is accepted."""
@@ -269,7 +275,7 @@ class Search(Generic[F, M]):
 
     def result(self, names: Names) -> SearchResult[F]:
         """Return the result for a set from the fitted sets, without a search for further rivals."""
-        models = self._sets
+        models = self.sets
         rivals: dict[str, list[F]] = {}
         without: dict[str, F] = {}
         for name in names:

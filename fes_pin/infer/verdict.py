@@ -1,22 +1,34 @@
 """The verdict on what a search found: a table of claims in a stated order, each of which may change the set.
 
 A claim takes a state and returns another one, or None if it has no objection. After each change the table is applied
-from its beginning. The state to which no claim objects is the verdict.
+from its beginning. The state to which no claim objects is the verdict. Every front end has the same claims: a claim
+that asks for what a front end does not weigh has no objection there.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Generic, TypeVar
 
 from fes_pin.infer.fits import F
 from fes_pin.infer.held_out import is_supported
-from fes_pin.infer.levels import NOTHING_PERCENT
+from fes_pin.infer.levels import FORM_SHARE, NOTHING_PERCENT
 from fes_pin.infer.result import FITTED, Evidence, Gain, Remainder
 from fes_pin.infer.search import M, Search, SearchResult
 from fes_pin.infer.text import WHOLE
+
+REASONS = {
+    "drop_insignificant": "its gain is not significant",
+    "drop_errors_of_form": "process noise is large, and it gains no more than an error of form may",
+    "drop_unsupported": "held-out data do not confirm it",
+    "drop_not_carried": "it gains nothing on other parts of the data, where it must act too",
+    "drop_that_predict_no_better": "the sets that folds choose predict no better than the nominal model",
+    "drop_rarely_chosen": "most folds of the data choose a set without it",
+    "drop_impossible": "its size is not twice its deviation, a parameter is at a bound, or a constant predicts as well",
+}
+"""Why a claim rejects a candidate, in words."""
 
 
 @dataclass(frozen=True)
@@ -31,30 +43,47 @@ class Rejected:
         Its share of the gain of all candidates in log-likelihood.
     gain
         Its gain on the data by which it was judged.
+    claim
+        The claim that rejected it.
     """
 
     p_value: float
     share: float
     gain: Gain
+    claim: str = ""
+
+    @property
+    def reason(self) -> str:
+        """Why, in words."""
+        return REASONS[self.claim]
 
 
 @dataclass(frozen=True)
 class Weighed:
-    """Evidence of the data on each candidate of a set.
+    """Evidence of the data on each claim of a set.
 
     Attributes
     ----------
     gains
-        Gains on held-out data; on the fitted data where none could be held out.
+        Gain in errors of every candidate that is a claim: on held-out data, or on the fitted data where none could be
+        held out; `NO_GAIN` of a candidate that is not judged by errors.
     evidence
-        Evidence in the likelihood of the same data; empty where a front end has none.
+        Evidence in the likelihood of the same data; empty where there is none.
     lack_of_fit
         Lack of fit of the set.
+    carried
+        Gains, percent, on other parts of the data than a candidate was fitted to, of those that must act there too.
     """
 
     gains: Mapping[str, Gain]
     evidence: Mapping[str, Evidence]
     lack_of_fit: Remainder
+    carried: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def is_random(self) -> bool:
+        """Whether process noise is more than a small share of what drives the system."""
+        return False
 
 
 W = TypeVar("W", bound=Weighed)
@@ -114,7 +143,17 @@ class Verdict(ABC, Generic[F, M, W]):
     @property
     def claims(self) -> Sequence[Claim[F, M, W]]:
         """The claims in their order."""
-        return self.drop_unsupported, self.settle, self.drop_rarely_chosen, self.drop_impossible, self.switch_estimator
+        return (
+            self.drop_insignificant,
+            self.drop_errors_of_form,
+            self.drop_unsupported,
+            self.drop_not_carried,
+            self.drop_that_predict_no_better,
+            self.settle,
+            self.drop_rarely_chosen,
+            self.drop_impossible,
+            self.switch_estimator,
+        )
 
     @abstractmethod
     def weigh(self, found: SearchResult[F]) -> W:
@@ -125,26 +164,23 @@ class Verdict(ABC, Generic[F, M, W]):
         return state.weighed.lack_of_fit
 
     def evidence(self, state: State[F, M, W]) -> dict[str, Evidence | None]:
-        """Return the evidence for each candidate; None where there is a lack of fit, but of fitted data alone.
+        """Return the evidence for each claim; None where a lack of fit leaves it to errors of held-out data.
 
         A likelihood says little of a wrong model. Its errors of prediction, which no fit minimises, say less of the
         data that it was fitted to.
         """
-        wrong = self.lack_of_fit(state).unexplained
-        return {n: None if wrong and e.on != FITTED else e for n, e in state.weighed.evidence.items()}
+        known, gains = state.weighed.evidence, state.weighed.gains
+        held_out = {n for n, e in known.items() if e.on != FITTED and not gains[n].is_none}
+        by_errors = held_out if self.lack_of_fit(state).unexplained else set[str]()
+        return {n: None if n in by_errors else known.get(n) for n in gains}
 
-    def unsupported(self, state: State[F, M, W]) -> list[str]:
-        """Return the candidates that held-out data do not support; where none could be held out, the fitted data."""
-        known, gains = self.evidence(state), state.weighed.gains
-        return [n for n, e in known.items() if not is_supported(e, gains[n], alone=len(known) == 1)]
+    def errors_chosen(self, state: State[F, M, W]) -> tuple[float, float] | None:
+        """Return held-out errors of the nominal model and of the sets that folds choose; None where none chooses."""
+        return None
 
     def is_rarely_chosen(self, state: State[F, M, W], name: str) -> bool:
         """Return whether most folds of the data choose a set without a candidate."""
         return False
-
-    def impossible(self, state: State[F, M, W]) -> list[str]:
-        """Return the candidates that no answer may contain: at a bound, or of no more than twice their deviation."""
-        return []
 
     def by_another_estimator(self, state: State[F, M, W]) -> State[F, M, W] | None:
         """Return the verdict of another estimator of the same data; None where there is none."""
@@ -173,14 +209,43 @@ class Verdict(ABC, Generic[F, M, W]):
         while True:
             for claim in self.claims:
                 if (changed := claim(state)) is not None:
-                    state = replace(changed, steps=(*changed.steps, claim.__name__))
+                    state = _noted(changed, claim.__name__)
                     break
             else:
                 return state
 
+    def drop_insignificant(self, state: State[F, M, W]) -> State[F, M, W] | None:
+        """Reject the weakest of the candidates that are not significant at the level of a claim."""
+        found, level = state.found, state.search.sets.level(state.found.best)
+        return self._without_weakest(state, [n for n in state.weighed.gains if not found.p_values[n] < level])
+
+    def drop_errors_of_form(self, state: State[F, M, W]) -> State[F, M, W] | None:
+        """Reject the weakest of the candidates that gain no more than an error of form, if process noise is large."""
+        least, gains = WHOLE * FORM_SHARE, state.weighed.gains
+        return self._without_weakest(state, [n for n in gains if state.weighed.is_random and gains[n].low < least])
+
     def drop_unsupported(self, state: State[F, M, W]) -> State[F, M, W] | None:
-        """Reject the weakest of the candidates that held-out data do not support."""
-        return self._without_weakest(state, self.unsupported(state))
+        """Reject the weakest of the candidates that held-out data do not support; see `infer.held_out.is_supported`.
+
+        Where no data could be held out, the fitted data judge.
+        """
+        known, gains = self.evidence(state), state.weighed.gains
+        weak = [n for n, e in known.items() if not is_supported(e, gains[n], alone=len(known) == 1)]
+        return self._without_weakest(state, weak)
+
+    def drop_not_carried(self, state: State[F, M, W]) -> State[F, M, W] | None:
+        """Reject the weakest of the candidates that gain nothing on other parts of the data, where they act too."""
+        return self._without_weakest(state, [n for n, gain in state.weighed.carried.items() if not gain > 0.0])
+
+    def drop_that_predict_no_better(self, state: State[F, M, W]) -> State[F, M, W] | None:
+        """Reject the weakest candidate if the sets that folds choose predict no better than the nominal model.
+
+        This is asked where there is a lack of fit.
+        """
+        if not (state.weighed.gains and self.lack_of_fit(state).unexplained):
+            return None
+        nominal, chosen = self.errors_chosen(state) or (1.0, 0.0)
+        return None if chosen < nominal else self._without_weakest(state, list(state.weighed.gains))
 
     def settle(self, state: State[F, M, W]) -> State[F, M, W] | None:
         """Search the rivals of a set from which candidates were rejected."""
@@ -194,8 +259,14 @@ class Verdict(ABC, Generic[F, M, W]):
         return self._without_weakest(state, [n for n in state.names if self.is_rarely_chosen(state, n)])
 
     def drop_impossible(self, state: State[F, M, W]) -> State[F, M, W] | None:
-        """Reject the weakest of the candidates that no answer may contain."""
-        return self._without_weakest(state, self.impossible(state))
+        """Reject the weakest candidate of a model that is none, else of those whose size is not certain.
+
+        A model is none if it is worse than a constant, or if a nominal parameter or a candidate ended at a bound.
+        """
+        models, best, claimed = state.search.sets, state.found.best, list(state.weighed.gains)
+        if models.is_a_model(best) and models.is_possible(best):
+            claimed = [n for n in claimed if not models.is_certain(best, n)]
+        return self._without_weakest(state, claimed)
 
     def switch_estimator(self, state: State[F, M, W]) -> State[F, M, W] | None:
         """Take the verdict of another estimator of the same data if it predicts materially better; tried once.
@@ -209,13 +280,25 @@ class Verdict(ABC, Generic[F, M, W]):
 
     def _without_weakest(self, state: State[F, M, W], some: Sequence[str]) -> State[F, M, W] | None:
         """Return the state without the weakest of some candidates; None if there are none."""
-        gains = state.weighed.gains
-        weakest = min(some, key=lambda n: (gains[n].low, n), default=None)
+        weakest = min(some, key=lambda n: (_low(state.weighed, n), n), default=None)
         if weakest is None:
             return None
-        rejected = Rejected(state.found.p_values[weakest], share_in(state.found, weakest), gains[weakest])
+        gain, p_value = state.weighed.gains[weakest], state.found.p_values[weakest]
+        rejected = {**state.rejected, weakest: Rejected(p_value, share_in(state.found, weakest), gain)}
         found = state.search.result(tuple(sorted(state.names - {weakest})))
-        return replace(state, found=found, weighed=self.weigh(found), rejected={**state.rejected, weakest: rejected})
+        return replace(state, found=found, weighed=self.weigh(found), rejected=rejected)
+
+
+def _low(weighed: Weighed, name: str) -> float:
+    """Return the low end of a candidate's gain; of one that is not judged by errors, that of its evidence, or 0."""
+    gain, evidence = weighed.gains[name], weighed.evidence.get(name)
+    return gain.low if not gain.is_none else evidence.low if evidence is not None else 0.0
+
+
+def _noted(state: State[F, M, W], claim: str) -> State[F, M, W]:
+    """Return a state with a claim that changed it; what the claim rejected says so."""
+    rejected = {n: one if one.claim else replace(one, claim=claim) for n, one in state.rejected.items()}
+    return replace(state, steps=(*state.steps, claim), rejected=rejected)
 
 
 def share_in(found: SearchResult[F], name: str) -> float:

@@ -11,7 +11,7 @@ import numpy as np
 
 from fes_pin.infer.family import SimulatedFamily
 from fes_pin.infer.fits import Candidate, FittedSets, Names
-from fes_pin.infer.levels import POSSIBLE_SIZES, STRONG_EVIDENCE, WALK_LEVEL
+from fes_pin.infer.levels import CERTAIN_LEVEL, CONFIDENCE_95, POSSIBLE_SIZES, STRONG_EVIDENCE, WALK_LEVEL
 from fes_pin.infer.search import Policy, Search, SearchResult
 from fes_pin.walk.designs import Designs
 from fes_pin.walk.likelihood import Fitted, fit_many
@@ -181,8 +181,13 @@ class WalkModels(FittedSets[WalkFit, None]):
         return float(gain <= 0.0) if self.null is None else self.null.p_value(gain)
 
     def level(self, fitted: WalkFit) -> float:
-        """See `WALK_LEVEL`."""
-        return WALK_LEVEL
+        """Return `WALK_LEVEL`; of a single stride, which nothing held out confirms, `CERTAIN_LEVEL`."""
+        return WALK_LEVEL if self.designs.strides.count > 1 else CERTAIN_LEVEL
+
+    def is_certain(self, fitted: WalkFit, name: str) -> bool:
+        """Return whether a size of a form is twice its deviation."""
+        sizes, deviations = self.sizes(fitted)[name], self.deviations(fitted)[name]
+        return bool(np.any(np.abs(sizes) > CONFIDENCE_95 * deviations))
 
     def near_rivals(self, found: SearchResult[WalkFit], name: str) -> list[WalkFit]:
         """Return sets with another form in the place of one that are not strongly excluded, best first."""

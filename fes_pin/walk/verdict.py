@@ -4,8 +4,7 @@ from dataclasses import replace
 from functools import cache, partial
 
 from fes_pin.infer.distributions import chi2_tail, normal_quantile
-from fes_pin.infer.held_out import is_supported
-from fes_pin.infer.levels import CERTAIN_LEVEL, CLAIM_LEVEL, WALK_LEVEL
+from fes_pin.infer.levels import CLAIM_LEVEL
 from fes_pin.infer.result import FITTED, NO_GAIN, Cause, Evidence, ParameterEstimate, Remainder
 from fes_pin.infer.search import SearchResult
 from fes_pin.infer.text import listed
@@ -50,24 +49,14 @@ class WalkVerdict(Verdict[WalkFit, WalkModels, Weighed]):
         """Return the evidence of held-out strides and of the test of lack of fit on a set."""
         designs, best, less = self.models.designs, found.best, found.without
         many = designs.strides.count > 1
+        by_errors = {n for n in less if many and not designs.forms[n].reads}
+        elsewhere = {n: self.other_leg(n) for n in less}
         return Weighed(
-            gains={n: self.errors.gain(without, best, many) for n, without in less.items()},
-            evidence={n: self.errors.evidence(without, best) for n, without in less.items()} if many else {},
+            gains={n: self.errors.gain(f, best, many) if n in by_errors else NO_GAIN for n, f in less.items()},
+            evidence={n: self.errors.evidence(f, best) for n, f in less.items()} if many else {},
             lack_of_fit=lack_of_fit(designs, best),
+            carried={n: gain for n, gain in elsewhere.items() if gain is not None},
         )
-
-    def unsupported(self, state: Judgement) -> list[str]:
-        """Return forms that held-out strides, or the other leg, do not support."""
-        return [n for n in state.names if not self._is_supported(state, n)]
-
-    def _is_supported(self, state: Judgement, name: str) -> bool:
-        weighed, p_value, alone = state.weighed, state.found.p_values[name], len(state.names) == 1
-        other = self.other_leg(name)
-        if p_value >= (WALK_LEVEL if weighed.evidence else CERTAIN_LEVEL) or (other is not None and other <= 0.0):
-            return False
-        if not weighed.evidence or (self.models.designs.forms[name].reads and weighed.evidence[name].low > 0.0):
-            return True
-        return is_supported(weighed.evidence[name], weighed.gains[name], alone)
 
     def lack_of_fit(self, state: Judgement) -> Remainder:
         """Return the lack of fit: the residual repeats in every stride, or held-out strides rejected a cause."""
@@ -88,7 +77,8 @@ class WalkVerdict(Verdict[WalkFit, WalkModels, Weighed]):
             body, (share,), (std,) = self.models.designs.stated.body_kg, values, stds
             each = [(form.site, body * (1.0 + share), body * std, "kg")]
             words = f"the body is stated to weigh {body:.4g} kg; it weighs {body * (1.0 + share):.4g}"
-        gain, gained = weighed.gains[name], found.without[name].fitted.deviance - best.fitted.deviance
+        gain = self.errors.gain(found.without[name], best, many := bool(weighed.evidence))
+        gained = found.without[name].fitted.deviance - best.fitted.deviance
         return Cause(
             name=form.cause,
             stage=STAGE,
@@ -98,7 +88,7 @@ class WalkVerdict(Verdict[WalkFit, WalkModels, Weighed]):
             elsewhere=tuple(dict.fromkeys(f.site for f in instead if f.cause == form.cause)),
             p_value=found.p_values[name],
             gain_fit=self.errors.gain(found.without[name], best, False).percent,
-            gain_held_out=gain if weighed.evidence else replace(gain, on=FITTED),
+            gain_held_out=gain if many else replace(gain, on=FITTED),
             evidence=weighed.evidence.get(name) or replace(Evidence.of(gained), on=FITTED),
             words=words,
             further={"other_leg": self.other_leg(name)},

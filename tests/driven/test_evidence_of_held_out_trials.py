@@ -26,6 +26,9 @@ class Judged(RigVerdict):
 
     held_out = 1.0, 0.5
 
+    def weigh(self, found):
+        return RigWeighed({}, {}, NOTHING)
+
     def errors(self, state):
         return [tuple(Ahead(e, e, e) for e in (1.0, 0.1)), tuple(Ahead(e, e, e) for e in self.held_out)]
 
@@ -35,10 +38,16 @@ def unsupported(evidence, low, random, held_out=Judged.held_out):
     verdict = Judged(SimpleNamespace(models=SimpleNamespace(judged_s=None, library=SimpleNamespace(effects=()))), ())
     verdict.held_out = held_out
     gains = {"coulomb_friction": Gain(low + 1.0, low, low + 2.0)}
-    found = SimpleNamespace(without={"coulomb_friction": None})
-    return verdict.unsupported(
-        State(None, found, RigWeighed(gains, evidence, NOTHING, (None,), random, None), {}, frozenset(gains))
+    fit = SimpleNamespace(sse=0.0)
+    found = SimpleNamespace(
+        without=dict.fromkeys(gains, fit), p_values=dict.fromkeys(gains, 0.0), nominal=fit, best=fit
     )
+    search = SimpleNamespace(result=lambda names: SimpleNamespace(without={}))
+    state = State(
+        search, found, RigWeighed(gains, evidence, NOTHING, folds=(None,), random=random), {}, frozenset(gains)
+    )
+    claims = verdict.drop_errors_of_form, verdict.drop_unsupported, verdict.drop_that_predict_no_better
+    return [claim.__name__ for claim in claims if claim(state) is not None]
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.search.library import Library
 from fes_pin.diagnosis.search.likelihood_forms import refined_form
 from fes_pin.diagnosis.search.likelihood_maxima import less, likeliest, look, maximum_from_afar, process_noises
-from fes_pin.diagnosis.search.possible import is_possible
+from fes_pin.diagnosis.search.possible import is_certain, is_possible
 from fes_pin.diagnosis.search.score import Scored, best_by_effect
 from fes_pin.diagnosis.search.starts import STARTED, STARTS, at_null, from_afar, refinements, started
 from fes_pin.identify.afar import at_a_bound, followed, following, freed, misfit_percent, with_beliefs
@@ -286,31 +286,46 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
     def approach(self, least: float = NOTHING_PERCENT) -> Names:
         """Return the smallest set whose E is no more than the least, or the nearest set of at most `MOST_CAUSES`.
 
-        Each further cause lessens E by a tenth, or an E that is negligible by half. Forms of the nearest sets of
-        several causes are refined before a further cause is tried.
+        Forms of the sets of several causes that are about as near as the nearest are refined before a further cause is
+        tried. Causes that the others came to replace are dropped at the end.
         """
         best: Names = ()
         fits = self.fits
         self.nominal()
-        while (now := self.misfit(fits[best])) > least and len(best) < MOST_CAUSES:
-            most = now / MORE if now < NOTHING_PERCENT else (1.0 - SMALL_SHARE) * now
+        while self.misfit(fits[best]) > least and len(best) < MOST_CAUSES:
             for k, names in enumerate(self._nearest(len(best))):
                 self.extend(names, FITTED if k else None)
-            larger = self._nearest(len(best) + 1)
+            larger = self._nearest(len(best) + 1, FITTED)
             if best and larger and self.is_far(fits[larger[0]]):
-                in_parallel(self._refine, larger)
-                larger.sort(key=lambda n: self.misfit(fits[n]))
-            if not larger or self.misfit(fits[larger[0]]) > most:
+                near = MORE * self.misfit(fits[larger[0]])
+                in_parallel(self._refine, [n for n in larger if self.misfit(fits[n]) <= near])
+                larger = self._nearest(len(best) + 1)
+            if not (larger and self._is_nearer(fits[larger[0]], fits[best])):
                 break
             best = larger[0]
         if best:
             self._refine(best)
+        while len(best) > 1:
+            rest = min((tuple(n for n in best if n != one) for one in best), key=lambda n: self._left(best, n))
+            if self._left(best, rest) > least and self._is_nearer(fits[best], fits[rest]):
+                break
+            best = rest
         return best
 
-    def _nearest(self, size: int) -> list[Names]:
-        """Return the `NEAREST` sets of a size of least E whose causes are physically possible."""
+    def _is_nearer(self, larger: LikelihoodFit, smaller: LikelihoodFit) -> bool:
+        """Return whether a larger set lessens E by a tenth, or an E that is negligible by half."""
+        now = self.misfit(smaller)
+        return self.misfit(larger) <= (now / MORE if now < NOTHING_PERCENT else (1.0 - SMALL_SHARE) * now)
+
+    def _left(self, names: Names, rest: Names) -> float:
+        """Return E of a set without the causes that a smaller one lacks, from its values where that is better."""
+        (gone,) = {*names} - {*rest}
+        return self.misfit(self.without(names, gone))
+
+    def _nearest(self, size: int, count: int = NEAREST) -> list[Names]:
+        """Return the sets of a size of least E whose causes are physically possible."""
         possible = [n for n, f in self.fits.items() if len(n) == size and (not n or self.is_possible(f))]
-        return sorted(possible, key=lambda n: (self.misfit(self.fits[n]), n))[:NEAREST]
+        return sorted(possible, key=lambda n: (self.misfit(self.fits[n]), n))[:count]
 
     def _refine(self, names: Names) -> None:
         """Replace the fit of a set by that of a refined form where E is half as large."""
@@ -454,8 +469,17 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         return fitted
 
     def is_possible(self, fitted: LikelihoodFit) -> bool:
-        """Return False if the size of a cause is physically impossible; see `possible.is_possible`."""
-        return is_possible(fitted, self.library.measured)
+        """Return False if a fit is no model, or the size of a cause physically impossible; see `possible.is_possible`."""
+        return self.is_a_model(fitted) and is_possible(fitted, self.library.measured)
+
+    def is_a_model(self, fitted: LikelihoodFit) -> bool:
+        """Return whether a fit is better than a constant, with every nominal parameter off its bounds."""
+        worse = self.judged_s is None and self.misfit(fitted) > WHOLE
+        return not (worse or at_a_bound(fitted, self.model))
+
+    def is_certain(self, fitted: LikelihoodFit, name: str) -> bool:
+        """See `possible.is_certain`."""
+        return is_certain(fitted, next(e for e in fitted.model.effects if e.name == name))
 
 
 def _of_much(shapes: Sequence[Scored]) -> list[Scored]:
