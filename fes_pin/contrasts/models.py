@@ -181,7 +181,9 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
         nominal = self.nominal_model.parameters()
         if any(n.partition("@")[0] in nominal and fitted.values[n] != 0.0 for n in fitted.at_bound):
             return False
-        return not self.leaves_noise(fitted) or all(misfit_percent(self.maxima.part(fitted, g)) <= WHOLE for g in self.trials)
+        return not self.leaves_noise(fitted) or all(
+            misfit_percent(self.maxima.part(fitted, g)) <= WHOLE for g in self.trials
+        )
 
     def is_certain(self, fitted: Grouped, name: str) -> bool:
         """Return whether a change is twice its deviation."""

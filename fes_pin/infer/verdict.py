@@ -144,11 +144,11 @@ class Verdict(ABC, Generic[F, M, W]):
     def claims(self) -> Sequence[Claim[F, M, W]]:
         """The claims in their order."""
         return (
-            self.drop_insignificant,
             self.drop_errors_of_form,
             self.drop_unsupported,
             self.drop_not_carried,
             self.drop_that_predict_no_better,
+            self.drop_insignificant,
             self.settle,
             self.drop_rarely_chosen,
             self.drop_impossible,

@@ -46,7 +46,7 @@ class Cogging(Effect):
         if not size > 0.0:
             return grids
         waves = [TURN / size * n for n in np.arange(FEWEST, MOST, STEP)]
-        waves += [float(n) for n in range(1, TEETH + 1) if size > TURN and n * size > TURN * MOST]
+        waves += [float(n) for n in range(1, TEETH + 1) if size > FEWEST * TURN]
         return {**grids, "waves": tuple(waves)}
 
     def limits(self, measured: Measured) -> Bounds:
