@@ -1,5 +1,6 @@
 """The verdict is a table of claims: each may change what was found, and what no claim objects to is the answer."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -7,9 +8,9 @@ import pytest
 from infer.regression import COUNT, Regression, RegressionVerdict
 
 from fes_pin.infer.held_out import deal
-from fes_pin.infer.result import CROSS_VALIDATED, FITTED, Evidence, Gain
+from fes_pin.infer.result import CROSS_VALIDATED, FITTED, NO_GAIN, Evidence, Gain
 from fes_pin.infer.search import Search
-from fes_pin.infer.verdict import State, Verdict, Weighed, word_of
+from fes_pin.infer.verdict import REASONS, State, Verdict, Weighed, word_of
 
 NOISE, SOMETHING = SimpleNamespace(unexplained=False), SimpleNamespace(unexplained=True)
 
@@ -127,6 +128,7 @@ def test_what_one_run_alone_shows_is_refused_and_said_to_be_refused(judged):
     found = judged(runs, x)
     assert found.names == frozenset() and "drop_unsupported" in found.steps
     assert "x07" in found.rejected and found.rejected["x07"].p_value < 1e-3
+    assert "do not confirm" in found.rejected["x07"].reason
 
 
 class TwoEstimators(Claims):
@@ -166,3 +168,61 @@ def test_another_estimator_is_asked_once_and_taken_where_it_predicts_better(erro
 def test_most_of_a_negligible_remainder_is_material_on_held_out_data_alone(on, percent, is_material):
     """On fitted data, a lag removed 68 % of an error of 0.3 % next to a torque that removed 200 %."""
     assert Gain(percent, 0.01, 2.0 * percent, on=on, given=68.0).is_material == is_material
+
+
+class Given(RegressionVerdict):
+    """The same with one piece of evidence given for each candidate, in the place of what runs say."""
+
+    def __init__(self, search, given):
+        super().__init__(search)
+        self.given = given
+
+    def weigh(self, found):
+        said = {n: {} if one is None else dict.fromkeys(found.without, one) for n, one in self.given.items()}
+        return replace(super().weigh(found), **said)
+
+
+@pytest.fixture
+def two_columns():
+    rng = np.random.default_rng(3)
+    x = {f"x{k:02d}": rng.standard_normal(COUNT) for k in range(20)}
+    runs = 0.5 * x["x03"] - 0.4 * x["x11"] + rng.standard_normal((6, COUNT))
+    return Search(Regression(x, runs), lambda share, words: None)
+
+
+@pytest.mark.parametrize(
+    ("given", "claim"),
+    [
+        ({"gains": gain(-50.0), "evidence": None}, "drop_unsupported"),
+        ({"carried": -1.0}, "drop_not_carried"),
+        ({"gains": NO_GAIN, "evidence": Evidence(-3.0, 0.0)}, "drop_unsupported"),
+    ],
+    ids=["errors alone", "not on other parts", "the likelihood alone"],
+)
+def test_every_claim_judges_what_a_front_end_weighs(two_columns, given, claim):
+    """A front end judged by errors alone had dropped nothing."""
+    state = Given(two_columns, given).of(two_columns.run())
+    assert state.names == frozenset() and set(state.rejected) >= {"x03", "x11"}
+    assert {r.claim for r in state.rejected.values()} == {claim}
+
+
+@pytest.mark.parametrize("says", ["is_a_model", "is_possible", "is_certain"])
+def test_no_front_end_names_what_is_no_model_or_of_no_certain_size(two_columns, says):
+    found = two_columns.run()
+    setattr(two_columns.models, says, lambda *_: False)
+    state = RegressionVerdict(two_columns).of(found)
+    assert state.names == frozenset() and {r.claim for r in state.rejected.values()} == {"drop_impossible"}
+
+
+def test_a_candidate_that_a_given_level_finds_insignificant_is_dropped(two_columns):
+    found = two_columns.run()
+    two_columns.models.level = lambda fitted: 0.0
+    state = RegressionVerdict(two_columns).of(found)
+    assert {r.claim for r in state.rejected.values()} == {"drop_insignificant"}
+
+
+def test_every_claim_that_rejects_says_why():
+    drops = {n for n in vars(Verdict) if n.startswith("drop_")}
+    assert drops == set(REASONS)
+    named = [claim.__name__ for claim in CLAIMS.claims]
+    assert drops < set(named) and all("claims" not in vars(front) for front in Verdict.__subclasses__())

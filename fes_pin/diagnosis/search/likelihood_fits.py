@@ -469,7 +469,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         return fitted
 
     def is_possible(self, fitted: LikelihoodFit) -> bool:
-        """Return False if a fit is no model, or the size of a cause physically impossible; see `possible.is_possible`."""
+        """Return False if a fit is no model, or the size of a cause is impossible; see `possible.is_possible`."""
         return self.is_a_model(fitted) and is_possible(fitted, self.library.measured)
 
     def is_a_model(self, fitted: LikelihoodFit) -> bool:
