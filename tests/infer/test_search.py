@@ -129,6 +129,14 @@ def test_a_further_candidate_must_explain_more_than_errors_of_form_leave(gain, a
     assert search.is_accepted(larger, smaller) is accepted
 
 
+def test_a_set_that_is_a_model_is_accepted_beside_one_that_is_none(search, monkeypatch):
+    """An autoregression takes up every error of a simulation that is worse than a constant: it was the likelier."""
+    near, wreck = (SimpleNamespace(sse=s, degrees=1, is_near=s > -50.0) for s in (-40.0, -100.0))
+    assert not search.is_accepted(near, wreck)
+    monkeypatch.setattr(search.models, "is_possible", lambda fitted: fitted.is_near)
+    assert search.is_accepted(near, wreck) and not search.is_accepted(wreck, near)
+
+
 @pytest.mark.parametrize(
     ("base", "better", "noise", "accepted"),
     [("lag", False, True, False), ("lag", True, True, True), ("", False, True, True), ("lag", False, False, True)],
