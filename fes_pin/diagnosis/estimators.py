@@ -59,7 +59,7 @@ def least_error(search: LikelihoodSearch) -> tuple[LikelihoodSearch, Found] | No
     def chosen() -> Found:
         if len(search.models.trials) < FEWEST:
             is_calm = search.models.noise == MEASUREMENT
-            return other.result(other.models.approach(0.0 if is_calm else NOTHING_PERCENT))
+            return other.settle(other.models.approach(0.0 if is_calm else NOTHING_PERCENT))
         return other.result(best_predicting(other, other.run().best.names))
 
     return _ended(other, attempted(chosen, None, search.seconds_left))

@@ -71,6 +71,8 @@ class Weighed:
         Evidence in the likelihood of the same data; empty where there is none.
     lack_of_fit
         Lack of fit of the set.
+    is_robust
+        Whether the noise of the likelihood includes errors of the model, so that it judges a wrong model too.
     carried
         Gains, percent, on other parts of the data than a candidate was fitted to, of those that must act there too.
     """
@@ -78,6 +80,7 @@ class Weighed:
     gains: Mapping[str, Gain]
     evidence: Mapping[str, Evidence]
     lack_of_fit: Remainder
+    is_robust: bool = False
     carried: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -171,7 +174,8 @@ class Verdict(ABC, Generic[F, M, W]):
         """
         known, gains = state.weighed.evidence, state.weighed.gains
         held_out = {n for n, e in known.items() if e.on != FITTED and not gains[n].is_none}
-        by_errors = held_out if self.lack_of_fit(state).unexplained else set[str]()
+        is_wrong = self.lack_of_fit(state).unexplained and not state.weighed.is_robust
+        by_errors = held_out if is_wrong else set[str]()
         return {n: None if n in by_errors else known.get(n) for n in gains}
 
     def errors_chosen(self, state: State[F, M, W]) -> tuple[float, float] | None:

@@ -28,11 +28,10 @@ Judgement = State[WalkFit, WalkModels, Weighed]
 class WalkVerdict(Verdict[WalkFit, WalkModels, Weighed]):
     """The verdict on what a search over sets of forms found.
 
-    The likelihood of held-out strides must support a cause: it counts errors of soft tissue, landmarks and plates in
-    every stride as noise, which make up most of an error in newtons. A form that belongs to neither leg must also
-    predict the stances of one leg from those of the other. An offset that is read in the air need not lessen the errors
-    in newtons, which other errors may hide. With a single stride nothing can be held out; only a cause that is certain
-    is then named.
+    The likelihood of held-out strides counts errors of soft tissue, landmarks and plates in every stride as noise,
+    which make up most of an error in newtons. A form that belongs to neither leg must also predict the stances of one
+    leg from those of the other. An offset that is read in the air is not judged by the errors in newtons, which other
+    errors may hide. With a single stride nothing can be held out; only a cause that is certain is then named.
 
     Parameters
     ----------
@@ -55,6 +54,7 @@ class WalkVerdict(Verdict[WalkFit, WalkModels, Weighed]):
             gains={n: self.errors.gain(f, best, many) if n in by_errors else NO_GAIN for n, f in less.items()},
             evidence={n: self.errors.evidence(f, best) for n, f in less.items()} if many else {},
             lack_of_fit=lack_of_fit(designs, best),
+            is_robust=True,
             carried={n: gain for n, gain in elsewhere.items() if gain is not None},
         )
 
