@@ -82,7 +82,8 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
 
         Changes of several may be mistaken for the change of a cause.
         """
-        apart = Search(CommonModels(self), lambda share, words: None, Policy(beam=1)).run().best
+        search = Search[Grouped, CommonModels](CommonModels(self), lambda share, words: None, Policy(beam=1))
+        apart = search.run().best
         alike = self._without(apart, apart.changes) if apart.items - set(apart.changes) else self.fits[()]
         while apart.changes and apart.criterion < alike.criterion:
             less = self._without(apart, [min(apart.changes, key=apart.certainty)])

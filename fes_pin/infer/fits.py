@@ -4,7 +4,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Generic, Protocol, Self, TypeVar
+from typing import Generic, Protocol, TypeVar
 
 from fes_pin.infer.family import Family
 from fes_pin.infer.levels import CLAIM_LEVEL, MOST_CAUSES
@@ -59,10 +59,6 @@ class Sets(ABC, Generic[F]):
         self.fits: dict[Names, F] = {}
         self._converged: set[Names] = set()
         self._begun: set[tuple[Names, Hashable]] = set()
-
-    def pair(self) -> tuple[Self, "Sets[F]"]:
-        """Return these sets with the type of their front end, and as sets: a search needs both."""
-        return self, self
 
     @abstractmethod
     def nominal(self) -> F:

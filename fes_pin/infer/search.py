@@ -10,21 +10,13 @@ import math
 import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Generic, Protocol, TypeVar
+from typing import Any, Generic, TypeVar
 
 from fes_pin.infer.fits import F, Names, Sets, more_degrees
 from fes_pin.infer.levels import UNUSUAL_LEVEL
 from fes_pin.workers import OutOfTime, Progress, seconds_left, time_limit
 
-M = TypeVar("M")
-M_co = TypeVar("M_co", covariant=True)
-
-
-class Paired(Protocol[F, M_co]):
-    """Sets that know the type of their front end."""
-
-    def pair(self) -> tuple[M_co, Sets[F]]:
-        """Return them with that type, and as sets."""
+M = TypeVar("M", bound=Sets[Any])
 
 
 @dataclass(frozen=True)
@@ -82,8 +74,9 @@ class Search(Generic[F, M]):
         Whether a limit of time ended the search, so that the result is the best set so far.
     """
 
-    def __init__(self, models: Paired[F, M], progress: Progress, policy: Policy | None = None) -> None:
-        self.models, self.sets = models.pair()
+    def __init__(self, models: M, progress: Progress, policy: Policy | None = None) -> None:
+        self.models: M = models
+        self.sets: Sets[F] = models
         self.progress, self.policy = progress, policy or Policy()
         self.was_stopped, self._end = False, math.inf
         self._formed: set[Names] = set()

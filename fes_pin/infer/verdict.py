@@ -8,7 +8,7 @@ that asks for what a front end does not weigh has no objection there.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Generic, TypeVar
 
@@ -19,16 +19,18 @@ from fes_pin.infer.result import FITTED, Evidence, Gain, Remainder
 from fes_pin.infer.search import M, Search, SearchResult
 from fes_pin.infer.text import WHOLE
 
-REASONS = {
-    "drop_insignificant": "its gain is not significant",
+CLAIMS = {
     "drop_errors_of_form": "process noise is large, and it gains no more than an error of form may",
     "drop_unsupported": "held-out data do not confirm it",
     "drop_not_carried": "it gains nothing on other parts of the data, where it must act too",
     "drop_that_predict_no_better": "the sets that folds choose predict no better than the nominal model",
+    "drop_insignificant": "its gain is not significant",
+    "settle": "",
     "drop_rarely_chosen": "most folds of the data choose a set without it",
     "drop_impossible": "its size is not twice its deviation, a parameter is at a bound, or a constant predicts as well",
+    "switch_estimator": "",
 }
-"""Why a claim rejects a candidate, in words."""
+"""The claims in their order, each with the reason, in words, for which it rejects a candidate."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +57,7 @@ class Rejected:
     @property
     def reason(self) -> str:
         """Why, in words."""
-        return REASONS[self.claim]
+        return CLAIMS[self.claim]
 
 
 @dataclass(frozen=True)
@@ -128,11 +130,8 @@ class State(Generic[F, M, W]):
         return frozenset(self.found.without)
 
 
-Claim = Callable[[State[F, M, W]], State[F, M, W] | None]
-
-
 class Verdict(ABC, Generic[F, M, W]):
-    """The claims of one front end, in the order of `claims`, and the decisions that they use.
+    """The claims, in the order of `CLAIMS`, and the decisions that they use.
 
     Parameters
     ----------
@@ -142,21 +141,6 @@ class Verdict(ABC, Generic[F, M, W]):
 
     def __init__(self, search: Search[F, M]) -> None:
         self.search = search
-
-    @property
-    def claims(self) -> Sequence[Claim[F, M, W]]:
-        """The claims in their order."""
-        return (
-            self.drop_errors_of_form,
-            self.drop_unsupported,
-            self.drop_not_carried,
-            self.drop_that_predict_no_better,
-            self.drop_insignificant,
-            self.settle,
-            self.drop_rarely_chosen,
-            self.drop_impossible,
-            self.switch_estimator,
-        )
 
     @abstractmethod
     def weigh(self, found: SearchResult[F]) -> W:
@@ -211,17 +195,18 @@ class Verdict(ABC, Generic[F, M, W]):
         weighed, settled = self.weigh(found), frozenset(found.without)
         state = State(search or self.search, found, weighed, {}, settled, replaced=replaced)
         while True:
-            for claim in self.claims:
-                if (changed := claim(state)) is not None:
-                    state = _noted(changed, claim.__name__)
+            for claim in CLAIMS:
+                if (changed := getattr(self, claim)(state)) is not None:
+                    state = _noted(changed, claim)
                     break
             else:
                 return state
 
     def drop_insignificant(self, state: State[F, M, W]) -> State[F, M, W] | None:
         """Reject the weakest of the candidates that are not significant at the level of a claim."""
-        found, level = state.found, state.search.sets.level(state.found.best)
-        return self._without_weakest(state, [n for n in state.weighed.gains if not found.p_values[n] < level])
+        found, sets = state.found, state.search.sets
+        weak = [n for n in state.weighed.gains if not found.p_values[n] < sets.level(found.best)]
+        return self._without_weakest(state, weak)
 
     def drop_errors_of_form(self, state: State[F, M, W]) -> State[F, M, W] | None:
         """Reject the weakest of the candidates that gain no more than an error of form, if process noise is large."""
@@ -267,9 +252,9 @@ class Verdict(ABC, Generic[F, M, W]):
 
         A model is none if it is worse than a constant, or if a nominal parameter or a candidate ended at a bound.
         """
-        models, best, claimed = state.search.sets, state.found.best, list(state.weighed.gains)
-        if models.is_a_model(best) and models.is_possible(best):
-            claimed = [n for n in claimed if not models.is_certain(best, n)]
+        sets, best, claimed = state.search.sets, state.found.best, list(state.weighed.gains)
+        if claimed and sets.is_a_model(best) and sets.is_possible(best):
+            claimed = [n for n in claimed if not sets.is_certain(best, n)]
         return self._without_weakest(state, claimed)
 
     def switch_estimator(self, state: State[F, M, W]) -> State[F, M, W] | None:
