@@ -129,10 +129,7 @@ def skeleton_of_subject(subject: Subject) -> Skeleton:
             parts.append(upright(name, y, top, per_mm))
     segments = {"trunk": combined(parts), "pelvis": upright("lower_trunk", 0.0, bottoms["lower_trunk"], column)}
     centres = {"lumbar": np.array([0.0, 0.0, bottoms["middle_trunk"]])}
-    points = {
-        "vertex": np.array([0.0, 0.0, subject.height_m]),
-        "neck": np.array([0.0, 0.0, bottoms["head"]]),
-    }
+    points = {"vertex": np.array([0.0, 0.0, subject.height_m]), "neck": np.array([0.0, 0.0, bottoms["head"]])}
     for side, y in zip(SIDES, (hip, -hip), strict=True):
         segments[f"{side}_thigh"] = upright("thigh", y, bottoms["thigh"], column)
         segments[f"{side}_shank"] = upright("shank", y, bottoms["shank"], column)

@@ -96,11 +96,7 @@ def lean_text(degrees: float) -> str:
 
 
 def attainable(
-    linear: LinearBody,
-    inputs,
-    gravity: bool = True,
-    settle_deg: float = SETTLE_DEG,
-    balance: bool = True,
+    linear: LinearBody, inputs, gravity: bool = True, settle_deg: float = SETTLE_DEG, balance: bool = True
 ) -> HeldLeans:
     """Return the leans that constant inputs can hold, by linear programs.
 

@@ -44,10 +44,7 @@ RANGE_DEG = {name: ends for name, (_, ends) in _TURNS.items()}
 
 _LEG, _LUMBAR = tuple(_TURNS)[:8], tuple(_TURNS)[8:]
 
-JOINT_NAMES: tuple[str, ...] = (
-    *(f"{side}_{joint}" for side in SIDES for joint in _LEG),
-    *_LUMBAR,
-)
+JOINT_NAMES: tuple[str, ...] = (*(f"{side}_{joint}" for side in SIDES for joint in _LEG), *_LUMBAR)
 """The 19 joints in the order in which tables and arrays without names list them."""
 
 MIRROR_SIGN = {"lumbar_bending": -1.0, "lumbar_rotation": -1.0}

@@ -38,11 +38,7 @@ class GroupedFits:
     """
 
     def __init__(
-        self,
-        nominal: Model,
-        trials: Mapping[str, Sequence[Trial]],
-        driven: bool,
-        effects: Sequence[type[Effect]] = (),
+        self, nominal: Model, trials: Mapping[str, Sequence[Trial]], driven: bool, effects: Sequence[type[Effect]] = ()
     ) -> None:
         self.nominal, self.trials, self.driven, self.effects = Model(nominal.rig), dict(trials), driven, effects
         self._begun: list[Weights] = []

@@ -229,10 +229,7 @@ class PositionController:
         self.place, self.beyond_rad = 0, 0.0
 
     def step(
-        self,
-        angle_rad: float | None,
-        reference_rad: float | Sequence[float] | None = None,
-        time_s: float | None = None,
+        self, angle_rad: float | None, reference_rad: float | Sequence[float] | None = None, time_s: float | None = None
     ) -> float:
         """One pulse: the pulse width in us from a reading.
 

@@ -149,11 +149,7 @@ class Loop(Tabulated):
 
     @classmethod
     def of(
-        cls,
-        truth: Sampled,
-        believed: tuple[np.ndarray, np.ndarray, float],
-        k: np.ndarray,
-        observer: np.ndarray,
+        cls, truth: Sampled, believed: tuple[np.ndarray, np.ndarray, float], k: np.ndarray, observer: np.ndarray
     ) -> Loop:
         """From what moves (`moved`), what is believed (`plant`), feedback k (3,) and steady observer gain (4,)."""
         model_a, model_b, pull = believed

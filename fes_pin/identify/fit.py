@@ -217,10 +217,7 @@ F = TypeVar("F", bound=Fit)
 
 
 def fit_problem(
-    problem: Problem,
-    start: Mapping[str, float],
-    unknowns: Unknowns | None = None,
-    max_iterations: int = MAX_ITERATIONS,
+    problem: Problem, start: Mapping[str, float], unknowns: Unknowns | None = None, max_iterations: int = MAX_ITERATIONS
 ) -> Fit:
     """Fit a problem from a start value of every parameter; see `infer.optimum.minimise`."""
     found = minimise(problem, start, unknowns, max_iterations)

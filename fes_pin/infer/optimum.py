@@ -114,10 +114,7 @@ class Optimum:
 
 
 def minimise(
-    problem: Problem,
-    start: Mapping[str, float],
-    unknowns: Unknowns | None = None,
-    max_iterations: int = MAX_ITERATIONS,
+    problem: Problem, start: Mapping[str, float], unknowns: Unknowns | None = None, max_iterations: int = MAX_ITERATIONS
 ) -> Optimum:
     """Fit a problem from a start value of every parameter.
 

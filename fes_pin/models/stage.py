@@ -17,13 +17,7 @@ import numpy as np
 from fes_pin.data.errors import InputError
 from fes_pin.data.schema import unknown
 from fes_pin.models.maths import where
-from fes_pin.models.parameters import (  # noqa: F401 - what the file of a cause needs is imported from here
-    ParameterInfo,
-    check_parameters,
-    parameter,
-    parameters_of,
-    refinement,
-)
+from fes_pin.models.parameters import ParameterInfo, check_parameters, parameter, parameters_of, refinement  # noqa: F401 - what the file of a cause needs is imported from here
 
 Scalar = Any
 """A number, an array of them, or an expression of CasADi."""

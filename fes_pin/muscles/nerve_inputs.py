@@ -44,12 +44,7 @@ def whose_strength(body: Body, years: str = YEARS[0]) -> str:
 
 
 def subject_nerves(
-    body: Body,
-    names: Iterable[str] | None = None,
-    strength: float | None = None,
-    *,
-    years: str = YEARS[0],
-    **options,
+    body: Body, names: Iterable[str] | None = None, strength: float | None = None, *, years: str = YEARS[0], **options
 ) -> Nerves:
     """The nerves of a body of this size, sex and years.
 

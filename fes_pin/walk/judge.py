@@ -128,7 +128,7 @@ class StrideErrors:
         nominal, before, after = (self.errors(one, held_out) for one in sets)
         return held_out_gain(nominal, before, after, self.models.designs.seed)
 
-    def evidence(self, without: WalkFit, best: WalkFit) -> Evidence:
+    def likelihood(self, without: WalkFit, best: WalkFit) -> Evidence:
         """Return the evidence for a set in held-out strides, against a smaller set, with the set's noise.
 
         Ordinary errors of landmarks and plates in a session are nuisance parameters. The evidence is the mean over

@@ -174,11 +174,7 @@ def pelvis_to_hip(body: Body, table: Mapping | None = None) -> np.ndarray:
 
 
 def motion_of(
-    body: Body,
-    time: np.ndarray,
-    columns: Mapping[str, np.ndarray],
-    hip: np.ndarray,
-    session: Session,
+    body: Body, time: np.ndarray, columns: Mapping[str, np.ndarray], hip: np.ndarray, session: Session
 ) -> Motion:
     """The body's motion from OpenSim's coordinates.
 

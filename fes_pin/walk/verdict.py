@@ -49,13 +49,12 @@ class WalkVerdict(Verdict[WalkFit, WalkModels, Weighed]):
         designs, best, less = self.models.designs, found.best, found.without
         many = designs.strides.count > 1
         by_errors = {n for n in less if many and not designs.forms[n].reads}
-        elsewhere = {n: self.other_leg(n) for n in less}
         return Weighed(
             gains={n: self.errors.gain(f, best, many) if n in by_errors else NO_GAIN for n, f in less.items()},
-            evidence={n: self.errors.evidence(f, best) for n, f in less.items()} if many else {},
+            evidence={n: self.errors.likelihood(f, best) for n, f in less.items()} if many else {},
             lack_of_fit=lack_of_fit(designs, best),
             is_robust=True,
-            carried={n: gain for n, gain in elsewhere.items() if gain is not None},
+            carried={n: gain for n in less if (gain := self.other_leg(n)) is not None},
         )
 
     def lack_of_fit(self, state: Judgement) -> Remainder:

@@ -305,22 +305,22 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
             best = larger[0]
         if best:
             self._refine(best)
-        while len(best) > 1:
-            rest = min((tuple(n for n in best if n != one) for one in best), key=lambda n: self._left(best, n))
-            if self._left(best, rest) > least and self._is_nearer(fits[best], fits[rest]):
+        return self._without_replaced(best, least)
+
+    def _without_replaced(self, names: Names, least: float) -> Names:
+        """Return a set without the causes that lessen E no longer, or that E above the least does not need."""
+        while len(names) > 1:
+            left = {n: self.without(names, n) for n in names}
+            gone = min(names, key=lambda n: self.misfit(left[n]))
+            if self.misfit(left[gone]) > least and self._is_nearer(self.fits[names], left[gone]):
                 break
-            best = rest
-        return best
+            names = tuple(n for n in names if n != gone)
+        return names
 
     def _is_nearer(self, larger: LikelihoodFit, smaller: LikelihoodFit) -> bool:
         """Return whether a larger set lessens E by a tenth, or an E that is negligible by half."""
         now = self.misfit(smaller)
         return self.misfit(larger) <= (now / MORE if now < NOTHING_PERCENT else (1.0 - SMALL_SHARE) * now)
-
-    def _left(self, names: Names, rest: Names) -> float:
-        """Return E of a set without the causes that a smaller one lacks, from its values where that is better."""
-        (gone,) = {*names} - {*rest}
-        return self.misfit(self.without(names, gone))
 
     def _nearest(self, size: int, count: int = NEAREST) -> list[Names]:
         """Return the sets of a size of least E whose causes are physically possible."""
