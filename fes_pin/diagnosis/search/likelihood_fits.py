@@ -323,8 +323,9 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         return self.misfit(larger) <= (now / MORE if now < NOTHING_PERCENT else (1.0 - SMALL_SHARE) * now)
 
     def _nearest(self, size: int, count: int = NEAREST) -> list[Names]:
-        """Return the sets of a size of least E whose causes are physically possible."""
-        possible = [n for n, f in self.fits.items() if len(n) == size and (not n or self.is_possible(f))]
+        """Return the sets of a size of least E whose causes are physically possible; on the way none may be a model."""
+        own = (n for n in self.fits if len(n) == size)
+        possible = [n for n in own if not n or is_possible(self.fits[n], self.library.measured)]
         return sorted(possible, key=lambda n: (self.misfit(self.fits[n]), n))[:count]
 
     def _refine(self, names: Names) -> None:
