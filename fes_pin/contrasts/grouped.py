@@ -369,6 +369,7 @@ class Grouped(Fit):
         names = [f"{e.name}.{n}" for e in own.effects if e.name == change.name for n in e.amplitudes()]
         return max(self._apart(n, group) for n in names or [change.name])
 
+    @np.errstate(invalid="ignore")
     def _apart(self, name: str, group: str) -> float:
         """Return the difference of a parameter of one group from its value in another, or its null, in deviations."""
         model, here = self.grouped, self.grouped.path(name, group)

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,10 +13,14 @@ from contrast_pairs.twitch import twitch_pair
 from data import studies
 
 import fes_pin as fp
+from fes_pin.contrasts.fits import GroupedFits
+from fes_pin.contrasts.groups import in_groups
+from fes_pin.contrasts.models import ContrastModels
 from fes_pin.data.errors import InputError
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.infer.levels import CONFIDENCE_95
+from fes_pin.models.nominal import nominal_model
 from fes_pin.view.report import report_html
 
 
@@ -68,7 +73,30 @@ def test_one_change_is_named_alone_with_its_size(tmp_path):
     one = change.parameters["offset"]["after"]
     assert one.value == pytest.approx(0.8, abs=max(4.0 * one.std, 0.05))
     assert change.p_value < 1e-3
+    (item,), alone = found.fit.changes, found.fit.std("sensor_offset.offset@after")
+    assert found.fit.certainty(item) == pytest.approx(one.value / alone)
     assert "sensor_offset" not in found.excluded
+
+
+def test_the_certainty_of_a_change_is_that_of_the_difference_between_groups(tmp_path):
+    best = fp.contrast(stronger_with_zeros(0.0, tmp_path)).fit
+    (item,), at = best.changes, [best.place("gain"), best.place("gain@after")]
+    variance = np.array([1.0, -1.0]) @ best.covariance[np.ix_(at, at)] @ np.array([1.0, -1.0])
+    assert best.certainty(item) == pytest.approx((best.values["gain@after"] - best.values["gain"]) / np.sqrt(variance))
+    assert replace(best, covariance=np.full_like(best.covariance, np.inf)).certainty(item) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("values", "at_bound", "is_a_model"),
+    [({}, (), True), ({}, ("gain",), False), ({"gain": 0.0}, ("gain",), True), ({}, ("sensor_offset.offset",), True)],
+)
+def test_no_change_is_named_in_a_model_at_a_bound(values, at_bound, is_a_model, tmp_path):
+    """A nominal parameter may end at 0; a cause at its bound is impossible by another rule."""
+    study = stronger_with_zeros(0.0, tmp_path)
+    nominal = nominal_model(study)
+    models = ContrastModels(GroupedFits(nominal, in_groups(study.trials), True))
+    fitted = SimpleNamespace(at_bound=at_bound, values={**nominal.parameters(), **values}, repeats={}, is_driven=True)
+    assert models.is_a_model(fitted) is is_a_model
 
 
 def test_two_changes_are_both_named(tmp_path):
