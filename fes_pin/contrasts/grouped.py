@@ -378,8 +378,7 @@ class Grouped(Fit):
         weights = np.array([(n == here) - float(n in there) for n in self.free])
         felt = weights != 0.0
         variance = float(weights[felt] @ self.covariance[np.ix_(felt, felt)] @ weights[felt])
-        away = abs(self.values[here] - other)
-        return away / math.sqrt(variance) if 0.0 < variance < math.inf else 0.0
+        return abs(self.values[here] - other) / math.sqrt(variance) if 0.0 < variance < math.inf else 0.0
 
     def leaning(self, moved: np.ndarray) -> float:
         """Return the part of the squares of a change that depends on the scatter of repeats.

@@ -188,8 +188,7 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
 
     def is_certain(self, fitted: Grouped, name: str) -> bool:
         """Return whether a change is twice its deviation."""
-        (change,) = (i for i in fitted.changes if str(i) == name)
-        return fitted.certainty(change) > CONFIDENCE_95
+        return next(fitted.certainty(i) for i in fitted.changes if str(i) == name) > CONFIDENCE_95
 
     def is_claimed(self, name: str) -> bool:
         """Return whether an item is a change: a cause of all groups is none."""
