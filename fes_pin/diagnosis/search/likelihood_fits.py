@@ -308,7 +308,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         return self._without_replaced(best, least)
 
     def _without_replaced(self, names: Names, least: float) -> Names:
-        """Return a set without the causes that lessen E no longer, or that E above the least does not need."""
+        """Return a set without each cause that no longer lessens E, or without which E is no more than the least."""
         while len(names) > 1:
             left = {n: self.without(names, n) for n in names}
             gone = min(names, key=lambda n: self.misfit(left[n]))
