@@ -175,9 +175,9 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
         return all(are_possible(m.effects, at_bound[g], measured) for g, m in model.models.items())
 
     def is_a_model(self, fitted: Grouped) -> bool:
-        """Return whether a fit is better than a constant in every group, no nominal parameter at a bound but 0.
+        """Return whether a fit is better than a constant in every group, and no nominal parameter is at a bound but 0.
 
-        Where repeats scatter no one simulation is that of all trials, and constants are not compared.
+        Where nominal parameters scatter between repeats, the fit is not compared with a constant.
         """
         nominal = self.nominal_model.parameters()
         if any(n.partition("@")[0] in nominal and fitted.values[n] != 0.0 for n in fitted.at_bound):

@@ -28,7 +28,7 @@ def test_an_offset_larger_than_the_largest_command_is_found(times):
 
 
 def small_swings(offset, folder):
-    """Swings of a tenth of a radian about the rest of a free pendulum, read by an encoder that is off."""
+    """A free pendulum with amplitudes of 0.1 to 0.16 rad; its encoder has a constant offset, rad."""
     rng, time, made = np.random.default_rng(5), np.arange(600) / 100, []
     constants, true, _ = joint_rig(rng)
     for k, size in enumerate((0.1, -0.13, 0.16)):
