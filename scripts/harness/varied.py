@@ -102,15 +102,33 @@ class Answer:
 
 
 def planned(kind: str, number: int, seed: int, only: Sequence[str], draws: int = DRAWS) -> list[list[Asked]]:
-    """The ways in which so many studies are asked about, by study; the first way is what others are compared with."""
-    out = []
-    for source, item in islice(_bases(seed), number):
-        ways = [f"{n:02d}" for n in range(draws)] if kind == STARTS else [PLAIN, *SLOWER]
-        if kind == RATES and "faster" in inspect.signature(_generator(source).make).parameters:
-            ways.append(TWICE)
-        if not only or item.key in only:
-            out.append([Asked(source, item, way) for way in ways])
-    return out
+    """The ways in which so many studies are asked about, by study; the first way is what others are compared with.
+
+    A study that no other rate has the same stimulus of is passed over.
+    """
+    starts = [f"{n:02d}" for n in range(draws)]
+    every = ([Asked(s, item, w) for w in (starts if kind == STARTS else rates_of(s, item))] for s, item in _bases(seed))
+    plan = islice((ways for ways in every if len(ways) > 1), number)
+    return [ways for ways in plan if not only or ways[0].item.key in only]
+
+
+def rates_of(source: str, item: Item) -> list[str]:
+    """The rates at which the stimulus of a study is what it was: its own, lower ones, and twice by its generator."""
+    trials = _study(source, item, 1)[0].trials
+    lower = [way for way, every in SLOWER.items() if all(is_held(t, every) for t in trials)]
+    twice = "faster" in inspect.signature(_generator(source).make).parameters
+    return [PLAIN, *lower, *([TWICE] if twice else [])]
+
+
+def is_held(trial: fp.Trial, every: int) -> bool:
+    """Whether pulses are at samples that are kept, and pulse widths are the same until the next of them.
+
+    The force is no linear function of a pulse width, nor of the time of a pulse: their means are another stimulus.
+    """
+    pulses = trial.columns.get("stim", np.zeros(len(trial)))
+    widths = trial.columns.get("pulse_width_us", np.zeros(len(trial)))
+    kept = np.arange(len(trial)) // every * every
+    return not np.any(pulses[kept != np.arange(len(trial))]) and bool(np.all(widths == widths[kept]))
 
 
 def _bases(seed: int) -> Iterator[tuple[str, Item]]:
@@ -209,15 +227,13 @@ def started(study: fp.Study, truth: Truth, rng: np.random.Generator) -> fp.Study
 def decimated(trial: fp.Trial, every: int) -> fp.Trial:
     """Every so many samples of a trial.
 
-    A pulse is in the sample that is kept before it. An effort that moves a joint, or a pulse width, is the mean of the
-    samples it was held for: a recruitment curve is linear between threshold and saturation.
+    An effort that moves a joint is the mean of the samples it was held for: its impulse stays. Stimuli are held
+    (`is_held`).
     """
     columns, kept = {}, np.arange(0, len(trial), every)
     for name, values in trial.columns.items():
         columns[name] = values[kept]
-        if name == "stim":
-            columns[name] = np.maximum.reduceat(values, kept)
-        elif name == "pulse_width_us" or (name == "effort" and trial.kind == "motion"):
+        if name == "effort" and trial.kind == "motion":
             columns[name] = np.add.reduceat(values, kept) / np.diff(np.append(kept, len(trial)))
     return replace(trial, columns=columns, time=trial.time[::every])
 

@@ -17,6 +17,7 @@ from harness.varied import (
     Answer,
     Asked,
     decimated,
+    is_held,
     is_same,
     moved,
     planned,
@@ -52,11 +53,22 @@ def test_starts_are_drawn_about_what_is_true_and_by_their_number():
     assert 0.01 <= min(drawn) < 0.02 and 7.0 < max(drawn) <= 10.0
 
 
-def test_no_pulse_and_no_impulse_of_an_effort_is_lost_between_samples():
-    half = decimated(study().trials[0], 2)
-    assert np.flatnonzero(half["stim"]).tolist() == [6] and np.array_equal(half["force_n"], TIME[::2])
-    third = decimated(study(pulse_width_us=1e6 * TIME, force_n=TIME).trials[0], 3)
-    assert third["pulse_width_us"][:5] == pytest.approx(1e6 * TIME[1:15:3])
+def test_the_stimulus_is_the_same_at_a_lower_rate():
+    def trial(**columns):
+        return study(**columns, force_n=TIME).trials[0]
+
+    assert [is_held(trial(stim=np.eye(60)[n]), 2) for n in (13, 14)] == [False, True]
+    assert [is_held(trial(pulse_width_us=np.repeat(TIME[::n], n)), 3) for n in (1, 2, 3, 6)] == [
+        False,
+        False,
+        True,
+        True,
+    ]
+    half = decimated(trial(stim=np.eye(60)[14]), 2)
+    assert np.flatnonzero(half["stim"]).tolist() == [7] and np.array_equal(half["force_n"], TIME[::2])
+
+
+def test_no_impulse_of_an_effort_is_lost_between_samples():
     moved_by = fp.Trial("j", "motion", {"effort": np.sin(90.0 * TIME[:59]), "position": TIME[:59]}, TIME[:59])
     slow = decimated(moved_by, 3)
     lengths = np.append(np.full(19, 3), 2)
@@ -96,12 +108,12 @@ def test_a_plan_has_studies_of_every_source_and_ways_of_each(monkeypatch, tmp_pa
     assert {len(ways) for ways in plan} == {varied.DRAWS} and len({w.key for ways in plan for w in ways}) == 8 * 20
     rates = planned(RATES, 4, 3, ())
     assert [w.way for w in rates[0]] == [PLAIN, "half", "third", TWICE]
-    assert [w.way for w in rates[1]] == [PLAIN, "half", "third"]
+    assert all(ways[0].way == PLAIN and len(ways) > 1 for ways in rates) and len(rates) == 4
     assert len(planned(RATES, 4, 3, [rates[0][0].item.key])) == 1
     place = tmp_path / "practice/answers/one/answer.json"
     place.parent.mkdir(parents=True)
     place.write_text('{"causes": []}')
-    assert [ways[0].study for ways in planned(RATES, 10, 3, ())][4::5] == ["practice one"] * 2
+    assert [ways[0].study for ways in planned(STARTS, 10, 3, ())][4::5] == ["practice one"] * 2
 
 
 ASKED = [[Asked("large", Item("a", 1, ("fatigue",)), way) for way in (PLAIN, "half", "third")]]
