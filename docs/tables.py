@@ -27,6 +27,10 @@ ROOMS = {
     "infer": "Inference",
     "models": "Models: rigs, effects, simulation",
     "identify": "Fits, noise",
+    "remainder": "Lack of fit",
+    "search": "Sets of causes",
+    "prepare": "Trials before a search",
+    "faults": "Faults of a record",
     "diagnosis": "Diagnosis",
     "contrasts": "What changed",
     "comparison": "Models of the literature, ranked",
@@ -226,7 +230,20 @@ def public_text() -> str:
 
 
 REASONED = (
-    *("infer", "identify", "diagnosis", "contrasts", "walk", "comparison", "cohort", "verdict"),
+    *(
+        "infer",
+        "identify",
+        "remainder",
+        "search",
+        "prepare",
+        "faults",
+        "diagnosis",
+        "contrasts",
+        "walk",
+        "comparison",
+        "cohort",
+        "verdict",
+    ),
     "models/plausibility.py",
 )
 """Rooms of inference, and a file of another room, whose numbers are listed with their reasons."""

@@ -1,5 +1,5 @@
-"""The imports run one way: cohort -> verdict -> view -> diagnosis -> identify -> models -> data; and control ->
-allocation -> muscles -> body.
+"""The imports run one way: cohort -> verdict -> view -> front ends -> faults -> search -> identify -> models -> data;
+and control -> allocation -> muscles -> body. No front end (diagnosis, contrasts, comparison, walk) imports another.
 
 Inference (infer) knows no rig and no body: all may use it, and it uses nothing of ours but `workers`.
 The controller takes eq. (1) from paper, which takes recruitment from muscles. Measured walking (walk) reads the body,
@@ -20,9 +20,13 @@ ALLOWED = {
     "data": set(),
     "models": {"data"},
     "identify": {"models", "data"},
-    "diagnosis": {"identify", "models", "data"},
-    "contrasts": {"diagnosis", "identify", "models", "data"},
-    "comparison": {"diagnosis", "identify", "models", "data"},
+    "remainder": {"identify", "models", "data"},
+    "search": {"identify", "models", "data"},
+    "prepare": {"identify", "models", "data"},
+    "faults": {"search", "prepare", "identify", "models", "data"},
+    "diagnosis": {"faults", "prepare", "search", "remainder", "identify", "models", "data"},
+    "contrasts": {"faults", "prepare", "search", "remainder", "identify", "models", "data"},
+    "comparison": {"prepare", "identify", "models", "data"},
     "paper": {"muscles", "body", "data"},
     "body": {"data"},
     "walk": {"body", "models", "data"},

@@ -7,10 +7,10 @@ import pytest
 
 from fes_pin import diagnose
 from fes_pin.data.study import read_study
-from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
 from fes_pin.models.effects import SensorLag
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.simulate import simulate
+from fes_pin.search.likelihood_fits import LikelihoodFits
 
 pytestmark = pytest.mark.shared
 

@@ -109,7 +109,7 @@ def diagnose(
 @app.command()
 def effects(library: Libraries = None) -> None:
     """List the causes it knows, with stage, equation and parameters."""
-    from fes_pin.diagnosis.misread import DESCRIBED as MISREAD
+    from fes_pin.faults.misread import DESCRIBED as MISREAD
     from fes_pin.models.describe import describe, described
     from fes_pin.walk.effect import STAGE
     from fes_pin.walk.effects import EFFECTS

@@ -65,11 +65,11 @@ def predict(
     from fes_pin.data.outputs import Outputs
     from fes_pin.data.plausibility import ToPredict
     from fes_pin.data.table import check_table, table_bytes
-    from fes_pin.diagnosis.plausibility import check_study
     from fes_pin.diagnosis.replay import trial_table
     from fes_pin.identify.stored import load_log
     from fes_pin.models.predict import predicted_trial
     from fes_pin.models.store import load_model
+    from fes_pin.prepare.plausibility import check_study
 
     catalogue = catalogue_with(library)
     loaded = load_model(model, library=catalogue)

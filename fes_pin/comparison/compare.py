@@ -16,8 +16,6 @@ from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import instance, number
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.diagnosis import measured_study, split
-from fes_pin.diagnosis.plausibility import check_study
 from fes_pin.identify.ahead import default_horizon
 from fes_pin.identify.fit import fit_multistart, rough_noise
 from fes_pin.identify.problem import Problem
@@ -27,6 +25,8 @@ from fes_pin.models.catalogue import Source
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.store import load_model
+from fes_pin.prepare.measured import measured_study, split
+from fes_pin.prepare.plausibility import check_study
 from fes_pin.workers import Progress, in_parallel, one_thread_each
 
 FEW = "too few trials to estimate how trials differ: the first seconds of a trial do not predict its others"

@@ -17,7 +17,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.held_out import folds_of
 from fes_pin.identify.ahead import forecast, free_residuals
 from fes_pin.identify.fit import Fit, noise_of
 from fes_pin.identify.problem import Problem
@@ -25,6 +24,7 @@ from fes_pin.infer.held_out import within
 from fes_pin.infer.levels import RUNAWAY
 from fes_pin.infer.noise import Noise, noise_step, thinning
 from fes_pin.models.model import Model
+from fes_pin.prepare.folds import folds_of
 from fes_pin.workers import in_parallel
 
 WORTH = (1.0, 3.0, 10.0, 30.0, 100.0)

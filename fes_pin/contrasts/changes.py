@@ -5,7 +5,7 @@ import math
 from fes_pin.contrasts.grouped import Grouped, Item
 from fes_pin.contrasts.models import ContrastModels, Found
 from fes_pin.contrasts.words import of_cause, of_nominal
-from fes_pin.diagnosis.misread import NAME, Misread
+from fes_pin.faults.misread import NAME, Misread
 from fes_pin.infer.distributions import normal_quantile
 from fes_pin.infer.levels import CLAIM_LEVEL, IDENTIFIABLE_SHARE, SEEN_POWER, SEPARABLE
 from fes_pin.infer.result import Change, Evidence, ParameterEstimate

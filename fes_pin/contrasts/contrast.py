@@ -19,16 +19,16 @@ from fes_pin.data.provenance import provenance_now
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.conditions import Restated
-from fes_pin.diagnosis.diagnosis import measured_study, split
-from fes_pin.diagnosis.logged import LogFaults, words_of_noise
-from fes_pin.diagnosis.long_records import searched_part
-from fes_pin.diagnosis.plausibility import check_study
+from fes_pin.faults.conditions import Restated
+from fes_pin.faults.effort_noise import EffortNoise, words_of_noise
 from fes_pin.identify.correlation_time import words_of_reading
 from fes_pin.identify.effort_timing import words_of_lateness
 from fes_pin.identify.feedback import is_fed_back
 from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
 from fes_pin.models.nominal import nominal_model
+from fes_pin.prepare.long_records import searched_part
+from fes_pin.prepare.measured import measured_study, split
+from fes_pin.prepare.plausibility import check_study
 from fes_pin.workers import Progress, noting_stops, one_thread_each, time_limit
 
 GroupsRestated = Restated[Grouped, ContrastModels]
@@ -141,8 +141,8 @@ class _Work:
         """Return the noise of recorded efforts in all groups, in their unit; 0 where the likelihood supports none."""
         if not self.fed_back or not all(EFFORT in self.nominal.rig.input_columns(t) for t in self.study.trials):
             return 0.0
-        faults = LogFaults(self.study.trials, lambda trials: self._searched(trials)[0], self.end)
-        return faults.effort_noise_of_nominal(self.nominal)
+        faults = EffortNoise(self.study.trials, lambda trials: self._searched(trials)[0], self.end)
+        return faults.of_nominal(self.nominal)
 
     def _searched(self, trials: Sequence[Trial]) -> tuple[list[Trial], list[str]]:
         """Return the trials of each group, or the parts of them, that a search takes, and warnings."""

@@ -12,8 +12,8 @@ from fes_pin.contrasts.groups import in_groups
 from fes_pin.contrasts.models import ContrastModels, Found
 from fes_pin.data.log import EFFORT
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.conditions import Conditions, Restated
-from fes_pin.diagnosis.misread import Misread, find_misread
+from fes_pin.faults.conditions import Conditions, Restated
+from fes_pin.faults.misread import Misread, find_misread
 from fes_pin.identify.effort_timing import lateness_of
 from fes_pin.identify.likelihood_fit import maximum_from
 from fes_pin.infer.levels import CLAIM_LEVEL

@@ -6,8 +6,6 @@ from collections.abc import Collection, Mapping, Sequence
 from fes_pin.contrasts.grouped import Grouped, GroupedModel, GroupedProblem, Item, Weights, by_group
 from fes_pin.data.errors import InputError
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.search.likelihood_fits import FIRST_NOISE_SCALES, MEASUREMENT, PROCESS, LikelihoodFits
-from fes_pin.diagnosis.search.likelihood_maxima import SCREEN_ITERATIONS, likeliest, process_noises
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit, fit_of
 from fes_pin.identify.process_noise import first_guess
@@ -16,6 +14,8 @@ from fes_pin.infer.optimum import minimise
 from fes_pin.infer.problem import Unknowns
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
+from fes_pin.search.likelihood_fits import FIRST_NOISE_SCALES, MEASUREMENT, PROCESS, LikelihoodFits
+from fes_pin.search.likelihood_maxima import SCREEN_ITERATIONS, likeliest, process_noises
 from fes_pin.workers import in_parallel
 
 ROUNDS = 6

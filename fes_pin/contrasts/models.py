@@ -7,10 +7,6 @@ import numpy as np
 from fes_pin.contrasts.fits import GroupedFits
 from fes_pin.contrasts.grouped import Grouped, GroupedModel, Item
 from fes_pin.contrasts.screen import ItemScore, Screen
-from fes_pin.diagnosis.search.library import Library
-from fes_pin.diagnosis.search.likelihood_forms import demanded_form
-from fes_pin.diagnosis.search.possible import are_possible
-from fes_pin.diagnosis.search.starts import STARTS, number_of_forms, refinements
 from fes_pin.identify.afar import misfit_percent
 from fes_pin.infer.distributions import chi2_tail
 from fes_pin.infer.fits import Candidate, FittedSets, Names, more_degrees
@@ -21,6 +17,10 @@ from fes_pin.infer.spread import ByUnit, Spread
 from fes_pin.infer.text import WHOLE
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
+from fes_pin.search.library import Library
+from fes_pin.search.likelihood_forms import demanded_form
+from fes_pin.search.possible import are_possible
+from fes_pin.search.starts import STARTS, number_of_forms, refinements
 from fes_pin.workers import in_parallel
 
 FITTED, FITTED_DRIVEN = 10, 6

@@ -10,9 +10,6 @@ import numpy as np
 
 from fes_pin.contrasts.grouped import Grouped, Item, by_group
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.search.library import Library
-from fes_pin.diagnosis.search.score import bounded_step
-from fes_pin.diagnosis.search.starts import near_null, started
 from fes_pin.infer.covariance import covariance_of
 from fes_pin.infer.family import Family
 from fes_pin.infer.levels import PARAMETER_PENALTY
@@ -21,6 +18,9 @@ from fes_pin.infer.projection import BlockColumns, Projection, slices
 from fes_pin.infer.spread import ByUnit, Spread, units, usual_spread
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
+from fes_pin.search.library import Library
+from fes_pin.search.score import bounded_step
+from fes_pin.search.starts import near_null, started
 from fes_pin.workers import in_parallel
 
 FITTED = 2

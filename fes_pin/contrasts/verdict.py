@@ -8,12 +8,12 @@ import numpy as np
 from fes_pin.contrasts.grouped import Grouped
 from fes_pin.contrasts.models import ContrastModels, ContrastSearch, Found
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.held_out import folds_of
-from fes_pin.diagnosis.remainder.lack_of_fit import lack_of_fit
 from fes_pin.infer.held_out import FOLDS, marginal_cost
 from fes_pin.infer.levels import CLAIM_LEVEL
 from fes_pin.infer.result import NO_GAIN, Evidence, Remainder
 from fes_pin.infer.verdict import State, Verdict, Weighed
+from fes_pin.prepare.folds import folds_of
+from fes_pin.remainder.lack_of_fit import lack_of_fit
 from fes_pin.workers import in_parallel
 
 

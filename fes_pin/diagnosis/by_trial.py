@@ -18,11 +18,9 @@ import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.held_out import Again, Found, gains_of, make_folds, refit
+from fes_pin.diagnosis.likelihood_models import LikelihoodSearch
 from fes_pin.diagnosis.restate import Made, with_first
 from fes_pin.diagnosis.result import Diagnosis
-from fes_pin.diagnosis.search.library import Library
-from fes_pin.diagnosis.search.likelihood_maxima import look
-from fes_pin.diagnosis.search.likelihood_models import LikelihoodSearch
 from fes_pin.identify.likelihood_fit import LikelihoodFit, at_noise, maximum_from
 from fes_pin.identify.per_trial import as_parameters, cross_fitted_unknowns, halves, pieces
 from fes_pin.infer.distributions import chi2_quantile, chi2_tail
@@ -35,6 +33,8 @@ from fes_pin.infer.search import SearchResult
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import StateSpaceNoise
 from fes_pin.models.stage import Effect, Stage
+from fes_pin.search.library import Library
+from fes_pin.search.likelihood_maxima import look
 from fes_pin.workers import attempted
 
 Ran = tuple[LikelihoodSearch, Found, Made | None]

@@ -8,12 +8,13 @@ from typing import Any
 from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.show import DataFrame, by_columns, frame, table_html
 from fes_pin.data.study import Study
-from fes_pin.diagnosis.diagnosis import few_trials, measured_study, split
-from fes_pin.diagnosis.plausibility import check_study
+from fes_pin.diagnosis.diagnosis import few_trials
 from fes_pin.diagnosis.testable import Testable, testable_causes
 from fes_pin.infer.result import shown
 from fes_pin.models.catalogue import Source, catalogue_of
 from fes_pin.models.nominal import nominal_model
+from fes_pin.prepare.measured import measured_study, split
+from fes_pin.prepare.plausibility import check_study
 
 FAR = 0.3
 """Share of the variance that the nominal model leaves above which a warning says so."""

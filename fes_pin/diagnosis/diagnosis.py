@@ -3,33 +3,26 @@
 import math
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from fes_pin.data.asked import asked
-from fes_pin.data.derived import without_derived
-from fes_pin.data.errors import InputError
 from fes_pin.data.log import EFFORT, Log
 from fes_pin.data.provenance import provenance_now
 from fes_pin.data.schema import IMPOSED
-from fes_pin.data.spikes import without_spikes
-from fes_pin.data.stuck import without_stuck
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.by_trial import Ask, Ran, with_fault, with_faults
 from fes_pin.diagnosis.estimators import searched
+from fes_pin.diagnosis.likelihood_models import Found, LikelihoodModels, LikelihoodSearch, NominalFitError
 from fes_pin.diagnosis.logged import LogFaults, likelier, with_timing_of, with_words
-from fes_pin.diagnosis.long_records import in_parts, searched_part, thinned
-from fes_pin.diagnosis.misread import NAME as MISREAD
-from fes_pin.diagnosis.misread import restated_trials
-from fes_pin.diagnosis.plausibility import check_study
 from fes_pin.diagnosis.reported import diagnosis_of, unfitted
 from fes_pin.diagnosis.restate import StudyConditions, with_misread
 from fes_pin.diagnosis.result import Diagnosis
-from fes_pin.diagnosis.search.likelihood_fits import MEASUREMENT, PROCESS
-from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodModels, LikelihoodSearch, NominalFitError
 from fes_pin.diagnosis.testable import given_away
+from fes_pin.faults.misread import NAME as MISREAD
+from fes_pin.faults.misread import restated_trials
 from fes_pin.identify.feedback import is_fed_back, is_stimulus_fed_back
 from fes_pin.identify.recording import improves, low_pass_of
 from fes_pin.infer.held_out import FOLDS
@@ -37,6 +30,10 @@ from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.rigs.base import Rig
+from fes_pin.prepare.long_records import in_parts, searched_part
+from fes_pin.prepare.measured import measured_study, split
+from fes_pin.prepare.plausibility import check_study
+from fes_pin.search.likelihood_fits import MEASUREMENT, PROCESS
 from fes_pin.workers import Progress, attempted, noting_stops, one_thread_each, time_limit
 
 LOOKED = 0.1
@@ -124,7 +121,7 @@ class _Work:
         driven = _is_answered(nominal.rig, train)
         logged = all(EFFORT in nominal.rig.input_columns(t) for t in study.trials)
         faults = LogFaults(study.trials, lambda trials: _searched(study, trials, driven), self.end)
-        log = Log(effort_noise=faults.effort_noise_of_nominal(nominal)) if driven and logged else Log()
+        log = Log(effort_noise=faults.of_nominal(nominal)) if driven and logged else Log()
         found = self._logged(study, log)
         if not self.stops and (passed := _low_passed(found, self.end)) is not None:
             found = _likelier(self.diagnosis(passed), found)
@@ -226,63 +223,6 @@ def _likelier(passed: Diagnosis, recorded: Diagnosis) -> Diagnosis:
     cutoff = trials[0].low_pass_hz
     said = f"{names} seems low-passed at {cutoff:.2g} Hz: the simulation was low-passed there as well"
     return replace(passed, log=replace(passed.log, low_pass_hz=cutoff), warnings=(said, *passed.warnings))
-
-
-@dataclass(frozen=True)
-class Measured:
-    """A study without spikes and without stretches of stuck sensors.
-
-    Attributes
-    ----------
-    study
-        The study, with spikes replaced and stretches of stuck sensors cut out.
-    left_out
-        Samples that were spikes, by trial and column.
-    warnings
-        The stretches that were cut out, a line each.
-    """
-
-    study: Study
-    left_out: dict[str, dict[str, tuple[int, ...]]]
-    warnings: list[str]
-
-
-def measured_study(study: Study) -> Measured:
-    """Return a study without spikes of its measured columns and without stretches in which a sensor was stuck.
-
-    A sample that its neighbours replace carries no information of its own. Intervals are therefore too narrow by half
-    the share of such samples: half a percent where one in a hundred is a spike.
-
-    Raises
-    ------
-    InputError
-        If no trial has a reading that is not stuck.
-    """
-    rig, trials, found, warnings = nominal_model(study).rig, [], {}, []
-    for trial in study.trials:
-        pieces, said = without_stuck(trial, rig.outputs(trial.kind), bool(rig.unknowns(trial.kind)))
-        warnings += said
-        for piece in pieces:
-            clean, spikes = without_spikes(piece, rig.outputs(piece.kind))
-            trials.append(clean)
-            if spikes:
-                found[piece.name] = spikes
-    if not trials:
-        raise InputError(f"no trial has a reading that is not stuck: {warnings[0]}", file=study.folder)
-    for rate, position in rig.rate_of.items():
-        trials, said = without_derived(trials, position, rate)
-        warnings += said
-    return Measured(replace(study, trials=tuple(trials)) if found or warnings else study, found, warnings)
-
-
-def split(study: Study) -> tuple[list[Trial], list[Trial]]:
-    """Return the trials to fit and the trials that the study holds out.
-
-    Free motion is fitted at the rate that its noise is modelled at, since no input is faster.
-    """
-    schema = study.schema
-    train = [t if set(schema.inputs) & set(t.columns) else thinned(t, schema) for t in study.to_fit()]
-    return train, [t for t in study.trials if t.role == "held_out"]
 
 
 def few_trials(count: int) -> list[str]:

@@ -4,14 +4,14 @@ from fes_pin.data.schema import IMPOSED
 from fes_pin.diagnosis.decide.by_prediction import FEWEST, best_predicting
 from fes_pin.diagnosis.decide.rivals import not_excluded
 from fes_pin.diagnosis.errors_ahead import squared_errors
-from fes_pin.diagnosis.search.likelihood_fits import MEASUREMENT, PROCESS
-from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodModels, LikelihoodSearch
+from fes_pin.diagnosis.likelihood_models import Found, LikelihoodModels, LikelihoodSearch
 from fes_pin.identify.afar import is_rounding
 from fes_pin.identify.likelihood_fit import LikelihoodFit, with_white_process_noise
 from fes_pin.identify.process_noise import step_s
 from fes_pin.infer.held_out import held_out_gain
 from fes_pin.infer.levels import NOTHING_PERCENT
 from fes_pin.infer.search import Policy
+from fes_pin.search.likelihood_fits import MEASUREMENT, PROCESS
 from fes_pin.workers import attempted, in_parallel
 
 WHITE_PROCESS_NOISE = (

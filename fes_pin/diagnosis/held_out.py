@@ -10,23 +10,18 @@ from fes_pin.diagnosis.errors_ahead import squared_errors
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit, fit_of, maximise
 from fes_pin.infer.covariance import covariance_of
-from fes_pin.infer.held_out import FOLDS, Errors, deal, held_out_gain, marginal_cost
+from fes_pin.infer.held_out import Errors, held_out_gain, marginal_cost
 from fes_pin.infer.levels import IDENTIFIABLE_SHARE
 from fes_pin.infer.maximise import together
 from fes_pin.infer.optimum import minimise
 from fes_pin.infer.problem import Unknowns, normal_equations
 from fes_pin.infer.result import CROSS_VALIDATED, FITTED, Evidence, Gain
 from fes_pin.infer.search import SearchResult
+from fes_pin.prepare.folds import folds_of
 from fes_pin.workers import in_parallel
 
 Found = SearchResult[LikelihoodFit]
 """Result of a search among causes."""
-
-
-def folds_of(trials: Sequence[Trial], groups: Sequence[str] | None = None, count: int = FOLDS) -> list[list[int]]:
-    """Return the trials of each fold, in which every kind and load is spread evenly; none where there is one trial."""
-    order = sorted(range(len(trials)), key=lambda i: (trials[i].kind, sorted(trials[i].conditions.items()), i))
-    return deal(order, groups, count)
 
 
 @dataclass(frozen=True)

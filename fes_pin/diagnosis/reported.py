@@ -12,10 +12,9 @@ from fes_pin.diagnosis.decide.chosen_again import share_of
 from fes_pin.diagnosis.decide.rivals import alike_in, estimates, experiment, not_identifiable, ranking
 from fes_pin.diagnosis.errors_ahead import AheadErrors, free_errors, noise_that_is_small
 from fes_pin.diagnosis.estimators import WHITE_PROCESS_NOISE
+from fes_pin.diagnosis.likelihood_models import Found, LikelihoodSearch
 from fes_pin.diagnosis.rejected import UNMOVED, is_moved_by_what_is_recorded
 from fes_pin.diagnosis.result import Diagnosis
-from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
-from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodSearch
 from fes_pin.diagnosis.verdict import RigState, RigVerdict
 from fes_pin.identify.correlation_time import words_of_reading
 from fes_pin.identify.fit import rough_noise
@@ -26,6 +25,7 @@ from fes_pin.infer.scatter import as_wide_as_estimates_differ, as_wide_as_trials
 from fes_pin.infer.verdict import share_in, word_of
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
+from fes_pin.search.likelihood_fits import LikelihoodFits
 
 
 def _ceiling(fitted: LikelihoodFit) -> float:

@@ -6,14 +6,12 @@ from dataclasses import replace
 import numpy as np
 
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.conditions import Conditions, Restated
 from fes_pin.diagnosis.errors_ahead import errors_ahead, free_errors
 from fes_pin.diagnosis.held_out import Again, make_folds, refit
-from fes_pin.diagnosis.long_records import in_parts
-from fes_pin.diagnosis.misread import NAME, Misread, find_misread
-from fes_pin.diagnosis.remainder.lack_of_fit import lack_of_fit
+from fes_pin.diagnosis.likelihood_models import Found, LikelihoodModels, LikelihoodSearch
 from fes_pin.diagnosis.result import Diagnosis
-from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodModels, LikelihoodSearch
+from fes_pin.faults.conditions import Conditions, Restated
+from fes_pin.faults.misread import NAME, Misread, find_misread
 from fes_pin.identify.fit import rough_fit
 from fes_pin.identify.likelihood_fit import LikelihoodFit, maximum_from
 from fes_pin.identify.per_trial import halves
@@ -22,6 +20,8 @@ from fes_pin.infer.result import Cause
 from fes_pin.infer.search import SearchResult
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Stage
+from fes_pin.prepare.long_records import in_parts
+from fes_pin.remainder.lack_of_fit import lack_of_fit
 
 Run = Callable[[list[Trial]], tuple[LikelihoodSearch, Found]]
 """Search of trials: returns the search and its result."""

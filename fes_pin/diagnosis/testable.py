@@ -14,9 +14,6 @@ import numpy as np
 from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.long_records import searched_part
-from fes_pin.diagnosis.search.library import Library
-from fes_pin.diagnosis.search.score import Scores, best_by_effect
 from fes_pin.identify.feedback import is_fed_back
 from fes_pin.identify.fit import Fit, noise_of, rough_fit
 from fes_pin.identify.likelihood_fit import at_noise
@@ -26,6 +23,9 @@ from fes_pin.models.catalogue import Catalogue, installed
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.simulate import simulated_trial
+from fes_pin.prepare.long_records import searched_part
+from fes_pin.search.library import Library
+from fes_pin.search.score import Scores, best_by_effect
 from fes_pin.workers import attempted, one_thread_each
 
 LONGEST_SHIFT = 0.25

@@ -15,13 +15,13 @@ from fes_pin.diagnosis.decide.rivals import alike_in
 from fes_pin.diagnosis.errors_ahead import Ahead, Pairs, RandomPart, are_large, errors_ahead, random_parts
 from fes_pin.diagnosis.estimators import found_with_white_process_noise, judged_again, least_error
 from fes_pin.diagnosis.held_out import Again, Fold, as_random_as_in_all, evidence_of, gains_of, make_folds, refit
+from fes_pin.diagnosis.likelihood_models import Found, LikelihoodModels, LikelihoodSearch
 from fes_pin.diagnosis.rejected import is_moved_by_what_is_recorded, no_noise, with_rejected_causes
-from fes_pin.diagnosis.remainder.lack_of_fit import lack_of_fit
-from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodModels, LikelihoodSearch
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.per_trial import falls
 from fes_pin.infer.result import FITTED, Remainder
 from fes_pin.infer.verdict import State, Verdict, Weighed
+from fes_pin.remainder.lack_of_fit import lack_of_fit
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from driven_rigs.draw import Base, urdf
 
 import fes_pin as fp
 from fes_pin.data.study import Study
-from fes_pin.diagnosis import long_records
+from fes_pin.prepare import long_records
 
 OFFSET = 3.0
 """What the effort is read with too much, N."""

@@ -4,10 +4,10 @@ import pytest
 from harness.large import Large
 
 import fes_pin as fp
-from fes_pin.diagnosis.diagnosis import split
-from fes_pin.diagnosis.search.likelihood_fits import WHITE
-from fes_pin.diagnosis.search.likelihood_models import LikelihoodModels
+from fes_pin.diagnosis.likelihood_models import LikelihoodModels
 from fes_pin.models.nominal import nominal_model
+from fes_pin.prepare.measured import split
+from fes_pin.search.likelihood_fits import WHITE
 
 
 def study_of(seed, folder):

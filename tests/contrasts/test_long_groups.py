@@ -7,7 +7,7 @@ from contrast_pairs.driven import driven_pair
 
 import fes_pin as fp
 from fes_pin.data.smooth import low_pass
-from fes_pin.diagnosis import long_records
+from fes_pin.prepare import long_records
 
 
 @pytest.mark.parametrize("changes", [(), ("coulomb_friction",)], ids=["nothing", "friction"])

@@ -8,10 +8,10 @@ from contrast_pairs.free import free_pair
 
 import fes_pin as fp
 from fes_pin.contrasts.repeats import RepeatedProblem, scatter
-from fes_pin.diagnosis.search.likelihood_fits import MEASUREMENT, LikelihoodFits
 from fes_pin.infer.problem import Linearized
 from fes_pin.infer.projection import without_locals
 from fes_pin.models.nominal import nominal_model
+from fes_pin.search.likelihood_fits import MEASUREMENT, LikelihoodFits
 
 
 def drawn(deviation, seed, trials=60):

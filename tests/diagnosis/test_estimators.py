@@ -6,12 +6,12 @@ import pytest
 from diagnosis.hidden import study_of
 
 from fes_pin.data.trial import derived_trial
-from fes_pin.diagnosis.search.likelihood_fits import MEASUREMENT
-from fes_pin.diagnosis.search.likelihood_models import LikelihoodModels, LikelihoodSearch
+from fes_pin.diagnosis.likelihood_models import LikelihoodModels, LikelihoodSearch
 from fes_pin.diagnosis.verdict import RigVerdict, RigWeighed
 from fes_pin.infer.result import Remainder
 from fes_pin.infer.verdict import State
 from fes_pin.models.nominal import nominal_model
+from fes_pin.search.likelihood_fits import MEASUREMENT
 
 
 def test_trials_that_the_study_holds_out_do_not_choose_between_estimators():

@@ -7,11 +7,11 @@ from diagnosis.hidden import study_of
 
 from fes_pin.data.study import read_study
 from fes_pin.diagnosis.diagnosis import diagnose_joint
+from fes_pin.diagnosis.likelihood_models import LikelihoodModels
 from fes_pin.diagnosis.rejected import no_noise
-from fes_pin.diagnosis.search.likelihood_fits import MEASUREMENT
-from fes_pin.diagnosis.search.likelihood_models import LikelihoodModels
 from fes_pin.models.least_squares import least_squares
 from fes_pin.models.nominal import nominal_model
+from fes_pin.search.likelihood_fits import MEASUREMENT
 from fes_pin.view.report import report_html
 
 

@@ -7,12 +7,12 @@ import pytest
 from identify.rigs import WHITE, measured
 from models.cases import RIGS, trial
 
-from fes_pin.diagnosis.search.likelihood_forms import is_identified
-from fes_pin.diagnosis.search.starts import number_of_forms, refinements
 from fes_pin.identify.fit import fit_problem
 from fes_pin.identify.problem import Problem
 from fes_pin.models.effects import CoulombFriction, SensorNonlinearity
 from fes_pin.models.model import Model
+from fes_pin.search.likelihood_forms import is_identified
+from fes_pin.search.starts import number_of_forms, refinements
 
 BOUND = "coulomb_friction.stiction"
 

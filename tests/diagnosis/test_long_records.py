@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis import long_records
-from fes_pin.diagnosis.long_records import searched_part, thinned
 from fes_pin.models.rigs.joint import Joint
+from fes_pin.prepare import long_records
+from fes_pin.prepare.long_records import searched_part, thinned
 
 SCHEMA = Joint.described()
 

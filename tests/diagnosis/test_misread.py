@@ -8,7 +8,7 @@ import pytest
 from oracle import TYPICAL, make_study
 
 import fes_pin as fp
-from fes_pin.diagnosis.misread import find_misread
+from fes_pin.faults.misread import find_misread
 from fes_pin.infer.levels import CONFIDENCE_95
 from fes_pin.view.report import report_html
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from fes_pin.diagnosis.remainder.innovations import autocorrelation
-from fes_pin.diagnosis.remainder.repeated import repeated_p_value
+from fes_pin.remainder.innovations import autocorrelation
+from fes_pin.remainder.repeated import repeated_p_value
 
 
 def test_a_channel_of_zeros_is_taken_for_white():

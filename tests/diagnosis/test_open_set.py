@@ -11,23 +11,23 @@ from diagnosis.hidden import study_of
 from identify.rigs import trials_of
 
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.remainder import lack_of_fit as tests_of_fit
-from fes_pin.diagnosis.remainder import open_set
-from fes_pin.diagnosis.remainder.bursts import burst_p_value
-from fes_pin.diagnosis.remainder.heteroscedastic import heteroscedastic_p_value
-from fes_pin.diagnosis.remainder.innovations import channels
-from fes_pin.diagnosis.remainder.lack_of_fit import lack_of_fit
-from fes_pin.diagnosis.remainder.lines import line_p_value
-from fes_pin.diagnosis.remainder.play import play_p_value
-from fes_pin.diagnosis.remainder.repeated import repeated_p_value
-from fes_pin.diagnosis.remainder.slips import slip_p_value
-from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
 from fes_pin.identify.fit import fit, under_own_noise
 from fes_pin.infer.levels import CLAIM_LEVEL, FULL_NOISE
 from fes_pin.infer.noise import Noise, estimate_noise
 from fes_pin.infer.projection import Projection
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.predict import predict
+from fes_pin.remainder import lack_of_fit as tests_of_fit
+from fes_pin.remainder import open_set
+from fes_pin.remainder.bursts import burst_p_value
+from fes_pin.remainder.heteroscedastic import heteroscedastic_p_value
+from fes_pin.remainder.innovations import channels
+from fes_pin.remainder.lack_of_fit import lack_of_fit
+from fes_pin.remainder.lines import line_p_value
+from fes_pin.remainder.play import play_p_value
+from fes_pin.remainder.repeated import repeated_p_value
+from fes_pin.remainder.slips import slip_p_value
+from fes_pin.search.likelihood_fits import LikelihoodFits
 
 DT = 0.005
 WHITE = Noise(1.0, (), 1.0)

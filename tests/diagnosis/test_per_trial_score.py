@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 import scipy.stats
 
-from fes_pin.diagnosis.search.score import score_test
 from fes_pin.infer.levels import PARAMETER_PENALTY
 from fes_pin.infer.problem import Linearized
 from fes_pin.infer.projection import Projection
 from fes_pin.models.effects.mains_hum import MainsHum
+from fes_pin.search.score import score_test
 
 TRIALS, ROWS = 4, 60
 

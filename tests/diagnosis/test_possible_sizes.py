@@ -4,10 +4,10 @@ from dataclasses import replace
 
 from diagnosis.hidden import study_of
 
-from fes_pin.diagnosis.search.likelihood_fits import MEASUREMENT
-from fes_pin.diagnosis.search.likelihood_models import LikelihoodModels
+from fes_pin.diagnosis.likelihood_models import LikelihoodModels
 from fes_pin.models.effects import effect_named
 from fes_pin.models.nominal import nominal_model
+from fes_pin.search.likelihood_fits import MEASUREMENT
 
 
 def test_a_size_at_the_end_of_its_range_comes_last():

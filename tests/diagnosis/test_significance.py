@@ -4,10 +4,10 @@ import numpy as np
 from diagnosis.hidden import study_of
 from identify.rigs import trials_of
 
-from fes_pin.diagnosis.held_out import folds_of
-from fes_pin.diagnosis.remainder.lack_of_fit import lack_of_fit
-from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
 from fes_pin.models.predict import predict
+from fes_pin.prepare.folds import folds_of
+from fes_pin.remainder.lack_of_fit import lack_of_fit
+from fes_pin.search.likelihood_fits import LikelihoodFits
 
 
 def test_the_remainder_keeps_its_level():

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from fes_pin.diagnosis.search.starts import started
 from fes_pin.models.effects import EFFECTS, CoulombFriction
+from fes_pin.search.starts import started
 
 
 @pytest.mark.parametrize("estimate", [-1e3, 1e12])

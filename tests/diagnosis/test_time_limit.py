@@ -7,7 +7,7 @@ import pytest
 from diagnosis.hidden import study_of
 
 from fes_pin.diagnosis.diagnosis import diagnose_joint
-from fes_pin.diagnosis.search.likelihood_models import LikelihoodModels
+from fes_pin.diagnosis.likelihood_models import LikelihoodModels
 from fes_pin.view.report import report_html
 from fes_pin.workers import OutOfTime, check_limit, in_parallel, time_limit
 

@@ -13,7 +13,6 @@ from fes_pin.data.log import Log
 from fes_pin.data.smooth import low_pass
 from fes_pin.data.study import read_study
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
 from fes_pin.identify.correlation_time import FEWEST, with_new_noise
 from fes_pin.identify.process_noise import first_guess
 from fes_pin.identify.stored import load_random, stored_tables
@@ -22,6 +21,7 @@ from fes_pin.models.nominal import nominal_model
 from fes_pin.models.predictor import StateSpaceNoise, are_news
 from fes_pin.models.rigs.joint import Joint
 from fes_pin.models.store import model_toml
+from fes_pin.search.likelihood_fits import LikelihoodFits
 
 
 def nominal(study, made=lambda column: column):

@@ -7,7 +7,7 @@ from driven_rigs.swing_up import draw_swing_up
 from fes_pin.data.counts import count_of
 from fes_pin.data.study import read_study
 from fes_pin.diagnosis.diagnosis import diagnose_joint
-from fes_pin.diagnosis.search.likelihood_models import LikelihoodModels, LikelihoodSearch
+from fes_pin.diagnosis.likelihood_models import LikelihoodModels, LikelihoodSearch
 from fes_pin.identify.correlation_time import words_of_reading
 from fes_pin.models import predictor
 from fes_pin.models.effects import Cogging, CoulombFriction

@@ -3,12 +3,12 @@
 from driven_rigs.draw import draw
 
 from fes_pin.data.study import read_study
-from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
-from fes_pin.diagnosis.search.likelihood_forms import simplified_form
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import maximise
 from fes_pin.models.effects import CoulombFriction, QuadraticDamping
 from fes_pin.models.nominal import nominal_model
+from fes_pin.search.likelihood_fits import LikelihoodFits
+from fes_pin.search.likelihood_forms import simplified_form
 
 PAIR = ("coulomb_friction", "quadratic_damping")
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from driven.bristles import believed, trial
 
-from fes_pin.diagnosis.search.likelihood_models import LikelihoodModels, LikelihoodSearch
-from fes_pin.diagnosis.search.score import Scores
+from fes_pin.diagnosis.likelihood_models import LikelihoodModels, LikelihoodSearch
 from fes_pin.models.effects import CoulombFriction, SensorOffset
+from fes_pin.search.score import Scores
 
 
 @pytest.mark.parametrize("effects", [[SensorOffset], [CoulombFriction]], ids=["friction is left", "nothing is left"])

@@ -5,8 +5,8 @@ import pytest
 from driven_rigs.laboratory import CAUSES, draw_laboratory
 
 from fes_pin.data.study import read_study
-from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
 from fes_pin.models.nominal import nominal_model
+from fes_pin.search.likelihood_fits import LikelihoodFits
 
 SEED = 1600003
 """Of any rig."""

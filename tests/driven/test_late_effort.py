@@ -13,12 +13,12 @@ from fes_pin.data.recorded.text import read_csv
 from fes_pin.data.study import read_study
 from fes_pin.data.trial import Trial, trial_csv
 from fes_pin.diagnosis.diagnosis import diagnose_joint
-from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
 from fes_pin.identify.ahead import predict_ahead
 from fes_pin.identify.effort_timing import lateness_of
 from fes_pin.identify.likelihood_fit import maximum_from
 from fes_pin.identify.stored import load_log, log_table
 from fes_pin.models.nominal import nominal_model
+from fes_pin.search.likelihood_fits import LikelihoodFits
 
 ROWS = (2, 3, 4)
 """Samples of the controller between two rows of the log, at random."""

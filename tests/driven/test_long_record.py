@@ -4,8 +4,8 @@ import pytest
 from driven_rigs.draw import draw
 
 from fes_pin.data.study import read_study
-from fes_pin.diagnosis import long_records
 from fes_pin.diagnosis.diagnosis import diagnose_joint
+from fes_pin.prepare import long_records
 
 
 @pytest.mark.parametrize("seed", [1152000, 1152001, 1152002])

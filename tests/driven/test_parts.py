@@ -10,8 +10,8 @@ from models.cases import RIGS
 from fes_pin.data.study import read_study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.diagnosis import diagnose_joint
-from fes_pin.diagnosis.long_records import SHORTEST_S, in_parts
 from fes_pin.infer.result import CROSS_VALIDATED
+from fes_pin.prepare.long_records import SHORTEST_S, in_parts
 
 DT = 0.01
 

@@ -7,14 +7,14 @@ import pytest
 from driven_rigs.draw import BASES, draw
 
 from fes_pin.data.study import read_study
-from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
-from fes_pin.diagnosis.search.possible import is_possible
 from fes_pin.identify.fit import fit_problem
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.problem import answered_columns, measured_columns
 from fes_pin.identify.process_noise import first_guess
 from fes_pin.models.effects import Backlash, CoulombFriction, SensorGain, SensorLag
 from fes_pin.models.nominal import nominal_model
+from fes_pin.search.likelihood_fits import LikelihoodFits
+from fes_pin.search.possible import is_possible
 
 KNEE = next(k for k in range(99) if BASES[np.random.default_rng(k).integers(len(BASES))].name == "knee")
 GAIN, FRICTION = ("sensor_gain",), ("coulomb_friction",)

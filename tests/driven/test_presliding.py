@@ -8,13 +8,13 @@ from driven_rigs.draw import draw
 from fes_pin.data.study import read_study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.diagnosis import diagnose_joint
-from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
-from fes_pin.diagnosis.search.likelihood_forms import refined_form
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import maximise
 from fes_pin.identify.process_noise import first_guess
 from fes_pin.models.effects import CoulombFriction
 from fes_pin.models.simulate import simulated_trial
+from fes_pin.search.likelihood_fits import LikelihoodFits
+from fes_pin.search.likelihood_forms import refined_form
 
 NAMES = ("coulomb_friction",)
 STRETCH = 2e-3

@@ -5,9 +5,9 @@ from driven_rigs.draw import draw
 
 from fes_pin.data.study import read_study
 from fes_pin.diagnosis.diagnosis import diagnose_joint
-from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
-from fes_pin.diagnosis.search.likelihood_forms import refined_form
 from fes_pin.models.effects import CoulombFriction, EffortOffset
+from fes_pin.search.likelihood_fits import LikelihoodFits
+from fes_pin.search.likelihood_forms import refined_form
 
 FRICTION, BOTH = ("coulomb_friction",), ("coulomb_friction", "effort_offset")
 

@@ -8,7 +8,7 @@ from driven_rigs.draw import draw
 from fes_pin.data.study import read_study
 from fes_pin.diagnosis.decide.chosen_again import ChosenAgain
 from fes_pin.diagnosis.held_out import as_random_as_in_all, folds_of
-from fes_pin.diagnosis.search.likelihood_models import LikelihoodModels, LikelihoodSearch
+from fes_pin.diagnosis.likelihood_models import LikelihoodModels, LikelihoodSearch
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import maximise
 from fes_pin.infer.levels import PARAMETER_PENALTY

@@ -11,9 +11,9 @@ from fes_pin.data.log import Log
 from fes_pin.data.study import Study, read_study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.diagnosis import diagnose_joint
-from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
 from fes_pin.identify.effort_timing import cost_of_answers
 from fes_pin.models.nominal import nominal_model
+from fes_pin.search.likelihood_fits import LikelihoodFits
 
 MASS, DAMPING, DT = 10.0, 20.0, 0.01
 STIFFNESS, BRAKE = 1000.0, 150.0

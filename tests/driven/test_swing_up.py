@@ -5,8 +5,8 @@ import pytest
 from driven_rigs.swing_up import CAUSES, draw_swing_up
 
 from fes_pin.data.study import read_study
-from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
 from fes_pin.models.nominal import nominal_model
+from fes_pin.search.likelihood_fits import LikelihoodFits
 
 FINE = 1800005
 """A seed of an encoder that tells more than the pendulum's noise hides."""

@@ -7,9 +7,9 @@ from driven_rigs.draw import draw
 
 from fes_pin.data.study import read_study
 from fes_pin.diagnosis.diagnosis import diagnose_joint
-from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.models.nominal import nominal_model
+from fes_pin.search.likelihood_fits import LikelihoodFits
 from fes_pin.view.report import report_html
 from fes_pin.workers import OutOfTime, time_limit
 

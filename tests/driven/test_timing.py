@@ -9,10 +9,10 @@ from driven_rigs.draw import Base, draw, urdf
 
 from fes_pin.data.study import Study, read_study
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
 from fes_pin.identify.effort_timing import with_timing_of_readings
 from fes_pin.infer.scatter import with_honest_intervals
 from fes_pin.models.nominal import nominal_model
+from fes_pin.search.likelihood_fits import LikelihoodFits
 
 MASS, DAMPING = 12.0, 30.0
 DT = 0.004

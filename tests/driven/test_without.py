@@ -8,11 +8,11 @@ import pytest
 from driven_rigs.draw import draw
 
 from fes_pin.data.study import read_study
-from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import maximise
 from fes_pin.models.effects import CoulombFriction, EffortGain, PeriodicTorque
 from fes_pin.models.nominal import nominal_model
+from fes_pin.search.likelihood_fits import LikelihoodFits
 
 
 @pytest.mark.parametrize("own", [False, True], ids=["a phase of all trials", "a phase of each trial's own"])

@@ -15,7 +15,6 @@ from fes_pin.cli import main
 from fes_pin.data.study import read_study, write_study
 from fes_pin.data.trial import Trial, read_trial, write_trial
 from fes_pin.diagnosis.diagnosis import diagnose_joint
-from fes_pin.diagnosis.plausibility import check_study
 from fes_pin.models.effects import CoulombFriction
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
@@ -23,6 +22,7 @@ from fes_pin.models.predict import predict
 from fes_pin.models.rigs import Ankle
 from fes_pin.models.simulate import simulated_trial
 from fes_pin.models.store import load_model, save_model
+from fes_pin.prepare.plausibility import check_study
 
 RIG = Ankle(0.65, 0.05, 1.4e-3, 0.06, constants=ankle.KNOWN)
 

@@ -8,7 +8,6 @@ import pytest
 from cases import JOINT
 
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.search.likelihood_forms import refined_form
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import maximise
 from fes_pin.identify.problem import measured_columns
@@ -18,6 +17,7 @@ from fes_pin.models.predictor import StateSpaceNoise
 from fes_pin.models.rigs import Joint
 from fes_pin.models.simulate import simulate
 from fes_pin.models.stage import Signals
+from fes_pin.search.likelihood_forms import refined_form
 
 HERTZ = 4.0 / 3.0
 TORQUE = 0.01

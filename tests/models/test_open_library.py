@@ -14,7 +14,6 @@ from scipy.integrate import solve_ivp
 
 import fes_pin as fp
 from fes_pin.cli.main import main
-from fes_pin.diagnosis.search.starts import refinements
 from fes_pin.models import rigs
 from fes_pin.models.catalogue import installed, shipped
 from fes_pin.models.disturbance import disturbed
@@ -22,6 +21,7 @@ from fes_pin.models.effects import CoulombFriction
 from fes_pin.models.model import Model
 from fes_pin.models.outside import load_module
 from fes_pin.models.stage import classes_in
+from fes_pin.search.starts import refinements
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "own_causes_and_rigs.md"
 INERTIA, STIFFNESS, DAMPING, ONE_WAY = 0.02, 0.9, 0.01, 0.03

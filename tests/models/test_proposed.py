@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 import fes_pin as fp
-from fes_pin.diagnosis.search.library import Library
-from fes_pin.diagnosis.search.starts import from_afar, refinements
 from fes_pin.identify.problem import limits_of
 from fes_pin.models.catalogue import installed
 from fes_pin.models.rigs import Ankle, Joint, Muscle
+from fes_pin.search.library import Library
+from fes_pin.search.starts import from_afar, refinements
 
 SCALES = (1e-4, 1.0, 1e3, 1e6)
 """Ranges of readings: a stiff actuator in metres, radians, a wheel in degrees, counts."""

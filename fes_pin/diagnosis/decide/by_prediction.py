@@ -12,7 +12,7 @@ import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.held_out import identified_folds
-from fes_pin.diagnosis.search.likelihood_models import LikelihoodSearch
+from fes_pin.diagnosis.likelihood_models import LikelihoodSearch
 from fes_pin.identify.ahead import free_residuals
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit

@@ -5,13 +5,13 @@ from collections.abc import Mapping, Sequence
 from fes_pin.data.study import Study
 from fes_pin.diagnosis.experiment import NextExperiment, next_experiment
 from fes_pin.diagnosis.held_out import Found
-from fes_pin.diagnosis.search.score import Scored, best_by_effect
 from fes_pin.identify.afar import is_rounding
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.per_trial import amplitude
 from fes_pin.infer.levels import IDENTIFIABLE_SHARE
 from fes_pin.infer.result import Cause, ParameterEstimate, Ranked
 from fes_pin.infer.scatter import least_apart
+from fes_pin.search.score import Scored, best_by_effect
 
 
 def estimates(fitted: LikelihoodFit, name: str) -> dict[str, ParameterEstimate]:

@@ -4,10 +4,6 @@ import math
 
 from fes_pin.diagnosis.errors_ahead import are_large, random_parts
 from fes_pin.diagnosis.held_out import Fold, Found, gains_of
-from fes_pin.diagnosis.remainder.lack_of_fit import lack_of_fit
-from fes_pin.diagnosis.search.likelihood_fits import WHITE, LikelihoodFits
-from fes_pin.diagnosis.search.likelihood_forms import refined_form, simplified_form
-from fes_pin.diagnosis.search.score import Scored
 from fes_pin.identify.afar import is_rounding
 from fes_pin.identify.likelihood import is_simulated
 from fes_pin.identify.likelihood_fit import LikelihoodFit
@@ -15,6 +11,10 @@ from fes_pin.infer.distributions import chi2_tail
 from fes_pin.infer.levels import FORM_SHARE, NOTHING_PERCENT
 from fes_pin.infer.scatter import excess_scatter
 from fes_pin.infer.search import Search
+from fes_pin.remainder.lack_of_fit import lack_of_fit
+from fes_pin.search.likelihood_fits import WHITE, LikelihoodFits
+from fes_pin.search.likelihood_forms import refined_form, simplified_form
+from fes_pin.search.score import Scored
 
 
 class NominalFitError(ArithmeticError):

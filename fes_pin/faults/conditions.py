@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Generic
 
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.misread import Misread, restated_trials, takes_most
+from fes_pin.faults.misread import Misread, restated_trials, takes_most
 from fes_pin.infer.fits import F
 from fes_pin.infer.levels import PARAMETER_PENALTY, SEPARABLE
 from fes_pin.infer.search import M, Search, SearchResult

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fes_pin.diagnosis.remainder.innovations import CLIP, autocorrelation
 from fes_pin.infer.distributions import f_tail
+from fes_pin.remainder.innovations import CLIP, autocorrelation
 
 SCALES_S = (0.0, 0.03, 0.08, 0.2, 0.5)
 """Lengths over which the innovations are averaged, s; 0 averages nothing."""

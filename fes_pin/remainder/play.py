@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from fes_pin.diagnosis.remainder.innovations import Innovations, channels
 from fes_pin.identify.fit import Fit
 from fes_pin.infer.distributions import f_tail
 from fes_pin.infer.levels import IDENTIFIABLE_SHARE, UNFELT
 from fes_pin.infer.projection import Projection
 from fes_pin.models.simulate import Simulator
+from fes_pin.remainder.innovations import Innovations, channels
 
 WIDTHS = (0.003, 0.01, 0.03, 0.1)
 """Half widths of the play that are tried, as shares of the largest range of a trial's reading. Below the smallest, only

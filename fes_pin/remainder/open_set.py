@@ -7,17 +7,17 @@ trial, and readings that lag where the motion reverses. An autoregressive noise 
 
 import numpy as np
 
-from fes_pin.diagnosis.remainder.bursts import burst_p_value
-from fes_pin.diagnosis.remainder.detents import detent_p_value
-from fes_pin.diagnosis.remainder.heteroscedastic import heteroscedastic_p_value
-from fes_pin.diagnosis.remainder.innovations import channels, driven
-from fes_pin.diagnosis.remainder.lines import LONGEST_NOISE, line_p_value
-from fes_pin.diagnosis.remainder.play import play_p_value
-from fes_pin.diagnosis.remainder.repeated import repeated_p_value
-from fes_pin.diagnosis.remainder.slips import slip_p_value
 from fes_pin.identify.fit import Fit, under_own_noise
 from fes_pin.infer.levels import FULL_NOISE, SHORT_NOISE
 from fes_pin.infer.projection import Projection
+from fes_pin.remainder.bursts import burst_p_value
+from fes_pin.remainder.detents import detent_p_value
+from fes_pin.remainder.heteroscedastic import heteroscedastic_p_value
+from fes_pin.remainder.innovations import channels, driven
+from fes_pin.remainder.lines import LONGEST_NOISE, line_p_value
+from fes_pin.remainder.play import play_p_value
+from fes_pin.remainder.repeated import repeated_p_value
+from fes_pin.remainder.slips import slip_p_value
 
 
 def residual_tests(fitted: Fit) -> list[tuple[float, str]]:

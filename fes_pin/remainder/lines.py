@@ -6,8 +6,8 @@ import numpy as np
 import scipy.fft
 import scipy.ndimage
 
-from fes_pin.diagnosis.remainder.innovations import CLIP, Innovations, driven
 from fes_pin.infer.distributions import chi2_quantile, f_tail
+from fes_pin.remainder.innovations import CLIP, Innovations, driven
 
 LOWEST_HZ = 2.0
 """Lowest frequency: slower oscillations are found by the smooth features and by the causes of the library."""

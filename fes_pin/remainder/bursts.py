@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fes_pin.diagnosis.remainder.innovations import autocorrelation, convolved, normal_scores
 from fes_pin.infer.distributions import pearson3_tail
 from fes_pin.infer.noise import Noise
+from fes_pin.remainder.innovations import autocorrelation, convolved, normal_scores
 
 HUMPS_S = (0.06, 0.12, 0.25, 0.5, 1.0)
 """Lengths of a transient deviation, s: from a twitch to a slow pull."""

@@ -9,7 +9,6 @@ import math
 
 import numpy as np
 
-from fes_pin.diagnosis.remainder.open_set import residual_tests
 from fes_pin.identify.afar import is_rounding
 from fes_pin.identify.fit import rough_fit, under_own_noise
 from fes_pin.identify.likelihood import LikelihoodProblem
@@ -21,6 +20,7 @@ from fes_pin.infer.optimum import MAX_ITERATIONS
 from fes_pin.infer.projection import Projection
 from fes_pin.infer.result import Remainder
 from fes_pin.models.features import EffortFeatures, ForceFeatures, ReadingFeatures, scaled_to
+from fes_pin.remainder.open_set import residual_tests
 
 TRIED = (1.0, 0.5, 0.25, 0.1)
 """Shares of the Gauss-Newton step at which the cost is evaluated."""

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fes_pin.diagnosis.remainder.innovations import autocorrelation, convolved, normal_scores
 from fes_pin.infer.distributions import f_tail
+from fes_pin.remainder.innovations import autocorrelation, convolved, normal_scores
 
 SCALES_S = (0.0, 0.08, 0.3, 1.0)
 """Lengths over which the innovations are averaged, s; 0 averages nothing."""

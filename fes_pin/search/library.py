@@ -8,8 +8,6 @@ from typing import Any
 import numpy as np
 
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.search.score import Scores, score_test
-from fes_pin.diagnosis.search.starts import near_null
 from fes_pin.identify.likelihood import LikelihoodProblem, is_simulated
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.problem import answered_columns, measured_columns
@@ -18,6 +16,8 @@ from fes_pin.models.catalogue import installed
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import StateSpaceNoise
 from fes_pin.models.stage import Effect
+from fes_pin.search.score import Scores, score_test
+from fes_pin.search.starts import near_null
 from fes_pin.workers import in_parallel
 
 

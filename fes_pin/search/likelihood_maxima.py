@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.search.starts import STARTS
 from fes_pin.identify.afar import followed, following
 from fes_pin.identify.fit import GROSS, from_beginnings
 from fes_pin.identify.likelihood import LikelihoodProblem
@@ -20,6 +19,7 @@ from fes_pin.infer.problem import Unknowns, completed
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import StateSpaceNoise
 from fes_pin.models.stage import Effect
+from fes_pin.search.starts import STARTS
 from fes_pin.workers import in_parallel
 
 SCREEN_ITERATIONS = 4

@@ -9,12 +9,6 @@ from typing import Self
 
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.search.library import Library
-from fes_pin.diagnosis.search.likelihood_forms import refined_form
-from fes_pin.diagnosis.search.likelihood_maxima import less, likeliest, look, maximum_from_afar, process_noises
-from fes_pin.diagnosis.search.possible import is_certain, is_possible
-from fes_pin.diagnosis.search.score import Scored, best_by_effect
-from fes_pin.diagnosis.search.starts import STARTED, STARTS, at_null, from_afar, refinements, started
 from fes_pin.identify.afar import at_a_bound, followed, following, freed, misfit_percent, with_beliefs
 from fes_pin.identify.ahead import default_horizon
 from fes_pin.identify.correlation_time import with_new_noise
@@ -33,6 +27,12 @@ from fes_pin.infer.text import WHOLE
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import StateSpaceNoise
 from fes_pin.models.stage import Effect
+from fes_pin.search.library import Library
+from fes_pin.search.likelihood_forms import refined_form
+from fes_pin.search.likelihood_maxima import less, likeliest, look, maximum_from_afar, process_noises
+from fes_pin.search.possible import is_certain, is_possible
+from fes_pin.search.score import Scored, best_by_effect
+from fes_pin.search.starts import STARTED, STARTS, at_null, from_afar, refinements, started
 from fes_pin.workers import in_parallel
 
 FIRST_NOISE_SCALES = (1.0, 30.0)

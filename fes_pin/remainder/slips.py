@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 
-from fes_pin.diagnosis.remainder.innovations import CLIP, Innovations, channels
 from fes_pin.identify.fit import Fit
 from fes_pin.infer.distributions import pearson3_tail
 from fes_pin.infer.levels import IDENTIFIABLE_SHARE
 from fes_pin.infer.projection import Projection
+from fes_pin.remainder.innovations import CLIP, Innovations, channels
 
 TRIM = 0.15
 """Share of a trial at either end in which no jump is sought: Andrews, Tests for parameter instability and structural

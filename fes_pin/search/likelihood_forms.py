@@ -4,13 +4,13 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from fes_pin.diagnosis.search.likelihood_maxima import better, less, look
-from fes_pin.diagnosis.search.starts import STARTED, STARTS, number_of_forms, refinements
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood_fit import LikelihoodFit, maximum_from
 from fes_pin.infer.distributions import chi2_quantile, chi2_tail
 from fes_pin.infer.fits import F, more_degrees
 from fes_pin.infer.levels import CONFIDENCE_95
+from fes_pin.search.likelihood_maxima import better, less, look
+from fes_pin.search.starts import STARTED, STARTS, number_of_forms, refinements
 from fes_pin.workers import in_parallel
 
 

@@ -1,0 +1,1 @@
+"""Faults of a record: conditions that were misread, noise of recorded efforts."""

@@ -1,0 +1,1 @@
+"""Trials before a search: measured, in parts, and dealt to folds."""
