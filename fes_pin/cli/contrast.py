@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from fes_pin.cli.group import needs
-from fes_pin.cli.options import Exclude, Force, Libraries, Limit, Seed, Trials, output, study_of
+from fes_pin.cli.options import Exclude, Force, Libraries, Limit, Seed, Trials, Why, output, study_of
 from fes_pin.cli.progress import catalogue_with, print_result, progress, say_whose_code
 
 
@@ -25,6 +25,7 @@ def contrast(
     exclude: Exclude = None,
     library: Libraries = None,
     force: Force = False,
+    why: Why = None,
 ) -> None:
     """Say what differs between groups of trials, by how much, and what did not change."""
     from fes_pin.contrasts.contrast import contrast as find
@@ -44,5 +45,5 @@ def contrast(
         )
     outputs.write(out, answer_files(found.by_command(this_command())))
     say_whose_code(catalogue)
-    print_result(found)
+    print_result(found, [line for name in why or () for line in found.explain(name)])
     typer.echo(f"report: {out / 'report.html'}")

@@ -25,6 +25,7 @@ Libraries = Annotated[
 Force = Annotated[bool, typer.Option("--force", help="Write over files that this command did not write as they are.")]
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Of simulated critical values and bootstrap intervals.")]
 Limit = Annotated[float | None, typer.Option("--limit", min=0.0, help="Seconds of a search; then the best set so far.")]
+Why = Annotated[list[str] | None, typer.Option("--why", help="A cause: print why it is named, or is not.")]
 
 Trials = Annotated[str | None, typer.Option("--trials", help="Only these trials: a,b, or a* for all that begin so.")]
 Exclude = Annotated[str | None, typer.Option("--exclude", help="All trials but these: a,b, or a*.")]

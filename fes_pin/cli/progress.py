@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -55,14 +55,14 @@ def progress(every_s: float = math.inf) -> Iterator[Callable[[float, str], None]
         yield lambda share, words: bar.update(task, completed=share, description=words)
 
 
-def print_result(found: Saveable) -> None:
-    """Print a result as a table, as wide as the terminal."""
+def print_result(found: Saveable, notes: Sequence[str] = ()) -> None:
+    """Print a result as a table, as wide as the terminal, and further notes."""
     from rich import box
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
 
-    title, head, rows, notes = found.as_table()
+    title, head, rows, own = found.as_table()
     console = Console(width=None if sys.stdout.isatty() else 120, soft_wrap=not sys.stdout.isatty(), highlight=False)
     console.print(Text(title, style="bold"))
     if rows:
@@ -70,5 +70,5 @@ def print_result(found: Saveable) -> None:
         for row in rows:
             table.add_row(*map(Text, row))
         console.print(table)
-    for note in notes:
+    for note in (*own, *notes):
         console.print(Text(note))

@@ -2,22 +2,22 @@
 
 import math
 
-from fes_pin.contrasts.grouped import Grouped, Item
+from fes_pin.contrasts.grouped import Grouped
 from fes_pin.contrasts.models import ContrastModels, Found
 from fes_pin.contrasts.words import of_cause, of_nominal
 from fes_pin.faults.misread import NAME, Misread
 from fes_pin.infer.distributions import normal_quantile
+from fes_pin.infer.keys import Key
 from fes_pin.infer.levels import CLAIM_LEVEL, IDENTIFIABLE_SHARE, SEEN_POWER, SEPARABLE
 from fes_pin.infer.result import Change, Evidence, ParameterEstimate
 from fes_pin.models.catalogue import Catalogue
 
 
 def change_of(
-    models: ContrastModels, found: Found, item: Item, catalogue: Catalogue, evidence: Evidence | None
+    models: ContrastModels, found: Found, item: Key, catalogue: Catalogue, evidence: Evidence | None
 ) -> Change:
     """Return one change of the result: its size in each group, in words, and its equivalents."""
     best, model, groups = found.best, found.best.grouped, tuple(found.best.grouped.models)
-    assert item.group is not None
     wider = math.sqrt(max(1.0, models.spread(best, *models.under_noise_of(best, [found.without[str(item)]])).phi))
     nominal = item.name in found.nominal.grouped.free
     parameters = _by_group(best, item, wider)
@@ -40,10 +40,9 @@ def change_of(
     )
 
 
-def _by_group(best: Grouped, item: Item, wider: float) -> dict[str, dict[str, ParameterEstimate]]:
+def _by_group(best: Grouped, item: Key, wider: float) -> dict[str, dict[str, ParameterEstimate]]:
     """Return each parameter of a change in each group, with widened deviations; its null where a group has none."""
     model = best.grouped
-    assert item.group is not None
     own = model.models[item.group]
     parameters: dict[str, dict[str, ParameterEstimate]] = {}
     for path in [n for n in own.parameters() if n.partition(".")[0] == item.name]:
@@ -59,7 +58,7 @@ def _by_group(best: Grouped, item: Item, wider: float) -> dict[str, dict[str, Pa
     return parameters
 
 
-def _equivalents(models: ContrastModels, found: Found, item: Item) -> tuple[str, ...]:
+def _equivalents(models: ContrastModels, found: Found, item: Key) -> tuple[str, ...]:
     """Return the equivalents of a change; of driven rigs also with more parameters, if they are as likely.
 
     An equivalent is significant by the test of the change itself.
@@ -88,7 +87,7 @@ def not_changed(
     values, units, largest, seen = best.values, best.grouped.rig.units(), dict[str, float](), dict[str, str]()
     for one in models.screen.scores(best).scored:
         name, size = one.item.name, reach * one.deviation * math.sqrt(max(one.spread.phi, 1.0))
-        if one.item.group is None or name in named or not values.get(name, 1.0):
+        if not one.item.group or name in named or not values.get(name, 1.0):
             continue
         largest[name] = max(largest.get(name, 0.0), size / abs(values.get(name, 1.0)))
         if one.effect is not None and one.kept >= IDENTIFIABLE_SHARE:

@@ -24,6 +24,7 @@ from fes_pin.faults.effort_noise import EffortNoise, words_of_noise
 from fes_pin.identify.correlation_time import words_of_reading
 from fes_pin.identify.effort_timing import words_of_lateness
 from fes_pin.identify.feedback import is_fed_back
+from fes_pin.infer.why import why_of
 from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
 from fes_pin.models.nominal import nominal_model
 from fes_pin.prepare.long_records import searched_part
@@ -196,6 +197,7 @@ class _Work:
             repeats=best.repeats,
             warnings=tuple(said),
             catalogue=self.catalogue,
+            why=why_of(state),
         )
 
 

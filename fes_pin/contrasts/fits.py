@@ -3,12 +3,13 @@
 import math
 from collections.abc import Collection, Mapping, Sequence
 
-from fes_pin.contrasts.grouped import Grouped, GroupedModel, GroupedProblem, Item, Weights, by_group
+from fes_pin.contrasts.grouped import Grouped, GroupedModel, GroupedProblem, Weights, by_group
 from fes_pin.data.errors import InputError
 from fes_pin.data.trial import Trial
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit, fit_of
 from fes_pin.identify.process_noise import first_guess
+from fes_pin.infer.keys import Key
 from fes_pin.infer.maximise import alternate
 from fes_pin.infer.optimum import minimise
 from fes_pin.infer.problem import Unknowns
@@ -81,7 +82,7 @@ class GroupedFits:
     def apart(self, one: Grouped) -> Grouped:
         """Return the nominal model with every parameter of each group's own, from the noise of another fit."""
         names, groups = self.nominal.fitted_parameters(), list(self.trials)
-        model = one.grouped.having({Item(n, g) for n in names for g in groups[1:]})
+        model = one.grouped.having({Key(n, group=g) for n in names for g in groups[1:]})
         values = {model.path(n, g): self._each[g].fits[()].values[n] for n in names for g in groups}
         return self.fitted(model.with_parameters(values), one.weights)
 
@@ -101,7 +102,7 @@ class GroupedFits:
         begun = Model(found.rig, tuple(effects))
         own = in_parallel(lambda f: f.from_least_squares(begun), list(self._each.values()))
         near = dict(zip(self._each, own, strict=True))
-        model = one.grouped.having(one.items | {Item(e.name) for e in effects}, effects)
+        model = one.grouped.having(one.items | {Key(e.name) for e in effects}, effects)
         values = {model.path(n, g): near[g].values[n] for g, m in model.models.items() for n in m.parameters()}
         return self.fitted(model.with_parameters(values), Weights({g: f.noise for g, f in near.items()}))
 

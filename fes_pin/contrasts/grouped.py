@@ -16,6 +16,7 @@ from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood import is_simulated
 from fes_pin.identify.problem import products_of
+from fes_pin.infer.keys import Key
 from fes_pin.infer.levels import PARAMETER_PENALTY, SEPARABLE
 from fes_pin.infer.noise import Noise
 from fes_pin.infer.optimum import Optimum
@@ -31,29 +32,10 @@ T = TypeVar("T")
 
 
 @dataclass(frozen=True)
-class Item:
-    """A cause or change of a grouped model, which the nominal one does not have.
-
-    Attributes
-    ----------
-    name
-        A cause, or a nominal parameter.
-    group
-        The group that differs; None for a cause that acts in all groups alike.
-    """
-
-    name: str
-    group: str | None = None
-
-    def __str__(self) -> str:
-        return self.name if self.group is None else f"{self.name}@{self.group}"
-
-
-@dataclass(frozen=True)
 class GroupedModel:
     """A model for each group; a parameter of the same name is the same in all, but for those in `own`.
 
-    A parameter's name is its path, with "@group" behind it where the group has a value of its own.
+    A parameter's name is its path, with ":group" behind it where the group has a value of its own.
 
     Attributes
     ----------
@@ -67,7 +49,7 @@ class GroupedModel:
 
     models: Mapping[str, Model]
     own: frozenset[tuple[str, str]] = frozenset()
-    items: frozenset[Item] = frozenset()
+    items: frozenset[Key] = frozenset()
 
     @property
     def rig(self) -> Rig:
@@ -76,7 +58,7 @@ class GroupedModel:
 
     def path(self, name: str, group: str) -> str:
         """Return the path of a parameter of a group's model."""
-        return f"{name}@{group}" if (name, group) in self.own else name
+        return str(Key(name, group=group)) if (name, group) in self.own else name
 
     def parameters(self) -> dict[str, float]:
         """Return the value of every parameter, by its path."""
@@ -109,7 +91,7 @@ class GroupedModel:
         """The rig, and the effects of each group."""
         return tuple(f"{g}: {n}" for g, m in self.models.items() for n in m.structure())
 
-    def having(self, items: Collection[Item], new: Sequence[Effect] = ()) -> GroupedModel:
+    def having(self, items: Collection[Key], new: Sequence[Effect] = ()) -> GroupedModel:
         """The same rig with these items alone.
 
         A group that has a cause of its own has all its parameters for itself; where all groups have the
@@ -122,15 +104,15 @@ class GroupedModel:
         """
         models, own = {}, set[tuple[str, str]]()
         for group, model in self.models.items():
-            wanted = {i.name for i in items if i.group in (None, group)}
+            wanted = {i.name for i in items if i.group in ("", group)}
             known = [e for e in model.effects if e.name in wanted]
             known += [e for e in new if e.name in wanted and e.name not in {k.name for k in known}]
             models[group] = Model(model.rig, tuple(known))
-            own |= {(n, group) for i in items if i.group == group for n in _differing(i, known, Item(i.name) in items)}
+            own |= {(n, group) for i in items if i.group == group for n in _differing(i, known, Key(i.name) in items)}
         return _agreed(GroupedModel(models, frozenset(own), frozenset(items)))
 
 
-def _differing(item: Item, effects: Sequence[Effect], is_common: bool) -> list[str]:
+def _differing(item: Key, effects: Sequence[Effect], is_common: bool) -> list[str]:
     """Names of the parameters that an item gives a group of its own."""
     return [
         f"{e.name}.{n}" for e in effects if e.name == item.name for n in (e.amplitudes() if is_common else e.common())
@@ -189,7 +171,7 @@ class GroupedProblem(NoisyProblem):
     @property
     def noise(self) -> dict[str, Noise]:
         """Noise by column and group."""
-        return {f"{n}@{g}": v for g, p in self.parts.items() for n, v in p.noise.items()}
+        return {str(Key(n, group=g)): v for g, p in self.parts.items() for n, v in p.noise.items()}
 
     def start_unknowns(self) -> Unknowns:
         """The unknowns of each trial as its first samples suggest."""
@@ -198,12 +180,12 @@ class GroupedProblem(NoisyProblem):
     @property
     def noise_parameters(self) -> dict[str, float]:
         """Parameters of the process and measurement noise that may change, by name and group."""
-        return {f"{n}@{g}": v for g, p in self.parts.items() for n, v in p.noise_parameters.items()}
+        return {str(Key(n, group=g)): v for g, p in self.parts.items() for n, v in p.noise_parameters.items()}
 
     @property
     def noise_limits(self) -> dict[str, tuple[float, float]]:
         """Bounds of these parameters."""
-        return {f"{n}@{g}": v for g, p in self.parts.items() for n, v in p.noise_limits.items()}
+        return {str(Key(n, group=g)): v for g, p in self.parts.items() for n, v in p.noise_limits.items()}
 
     def set_noise(self, parameters: Mapping[str, float]) -> None:
         """Change parameters of the noise, in place."""
@@ -295,8 +277,8 @@ def by_group(rows: Iterable[T], trials: Mapping[str, Sequence[Trial]]) -> dict[s
 
 def _of_group(parameters: Mapping[str, float], group: str) -> dict[str, float]:
     """Return the parameters of a group's noise, by name."""
-    split = ((name.partition("@"), v) for name, v in parameters.items())
-    return {name: v for (name, _, g), v in split if g == group}
+    split = ((Key.of(name), v) for name, v in parameters.items())
+    return {key.name: v for key, v in split if key.group == group}
 
 
 @dataclass(frozen=True, kw_only=True, repr=False, eq=False)
@@ -325,7 +307,7 @@ class Grouped(Fit):
         return cls(**ended, trials=problem.trials, noise=problem.noise, weights=problem.weights, shrinks=shrinks)
 
     @property
-    def items(self) -> frozenset[Item]:
+    def items(self) -> frozenset[Key]:
         """Its causes and changes in addition to the nominal model."""
         return self.grouped.items
 
@@ -339,15 +321,15 @@ class Grouped(Fit):
         return self.sse + PARAMETER_PENALTY * (self.degrees + random) + SEPARABLE * len(self.changes)
 
     @property
-    def changes(self) -> tuple[Item, ...]:
+    def changes(self) -> tuple[Key, ...]:
         """The items that differ in one group, by name."""
-        return tuple(sorted((i for i in self.items if i.group is not None), key=str))
+        return tuple(sorted((i for i in self.items if i.group), key=str))
 
     @property
     def common(self) -> tuple[str, ...]:
         """Causes of all groups, except those that differ in one."""
         differ = {i.name for i in self.changes}
-        return tuple(sorted(i.name for i in self.items if i.group is None and i.name not in differ))
+        return tuple(sorted(i.name for i in self.items if not i.group and i.name not in differ))
 
     @property
     def is_driven(self) -> bool:
@@ -360,7 +342,7 @@ class Grouped(Fit):
         values = next(iter(self.grouped.models.values())).parameters()
         return {n: s / abs(values[n]) for n, s in self.weights.deviations.items() if values[n]}
 
-    def certainty(self, change: Item) -> float:
+    def certainty(self, change: Key) -> float:
         """Return by how many deviations one group differs from the others, in the amplitude where that is most.
 
         Amplitudes that are not identified count as equal.

@@ -5,11 +5,12 @@ from collections.abc import Collection, Mapping, Sequence
 import numpy as np
 
 from fes_pin.contrasts.fits import GroupedFits
-from fes_pin.contrasts.grouped import Grouped, GroupedModel, Item
+from fes_pin.contrasts.grouped import Grouped, GroupedModel
 from fes_pin.contrasts.screen import ItemScore, Screen
 from fes_pin.identify.afar import misfit_percent
 from fes_pin.infer.distributions import chi2_tail
 from fes_pin.infer.fits import Candidate, FittedSets, Names, more_degrees
+from fes_pin.infer.keys import Key
 from fes_pin.infer.levels import CLAIM_LEVEL, CONFIDENCE_95, DRIVEN_LEVEL, MOST_CAUSES, MOST_ITEMS, UNUSUAL_LEVEL
 from fes_pin.infer.scatter import excess_scatter
 from fes_pin.infer.search import Policy, Search, SearchResult
@@ -93,7 +94,7 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
         self.fits |= {tuple(sorted(map(str, f.items))): f for f in (apart, alike)}
         return apart if len(apart.changes) == 1 else alike
 
-    def _without(self, one: Grouped, items: Collection[Item]) -> Grouped:
+    def _without(self, one: Grouped, items: Collection[Key]) -> Grouped:
         """Return the fit of a set without some items, from its noise or from that of the nominal model."""
         model, noises = one.grouped.having(one.items.difference(items)), (one.weights, self.fits[()].weights)
         fits = in_parallel(lambda w: self.maxima.fitted(model, w, one.unknowns), noises)
@@ -104,7 +105,7 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
 
         The noise of the set understates the gain of the latter.
         """
-        by_item: dict[Item, list[ItemScore]] = {}
+        by_item: dict[Key, list[ItemScore]] = {}
         for one in sorted(self.screen.scores(base).scored, key=lambda s: -s.net_gain):
             if one.gain > 1.0:
                 by_item.setdefault(one.item, []).append(one)
@@ -180,7 +181,7 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
         Where nominal parameters scatter between repeats, the fit is not compared with a constant.
         """
         nominal = self.nominal_model.parameters()
-        if any(n.partition("@")[0] in nominal and fitted.values[n] != 0.0 for n in fitted.at_bound):
+        if any(Key.of(n).name in nominal and fitted.values[n] != 0.0 for n in fitted.at_bound):
             return False
         return not self.leaves_noise(fitted) or all(
             misfit_percent(self.maxima.part(fitted, g)) <= WHOLE for g in self.trials
@@ -192,7 +193,7 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
 
     def is_claimed(self, name: str) -> bool:
         """Return whether an item is a change: a cause of all groups is none."""
-        return "@" in name
+        return bool(Key.of(name).group)
 
     def excess_scatter(self, larger: Grouped, smaller: Grouped) -> float:
         """See `identify.scatter.excess_scatter`."""
@@ -285,7 +286,7 @@ class CommonModels(ContrastModels):
     def first(self) -> Names:
         """Return the causes by which one group is near its data."""
         near = self.maxima.nearest(self.fits[()])
-        names = tuple(sorted(str(i) for i in near.items if i.group is None)) if near else ()
+        names = tuple(sorted(str(i) for i in near.items if not i.group)) if near else ()
         if near:
             self.fits[names] = near
         return names
@@ -298,7 +299,7 @@ class CommonModels(ContrastModels):
         if not (base.is_driven or self.extension_p_value(base) < UNUSUAL_LEVEL):
             return {}
         best = max(self.screen.scores(base).scored, key=lambda s: s.net_gain)
-        known = super().candidates(base) if best.item.group is None else {}
+        known = super().candidates(base) if not best.item.group else {}
         return {n: one for n, one in known.items() if not self.is_claimed(n)}
 
     def begin_again(self, names: Names) -> bool:
@@ -309,7 +310,7 @@ class CommonModels(ContrastModels):
 def _causes(fitted: Grouped) -> list[tuple[str, Effect]]:
     """Return the causes of a set, each once for all groups that share it, with the first group that has it."""
     each = [(g, e) for g, m in fitted.grouped.models.items() for e in m.effects]
-    shared = {i.name for i in fitted.items if i.group is None}
+    shared = {i.name for i in fitted.items if not i.group}
     return list({(e.name, "" if e.name in shared else g): (g, e) for g, e in reversed(each)}.values())
 
 

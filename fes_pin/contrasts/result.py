@@ -56,6 +56,11 @@ class Contrast(Result):
         """The changes, most significant first."""
         return self.causes
 
+    @property
+    def untested(self) -> tuple[str, ...]:
+        """Parameters and causes whose change is not testable."""
+        return self.untestable
+
     def title(self) -> str:
         """The verdict in a few words."""
         between = listed(list(self.groups))

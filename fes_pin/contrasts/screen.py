@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from fes_pin.contrasts.grouped import Grouped, Item, by_group
+from fes_pin.contrasts.grouped import Grouped, by_group
 from fes_pin.data.trial import Trial
 from fes_pin.infer.covariance import covariance_of
 from fes_pin.infer.family import Family
+from fes_pin.infer.keys import Key
 from fes_pin.infer.levels import PARAMETER_PENALTY
 from fes_pin.infer.problem import Unknowns
 from fes_pin.infer.projection import BlockColumns, Projection, slices
@@ -51,7 +52,7 @@ class ItemScore:
         Spread of its first amplitude between trials.
     """
 
-    item: Item
+    item: Key
     effect: Effect | None
     gain: float
     degrees: int
@@ -100,7 +101,7 @@ class _Probe:
         Whitened sensitivities to them of the trials of each group that the item concerns.
     """
 
-    item: Item
+    item: Key
     effect: Effect | None
     amplitudes: Mapping[str, tuple[float, float, float]]
     pieces: Mapping[str, np.ndarray]
@@ -145,7 +146,7 @@ class Screen:
         spreads = [ByUnit.of_products(sizes, along).spread(FITTED) for sizes, along in by_unit]
         each = zip(probes, places, spreads, strict=True)
         scored = [_score(p, *columns.products(place), spread) for p, place, spread in each]
-        changes = [place for p, place in zip(probes, places, strict=True) if p.item.group is not None]
+        changes = [place for p, place in zip(probes, places, strict=True) if p.item.group]
         return ItemScores(scored, *columns.gram(changes))
 
     def _probes(self, base: Grouped, rows: Mapping[str, slice]) -> Iterator[_Probe]:
@@ -153,31 +154,31 @@ class Screen:
         for item in self._differing(base):
             yield _own(base, item, rows[str(item.group)])
         unknowns = by_group(base.unknowns, self._trials)
-        wanted = [e for e in self._effects if Item(e.name) not in base.items]
+        wanted = [e for e in self._effects if Key(e.name) not in base.items]
         for many in in_parallel(lambda e: list(self._of_cause(e, base, unknowns)), wanted):
             yield from many
 
-    def _differing(self, base: Grouped) -> Iterator[Item]:
+    def _differing(self, base: Grouped) -> Iterator[Key]:
         """Yield parameters and causes of all groups as items with a value of their own in one group.
 
         Of two groups it is the second that has it, as both choices give the same model.
         """
         groups = list(self._trials)
         free = groups[1:] if len(groups) == 2 else groups
-        for name in (*self._nominal.fitted_parameters(), *sorted(i.name for i in base.items if i.group is None)):
-            taken = [i.group for i in base.items if i.name == name and i.group is not None]
+        for name in (*self._nominal.fitted_parameters(), *sorted(i.name for i in base.items if not i.group)):
+            taken = [i.group for i in base.items if i.name == name and i.group]
             if len(taken) < len(groups) - 1:
-                yield from (Item(name, g) for g in free if g not in taken)
+                yield from (Key(name, group=g) for g in free if g not in taken)
 
     def _of_cause(self, kind: type[Effect], base: Grouped, unknowns: Mapping[str, Unknowns]) -> Iterator[_Probe]:
         """Yield a cause in all groups that lack it, and in each of them; in the form that other groups have, if any.
 
         If one group alone lacks it, that group has no item of its own: with it the cause acts in all.
         """
-        has = [g for g in self._trials if Item(kind.name, g) in base.items]
+        has = [g for g in self._trials if Key(kind.name, group=g) in base.items]
         lacks = [g for g in self._trials if g not in has]
-        wanted: list[tuple[Item, list[str]]] = [(Item(kind.name), lacks)]
-        wanted += [(Item(kind.name, g), [g]) for g in lacks if len(lacks) > 1]
+        wanted: list[tuple[Key, list[str]]] = [(Key(kind.name), lacks)]
+        wanted += [(Key(kind.name, group=g), [g]) for g in lacks if len(lacks) > 1]
         for one in [_at_null(base.grouped.models[has[0]], kind)] if has else self._library.grid(kind):
             pieces = {g: self._sensitivities(one, base, g, unknowns[g]) for g in lacks}
             info = one.parameters()
@@ -200,7 +201,7 @@ def _at_null(model: Model, kind: type[Effect]) -> Effect:
     return replace(effect, **nulls)
 
 
-def _own(base: Grouped, item: Item, rows: slice) -> _Probe:
+def _own(base: Grouped, item: Key, rows: slice) -> _Probe:
     """Return a parameter, or a cause's amplitudes, in one group alone."""
     model, group = base.grouped, str(item.group)
     effects = (e for e in model.models[group].effects if e.name == item.name)
@@ -235,5 +236,5 @@ def _score(one: _Probe, gram: np.ndarray, along: np.ndarray, norms: np.ndarray, 
     values = dict(zip(one.amplitudes, (nulls + step).tolist(), strict=True))
     if one.effect is not None:
         return ItemScore(one.item, started(one.effect, values), gain, degrees, kept, deviation, {}, spread)
-    start = {f"{n}@{one.item.group}": v or one.amplitudes[n][0] for n, v in values.items()}
+    start = {str(Key(n, group=one.item.group)): v or one.amplitudes[n][0] for n, v in values.items()}
     return ItemScore(one.item, None, gain, degrees, kept, deviation, start, spread)

@@ -15,8 +15,10 @@ from fes_pin.data.read_only import ReadOnly, as_dicts
 from fes_pin.data.show import DataFrame, by_columns, frame, table_html, table_text
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial, trial_csv
+from fes_pin.infer.keys import Key
 from fes_pin.infer.result import ON, STOPPED, Cause, Explained, Named, Remainder, shown
 from fes_pin.infer.text import listed, percent
+from fes_pin.infer.why import Why
 
 RESULT, TEXT, TABLE = "result", "text", "table"
 """Keys that every saved result has in addition to those of its kind: its kind, its text by lines, its table by
@@ -136,6 +138,8 @@ class Result(Saveable):
         The experiment that would distinguish the first cause from its equivalents.
     provenance
         Time, versions and files of its making.
+    why
+        How the answer was reached, and why no other cause is named; None where nothing was searched.
     """
 
     study: Study
@@ -147,6 +151,7 @@ class Result(Saveable):
     reason: str | None = None
     next_experiment: Plan | None = None
     provenance: Provenance | None = None
+    why: Why | None = None
     KIND: ClassVar[type[Named]] = Cause
     """Type of the causes."""
     FILE: ClassVar[str] = "diagnosis.json"
@@ -171,6 +176,11 @@ class Result(Saveable):
     def explained(self) -> Explained | None:
         """The gain of all causes together, with its reference and measure; None without errors."""
         return next((one for one in reversed(self.errors()) if one.what == self.judged_on), None)
+
+    @property
+    def untested(self) -> tuple[str, ...]:
+        """Causes that are not testable with these data."""
+        return ()
 
     def title(self) -> str:
         """Return the verdict in a few words."""
@@ -211,6 +221,16 @@ class Result(Saveable):
             return "check the sensors and conditions of what is missed most, or write a cause of your own"
         return "keep the model; to look for causes that these data cannot show, record other ones"
 
+    def explain(self, name: str) -> list[str]:
+        """Return why a cause is named or is not, a line for each place or group in which it was tried."""
+        said = [(one.name, f"named ({one.tested()})") for one in self.causes]
+        said += [(n, f"equivalent to {one.name}, which is named") for one in self.causes for n in one.equivalents]
+        said += list(self.why.reasons().items()) if self.why else []
+        said += [(n, "not testable with these data") for n in self.untested]
+        lines = [f"{n}: {words}" for n, words in said if name in (n, Key.of(n).name)]
+        known = listed(sorted({Key.of(n).name for n, _ in said}))
+        return lines or [f"{name}: not searched; candidates were {known}"]
+
     def judged(self) -> list[tuple[str, str]]:
         """Return the measure and the data by which each cause is judged, with its gain."""
         gains: dict[str, list[str]] = {}
@@ -237,6 +257,7 @@ class Result(Saveable):
             "remainder": self.remainder.record(),
             **({"explained": self.explained.record()} if self.explained else {}),
             **self.own_record(),
+            **({"why": self.why.record()} if self.why else {}),
             "warnings": list(self.warnings),
             "wall_s": round(self.wall_s, 2),
             **({"provenance": self.provenance.record()} if self.provenance else {}),
@@ -308,6 +329,11 @@ class ModelResult(Result):
     nominal_error: tuple[float | None, float | None]
     extended_error: tuple[float | None, float | None]
     ceiling_percent: float
+
+    @property
+    def untested(self) -> tuple[str, ...]:
+        """Causes that are not testable with these data."""
+        return self.absorbed
 
     @property
     def model(self) -> Any:

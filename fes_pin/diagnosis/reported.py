@@ -23,6 +23,7 @@ from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.result import CROSS_VALIDATED, FITTED, HELD_OUT, STOPPED, Cause, Remainder
 from fes_pin.infer.scatter import as_wide_as_estimates_differ, as_wide_as_trials_differ, with_honest_intervals
 from fes_pin.infer.verdict import share_in, word_of
+from fes_pin.infer.why import why_of
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
 from fes_pin.search.likelihood_fits import LikelihoodFits
@@ -74,6 +75,7 @@ def diagnosis_of(
         random=state.weighed.random,
         is_driven=search.models.judged_s is not None,
         reason=left.reason if not left.unexplained or is_moved_by_what_is_recorded(found.best) else UNMOVED,
+        why=why_of(state),
         ahead=AheadErrors(search.models.horizon_s, *fitted, *(held or (None, None))),
     )
 

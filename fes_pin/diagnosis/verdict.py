@@ -42,11 +42,6 @@ class RigWeighed(Weighed):
     random: tuple[RandomPart, ...] = ()
     no_noise: str | None = None
 
-    @property
-    def is_random(self) -> bool:
-        """See `errors_ahead.are_large`."""
-        return are_large(self.random)
-
 
 RigState = State[LikelihoodFit, LikelihoodModels, RigWeighed]
 
@@ -81,8 +76,9 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
             gains=gains if folds else {n: replace(one, on=FITTED) for n, one in gains.items()},
             evidence=evidence_of(folds, found, self._alike),
             lack_of_fit=lack_of_fit(found.best),
+            is_random=are_large(random := random_parts(found.best)),
             folds=folds,
-            random=random_parts(found.best),
+            random=random,
             no_noise=no_noise(found.best),
         )
 

@@ -9,6 +9,7 @@ import numpy as np
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
 from fes_pin.infer import problem as infer
+from fes_pin.infer.keys import Key
 from fes_pin.infer.noise import NoiseModel
 from fes_pin.infer.problem import Linearized, Unknowns
 from fes_pin.models.free_run import FreeRun
@@ -114,8 +115,8 @@ def products_of(names: Sequence[str], info: Mapping[str, ParameterInfo]) -> list
     """Return places of shapes and of the amplitudes that they multiply, within one group where there are groups."""
     out = []
     for at, name in enumerate(names):
-        path, mark, group = name.partition("@")
-        amplitude = f"{path.rpartition('.')[0]}.{info[name].times}{mark}{group}"
+        path, _, group = Key.of(name)
+        amplitude = str(Key(f"{path.rpartition('.')[0]}.{info[name].times}", group=group))
         if info[name].times and amplitude in names:
             out.append((at, names.index(amplitude)))
     return out

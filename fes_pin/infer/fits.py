@@ -60,6 +60,11 @@ class Sets(ABC, Generic[F]):
         self._converged: set[Names] = set()
         self._begun: set[tuple[Names, Hashable]] = set()
 
+    @property
+    def estimator(self) -> str:
+        """How sets are fitted, in words."""
+        return "likelihood"
+
     @abstractmethod
     def nominal(self) -> F:
         """Fit the nominal model and the family of tests; raise an error where the fit is not finite."""

@@ -355,6 +355,10 @@ class Named:
         """The gain by which it is named, with its measure; None where it is named by its p-value alone."""
         return self.evidence
 
+    def tested(self) -> str:
+        """Return its p-value and the gain by which it is named, in words."""
+        return probability(self.p_value) + (f", {self.judged.measure} {self.judged}" if self.judged else "")
+
     def estimates(self) -> list[tuple[tuple[str, ...], ParameterEstimate]]:
         """Return every estimate of it, with its cells of `CELL`."""
         raise NotImplementedError

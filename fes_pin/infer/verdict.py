@@ -10,14 +10,14 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from fes_pin.infer.fits import F
 from fes_pin.infer.held_out import is_supported
 from fes_pin.infer.levels import FORM_SHARE, NOTHING_PERCENT
-from fes_pin.infer.result import FITTED, Evidence, Gain, Remainder
+from fes_pin.infer.result import FITTED, Evidence, Gain, Remainder, p_shown
 from fes_pin.infer.search import M, Search, SearchResult
-from fes_pin.infer.text import WHOLE
+from fes_pin.infer.text import WHOLE, percent, probability
 
 CLAIMS = {
     "drop_errors_of_form": "process noise is large, and it gains no more than an error of form may",
@@ -25,12 +25,14 @@ CLAIMS = {
     "drop_not_carried": "it gains nothing on other parts of the data, where it must act too",
     "drop_that_predict_no_better": "the sets that folds choose predict no better than the nominal model",
     "drop_insignificant": "its gain is not significant",
-    "settle": "",
+    "settle": "the rivals of what remains were searched",
     "drop_rarely_chosen": "most folds of the data choose a set without it",
-    "drop_impossible": "its size is not twice its deviation, a parameter is at a bound, or a constant predicts as well",
-    "switch_estimator": "",
+    "drop_of_no_model": "a constant predicts as well as the model, or a nominal parameter is at a bound",
+    "drop_impossible": "the size of a candidate is not physically possible",
+    "drop_uncertain": "its size is not twice its deviation",
+    "switch_estimator": "another estimator predicts better",
 }
-"""The claims in their order, each with the reason, in words, for which it rejects a candidate."""
+"""The claims in their order, each with the reason, in words, for which it rejects a candidate or changes the answer."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +61,40 @@ class Rejected:
         """Why, in words."""
         return CLAIMS[self.claim]
 
+    def __str__(self) -> str:
+        return f"{self.reason} ({probability(self.p_value)}, gain {self.gain})"
+
+    def record(self) -> dict[str, Any]:
+        """As JSON files have it."""
+        gain = {} if self.gain.is_none else {"gain": self.gain.record()}
+        return {"claim": self.claim, "reason": self.reason, "p_value": p_shown(self.p_value), **gain}
+
+
+@dataclass(frozen=True)
+class Step:
+    """A claim that changed an answer.
+
+    Attributes
+    ----------
+    claim
+        One of `CLAIMS`.
+    name
+        The candidate that it rejected; empty if it rejected none.
+    words
+        What else it found, in words.
+    """
+
+    claim: str
+    name: str = ""
+    words: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.name}{': ' * bool(self.name)}{CLAIMS[self.claim]}{', ' * bool(self.words)}{self.words}"
+
+    def record(self) -> dict[str, str]:
+        """As JSON files have it."""
+        return {n: value for n, value in vars(self).items() if value}
+
 
 @dataclass(frozen=True)
 class Weighed:
@@ -77,6 +113,8 @@ class Weighed:
         Whether the noise of the likelihood includes errors of the model, so that it judges a wrong model too.
     carried
         Gains, percent, on other parts of the data than a candidate was fitted to, of those that must act there too.
+    is_random
+        Whether process noise is more than a small share of what drives the system.
     """
 
     gains: Mapping[str, Gain]
@@ -84,11 +122,7 @@ class Weighed:
     lack_of_fit: Remainder
     is_robust: bool = False
     carried: Mapping[str, float] = field(default_factory=dict)
-
-    @property
-    def is_random(self) -> bool:
-        """Whether process noise is more than a small share of what drives the system."""
-        return False
+    is_random: bool = False
 
 
 W = TypeVar("W", bound=Weighed)
@@ -121,7 +155,7 @@ class State(Generic[F, M, W]):
     weighed: W
     rejected: Mapping[str, Rejected]
     settled: frozenset[str]
-    steps: tuple[str, ...] = ()
+    steps: tuple[Step, ...] = ()
     replaced: State[F, M, W] | None = None
 
     @property
@@ -247,15 +281,20 @@ class Verdict(ABC, Generic[F, M, W]):
         """Reject the weakest of the candidates that most folds of the data do not choose."""
         return self._without_weakest(state, [n for n in state.names if self.is_rarely_chosen(state, n)])
 
-    def drop_impossible(self, state: State[F, M, W]) -> State[F, M, W] | None:
-        """Reject the weakest candidate of a model that is none, else of those whose size is not certain.
+    def drop_of_no_model(self, state: State[F, M, W]) -> State[F, M, W] | None:
+        """Reject the weakest candidate of a model that is none: see `Sets.is_a_model`."""
+        is_none = bool(state.weighed.gains) and not state.search.sets.is_a_model(state.found.best)
+        return self._without_weakest(state, list(state.weighed.gains) if is_none else [])
 
-        A model is none if it is worse than a constant, or if a nominal parameter or a candidate ended at a bound.
-        """
-        sets, best, claimed = state.search.sets, state.found.best, list(state.weighed.gains)
-        if claimed and sets.is_a_model(best) and sets.is_possible(best):
-            claimed = [n for n in claimed if not sets.is_certain(best, n)]
-        return self._without_weakest(state, claimed)
+    def drop_impossible(self, state: State[F, M, W]) -> State[F, M, W] | None:
+        """Reject the weakest candidate of a set with a size that is not physically possible."""
+        is_none = bool(state.weighed.gains) and not state.search.sets.is_possible(state.found.best)
+        return self._without_weakest(state, list(state.weighed.gains) if is_none else [])
+
+    def drop_uncertain(self, state: State[F, M, W]) -> State[F, M, W] | None:
+        """Reject the weakest of the candidates whose size is not certain."""
+        sets, best = state.search.sets, state.found.best
+        return self._without_weakest(state, [n for n in state.weighed.gains if not sets.is_certain(best, n)])
 
     def switch_estimator(self, state: State[F, M, W]) -> State[F, M, W] | None:
         """Take the verdict of another estimator of the same data if it predicts materially better; tried once.
@@ -263,9 +302,13 @@ class Verdict(ABC, Generic[F, M, W]):
         Data that the study itself holds out are not used: gains on them would be optimistic.
         """
         other, material = None if state.replaced else self.by_another_estimator(state), 1.0 - NOTHING_PERCENT / WHOLE
-        if other is None or not self.prediction_error(other) < material * self.prediction_error(state):
+        if other is None:
             return None
-        return replace(other, steps=(*state.steps, *other.steps))
+        before, after = self.prediction_error(state), self.prediction_error(other)
+        if not after < material * before:
+            return None
+        words = f"cross-validated E {percent(before)} -> {percent(after)}"
+        return replace(other, steps=(*state.steps, *other.steps, Step("switch_estimator", "", words)))
 
     def _without_weakest(self, state: State[F, M, W], some: Sequence[str]) -> State[F, M, W] | None:
         """Return the state without the weakest of some candidates; None if there are none."""
@@ -286,8 +329,10 @@ def _low(weighed: Weighed, name: str) -> float:
 
 def _noted(state: State[F, M, W], claim: str) -> State[F, M, W]:
     """Return a state with a claim that changed it; what the claim rejected says so."""
-    rejected = {n: one if one.claim else replace(one, claim=claim) for n, one in state.rejected.items()}
-    return replace(state, steps=(*state.steps, claim), rejected=rejected)
+    new = [n for n, one in state.rejected.items() if not one.claim]
+    rejected = {n: replace(one, claim=one.claim or claim) for n, one in state.rejected.items()}
+    steps = [Step(claim, n) for n in new or [""] if claim != "switch_estimator"]
+    return replace(state, steps=(*state.steps, *steps), rejected=rejected)
 
 
 def share_in(found: SearchResult[F], name: str) -> float:

@@ -42,6 +42,12 @@ size, further causes are also started at the smallest."""
 PROCESS, MEASUREMENT, WHITE = "process noise", "measurement noise", "white measurement noise"
 """Noise of the fits. Without process noise, predictions are free simulations; white measurement noise weighs every
 error alike, as least squares do."""
+ESTIMATORS = {
+    PROCESS: f"likelihood with {PROCESS}",
+    MEASUREMENT: f"likelihood with {MEASUREMENT} alone",
+    WHITE: "least squares of free simulations",
+}
+"""The same as estimators, in words."""
 RESTART_ROUNDS = 3
 """Alternations between parameters and noise in a fit that starts with little process noise."""
 RESTART_SETS = 3
@@ -112,6 +118,11 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         self._misfits: dict[int, tuple[LikelihoodFit, float]] = {}
         self._rough: Self | None = None
         self._compared: dict[tuple[Names, str], LikelihoodFit] = {}
+
+    @property
+    def estimator(self) -> str:
+        """How sets are fitted, in words."""
+        return f"likelihood with white {PROCESS}" if self.fits[()].noise.timed else ESTIMATORS[self.noise]
 
     @property
     def judged_s(self) -> float | None:

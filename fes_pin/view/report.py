@@ -13,7 +13,7 @@ from fes_pin.infer.result import ON, Cause, Change, Named
 from fes_pin.infer.text import percent, probability
 from fes_pin.models.describe import equation, remark, sentence
 from fes_pin.view.mathml import equations_mathml
-from fes_pin.view.page import Content, Markup, document, element, figure, html_table, section, unit_text
+from fes_pin.view.page import Content, Markup, document, element, figure, folded, html_table, section, unit_text
 from fes_pin.view.plots import intervals_drawing, rivals_drawing
 from fes_pin.view.sections import UNIT_IN_NAME, Parts, header, provenance_parts, stage_mark, value_and_interval
 
@@ -57,6 +57,7 @@ def report_html(result: Result) -> str:
         section("Errors", *_errors(result)),
         section(names, *_named(result)),
         *own.sections(result),
+        section("Why these, and no others", *_why(result)),
         section("Where this comes from", *provenance_parts(result.provenance)),
     ]
     return document(f"{result.study.name} - {result.FILE.removesuffix('.json')}", parts, own.residual)
@@ -141,6 +142,17 @@ def _card(result: Result, one: Named) -> Markup:
     table = html_table((*one.CELL, "value", "unit", "95 % interval"), rows, (len(one.CELL), len(one.CELL) + 2))
     drawn = [table, _by_group(one) if isinstance(one, Change) else _rivals(result, one)]
     return element("article", element("div", element("h3", _heading(one)), *about, *drawn), class_=f"cause {stage}")
+
+
+def _why(result: Result) -> list[Markup]:
+    """How the answer was reached, and why each other candidate is not named."""
+    if (why := result.why) is None:
+        return []
+    rows: list[list[Content]] = [[element("code", name), words] for name, words in why.reasons().items()]
+    said = f"Estimator: {why.estimator}. A cause is named at a family-wise level of {why.level:g}. "
+    said += f"What changed the answer of the search: {'; '.join(map(str, why.steps)) or 'nothing'}."
+    table = html_table(("candidate", "why it is not named"), rows, prose=True)
+    return [element("p", said), *([folded(f"{len(rows)} other candidates", table)] if rows else [])]
 
 
 def _by_group(change: Change) -> Markup:

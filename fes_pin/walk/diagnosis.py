@@ -18,6 +18,7 @@ from fes_pin.data.trial import Trial
 from fes_pin.infer.levels import STRONG_EVIDENCE
 from fes_pin.infer.search import SearchResult
 from fes_pin.infer.verdict import word_of
+from fes_pin.infer.why import why_of
 from fes_pin.walk.designs import Designs
 from fes_pin.walk.judge import not_testable
 from fes_pin.walk.models import POLICY, WalkFit, WalkModels, WalkSearch
@@ -178,4 +179,5 @@ def _judged(study: Study, search: WalkSearch, found: SearchResult[WalkFit]) -> W
         models=models,
         best=found.best,
         warnings=tuple(models.designs.stated.contradictions(study)),
+        why=why_of(state),
     )

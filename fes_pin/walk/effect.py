@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from fes_pin.body.joints import SIDES
+from fes_pin.infer.keys import Key
 from fes_pin.walk.walk_trial import WalkTrial
 
 STAGE = "body"
@@ -69,7 +70,7 @@ class Form:
     @property
     def label(self) -> str:
         """Cause and site: its name among all forms."""
-        return f"{self.cause} ({self.site})"
+        return str(Key(self.cause, self.site))
 
     @property
     def place(self) -> tuple[str, str]:

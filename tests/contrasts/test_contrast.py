@@ -73,16 +73,16 @@ def test_one_change_is_named_alone_with_its_size(tmp_path):
     one = change.parameters["offset"]["after"]
     assert one.value == pytest.approx(0.8, abs=max(4.0 * one.std, 0.05))
     assert change.p_value < 1e-3
-    (item,), alone = found.fit.changes, found.fit.std("sensor_offset.offset@after")
+    (item,), alone = found.fit.changes, found.fit.std("sensor_offset.offset:after")
     assert found.fit.certainty(item) == pytest.approx(one.value / alone)
     assert "sensor_offset" not in found.excluded
 
 
 def test_the_certainty_of_a_change_is_that_of_the_difference_between_groups(tmp_path):
     best = fp.contrast(stronger_with_zeros(0.0, tmp_path)).fit
-    (item,), at = best.changes, [best.place("gain"), best.place("gain@after")]
+    (item,), at = best.changes, [best.place("gain"), best.place("gain:after")]
     variance = np.array([1.0, -1.0]) @ best.covariance[np.ix_(at, at)] @ np.array([1.0, -1.0])
-    assert best.certainty(item) == pytest.approx((best.values["gain@after"] - best.values["gain"]) / np.sqrt(variance))
+    assert best.certainty(item) == pytest.approx((best.values["gain:after"] - best.values["gain"]) / np.sqrt(variance))
     assert replace(best, covariance=np.full_like(best.covariance, np.inf)).certainty(item) == 0.0
 
 

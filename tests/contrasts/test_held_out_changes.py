@@ -44,7 +44,7 @@ def test_a_change_that_held_out_trials_do_not_confirm_is_not_claimed(study, monk
     monkeypatch.setattr(ContrastVerdict, "_cost_of_held", lambda self, one, folds: float(len(one.items)))
     found = fp.contrast(study)
     assert not found.changes
-    assert any("gain@after is significant" in words and "do not confirm" in words for words in found.warnings)
+    assert any("gain:after is significant" in words and "do not confirm" in words for words in found.warnings)
 
 
 def test_where_nothing_can_be_held_out_the_change_stands(study):

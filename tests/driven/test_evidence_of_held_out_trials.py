@@ -11,7 +11,7 @@ from scipy.signal import lfilter
 
 from fes_pin.data.study import read_study
 from fes_pin.diagnosis.diagnosis import diagnose_joint
-from fes_pin.diagnosis.errors_ahead import Ahead, RandomPart
+from fes_pin.diagnosis.errors_ahead import Ahead, RandomPart, are_large
 from fes_pin.diagnosis.rejected import with_rejected_causes
 from fes_pin.diagnosis.verdict import RigVerdict, RigWeighed
 from fes_pin.infer.result import Evidence, Gain, Remainder
@@ -43,9 +43,8 @@ def unsupported(evidence, low, random, held_out=Judged.held_out):
         without=dict.fromkeys(gains, fit), p_values=dict.fromkeys(gains, 0.0), nominal=fit, best=fit
     )
     search = SimpleNamespace(result=lambda names: SimpleNamespace(without={}))
-    state = State(
-        search, found, RigWeighed(gains, evidence, NOTHING, folds=(None,), random=random), {}, frozenset(gains)
-    )
+    weighed = RigWeighed(gains, evidence, NOTHING, is_random=are_large(random), folds=(None,), random=random)
+    state = State(search, found, weighed, {}, frozenset(gains))
     claims = verdict.drop_errors_of_form, verdict.drop_unsupported, verdict.drop_that_predict_no_better
     return [claim.__name__ for claim in claims if claim(state) is not None]
 

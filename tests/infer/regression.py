@@ -14,6 +14,7 @@ from fes_pin.infer.distributions import chi2_tail, f_tail
 from fes_pin.infer.family import Family
 from fes_pin.infer.fits import Candidate, FittedSets, Names
 from fes_pin.infer.held_out import Errors, added_likelihood, deal, held_out_gain
+from fes_pin.infer.keys import Key
 from fes_pin.infer.levels import SEPARABLE
 from fes_pin.infer.optimum import Optimum
 from fes_pin.infer.problem import Linearized, normal_equations, whitened_sse
@@ -36,7 +37,7 @@ class Regression(FittedSets[Optimum, None]):
     runs
         What was measured, shape (runs, COUNT), noise of unit variance.
     groups
-        Of each run, 0 or 1: a column by the name `name@1` acts in the runs of group 1 alone.
+        Of each run, 0 or 1: a column by the name `name:1` acts in the runs of group 1 alone.
     """
 
     def __init__(self, columns: dict[str, np.ndarray], runs: np.ndarray, groups: np.ndarray | None = None) -> None:
@@ -46,7 +47,7 @@ class Regression(FittedSets[Optimum, None]):
         self.columns = {n: np.tile(c, count) for n, c in columns.items()}
         if groups is not None:
             in_group = np.repeat(groups == 1, COUNT)
-            self.columns |= {f"{n}@1": np.tile(c, count) * in_group for n, c in columns.items()}
+            self.columns |= {str(Key(n, group="1")): np.tile(c, count) * in_group for n, c in columns.items()}
 
     def part(self, names: Names, runs: slice | np.ndarray = slice(None)) -> Linearized:
         """Some runs as one trial, with their mean as its own unknown."""

@@ -69,7 +69,7 @@ def test_a_group_that_changed_is_told_from_one_that_did_not(changed):
     runs[groups == 1] += 0.7 * changed * x["x05"]
     models = Regression(x, runs, groups)
     found = searched(models)
-    assert found.best.free == (("x02", "x05@1") if changed else ("x02",))
+    assert found.best.free == (("x02", "x05:1") if changed else ("x02",))
 
 
 def test_what_no_candidate_explains_is_a_lack_of_fit():

@@ -1,0 +1,114 @@
+"""Why each candidate is named or not: the claims that changed an answer, and the last test of every candidate."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from fes_pin.infer.fits import Fitted, Names, Sets, more_degrees
+from fes_pin.infer.result import p_shown, shown
+from fes_pin.infer.text import listed, probability
+from fes_pin.infer.verdict import Rejected, State, Step
+
+PRINTED = 3
+"""Significant digits of a gain of a candidate that is not named."""
+
+
+@dataclass(frozen=True)
+class Tried:
+    """The nearest fitted set with a candidate that is neither named nor rejected.
+
+    Attributes
+    ----------
+    names
+        That set: the answer with the candidate if it was fitted, else the set of lowest criterion.
+    gain
+        Its gain over the answer in twice the log-likelihood.
+    p_value
+        Family-wise p-value of the gain; NaN of a set that does not extend the answer.
+    is_possible
+        Whether its sizes are physically possible.
+    """
+
+    names: Names
+    gain: float
+    p_value: float
+    is_possible: bool
+
+    def words(self, level: float) -> str:
+        """Return why the candidate is not named, in words."""
+        size, names = f"{shown(abs(self.gain), PRINTED):g}", listed(list(self.names))
+        if not self.is_possible:
+            return f"in the nearest set a size is not physically possible ({names})"
+        if math.isnan(self.p_value):
+            return f"twice the log-likelihood of the nearest set ({names}) is {size} less than that of the answer"
+        test = f"added to the answer it raises twice the log-likelihood by {size} ({probability(self.p_value)}"
+        if self.p_value < level:
+            return f"{test}), and does not lower the errors of prediction, or no more than an error of form may"
+        return f"{test}, level {level:g}): not significant"
+
+    def record(self) -> dict[str, Any]:
+        """As JSON files have it."""
+        test = {} if math.isnan(self.p_value) else {"p_value": p_shown(self.p_value)}
+        return {"with": list(self.names), "added": shown(self.gain, PRINTED), **test}
+
+
+@dataclass(frozen=True)
+class Why:
+    """How an answer was reached.
+
+    Attributes
+    ----------
+    estimator
+        The estimator of the answer.
+    level
+        Family-wise level of a claim.
+    steps
+        The claims that changed the answer, in their order.
+    rejected
+        Candidates that a claim rejected.
+    tried
+        All other candidates that were fitted and are not named.
+    """
+
+    estimator: str
+    level: float
+    steps: tuple[Step, ...] = ()
+    rejected: Mapping[str, Rejected] = field(default_factory=dict)
+    tried: Mapping[str, Tried] = field(default_factory=dict)
+
+    def reasons(self) -> dict[str, str]:
+        """Return why each candidate is not named, in words, those that a claim rejected first."""
+        rejected = {n: str(one) for n, one in self.rejected.items()}
+        return rejected | {n: one.words(self.level) for n, one in self.tried.items()}
+
+    def record(self) -> dict[str, Any]:
+        """As JSON files have it."""
+        return {
+            "estimator": self.estimator,
+            "level": self.level,
+            "steps": [one.record() for one in self.steps],
+            "rejected": {n: one.record() for n, one in self.rejected.items()},
+            "tried": {n: one.record() for n, one in self.tried.items()},
+        }
+
+
+def why_of(state: State[Any, Any, Any]) -> Why:
+    """Return how the state of a verdict was reached, and why its other candidates are not named."""
+    sets, best, named = state.search.sets, state.found.best, state.names
+    nearest: dict[str, Names] = {}
+    for names in sorted(sets.fits, key=lambda k: (not named < set(k), sets.fits[k].criterion)):
+        for one in set(names) - named - set(state.rejected):
+            nearest.setdefault(one, names)
+    tried = {n: _tried(sets, best, names, named < set(names)) for n, names in sorted(nearest.items())}
+    return Why(sets.estimator, sets.level(best), state.steps, state.rejected, tried)
+
+
+def _tried(sets: Sets[Any], best: Fitted, names: Names, extends: bool) -> Tried:
+    """Return the comparison of a set with the answer, and its test if it extends the answer."""
+    fitted = sets.fits[names]
+    gain = best.sse - fitted.sse
+    p_value = sets.noise_p_value(gain, more_degrees(fitted, best)) if extends else math.nan
+    if p_value < sets.level(best):
+        p_value = sets.p_value(fitted, best)
+    return Tried(names, gain, p_value, sets.is_possible(fitted))
