@@ -1,13 +1,19 @@
-"""Estimators of one study: without process noise, with coloured or white process noise, by least squares."""
+"""Estimators of a rig: without process noise, with coloured or white process noise, by least squares."""
+
+from abc import abstractmethod
+from collections.abc import Sequence
 
 from fes_pin.data.schema import IMPOSED
+from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.decide.by_prediction import FEWEST, best_predicting
 from fes_pin.diagnosis.decide.rivals import not_excluded
 from fes_pin.diagnosis.errors_ahead import squared_errors
 from fes_pin.diagnosis.likelihood_models import Found, LikelihoodModels, LikelihoodSearch
+from fes_pin.diagnosis.verdict import RigState, RigVerdict
 from fes_pin.identify.afar import is_rounding
 from fes_pin.identify.likelihood_fit import LikelihoodFit, with_white_process_noise
 from fes_pin.identify.process_noise import step_s
+from fes_pin.infer.estimators import Estimator
 from fes_pin.infer.held_out import held_out_gain
 from fes_pin.infer.levels import NOTHING_PERCENT
 from fes_pin.infer.search import Policy
@@ -44,60 +50,86 @@ def _ended(search: LikelihoodSearch, found: Found | None) -> tuple[LikelihoodSea
     return None if found is None or search.was_stopped else (search, found)
 
 
-def least_error(search: LikelihoodSearch) -> tuple[LikelihoodSearch, Found] | None:
-    """Search the same causes by least squares of free simulations; return None if time is up.
+class RigEstimator(Estimator):
+    """Another estimator of a rig, whose errors are those by which its causes are judged.
+
+    Parameters
+    ----------
+    test
+        Trials that the study itself holds out.
+    """
+
+    def __init__(self, test: Sequence[Trial]) -> None:
+        self.test = test
+
+    @abstractmethod
+    def searched(self, first: RigState) -> tuple[LikelihoodSearch, Found] | None:
+        """Return its search and the result of that; None where it does not apply or time is up."""
+
+    def state(self, first: RigState) -> RigState | None:
+        """Return the state of its own verdict."""
+        if first.search.was_stopped or (found := self.searched(first)) is None:
+            return None
+        return RigVerdict(found[0], self.test).of(found[1], replaced=first)
+
+
+class LeastSquares(RigEstimator):
+    """Least squares of free simulations, for a rig in open loop whose model has a lack of fit.
 
     Where a model is wrong, a likelihood with process noise or autoregressive measurement noise takes its error for
     noise. Least squares give the model that predicts best from the inputs alone (Ljung, System Identification,
     2nd ed., section 8.3). Causes are chosen by their predictions of trials left out. Where there are too few trials,
     they are those that bring a model near the data; where process noise acts, negligible errors are random.
     """
-    if search.models.answered or search.was_stopped:
-        return None
-    other = LikelihoodSearch(search.models.least_squares, search.progress)
 
-    def chosen() -> Found:
-        if len(search.models.trials) < FEWEST:
-            is_calm = search.models.noise == MEASUREMENT
-            return other.settle(other.models.approach(0.0 if is_calm else NOTHING_PERCENT))
-        return other.result(best_predicting(other, other.run().best.names))
+    def searched(self, first: RigState) -> tuple[LikelihoodSearch, Found] | None:
+        """Return a search of the same causes, and its result."""
+        models, search = first.search.models, first.search
+        if models.answered or not first.verdict.lack_of_fit(first).unexplained:
+            return None
+        other = LikelihoodSearch(models.least_squares, search.progress)
 
-    return _ended(other, attempted(chosen, None, search.seconds_left))
+        def chosen() -> Found:
+            if len(models.trials) < FEWEST:
+                return other.settle(other.models.approach(0.0 if models.noise == MEASUREMENT else NOTHING_PERCENT))
+            return other.result(best_predicting(other, other.run().best.names))
 
-
-def found_with_white_process_noise(search: LikelihoodSearch, found: Found) -> LikelihoodFit | None:
-    """Return the best set fitted with white process noise; None where no coloured process noise acts."""
-    if search.was_stopped or not search.models.answered or not _has_coloured_noise(found.best):
-        return None
-    return attempted(lambda: with_white_process_noise(found.best), None, search.seconds_left)
+        return _ended(other, attempted(chosen, None, search.seconds_left))
 
 
-def judged_again(search: LikelihoodSearch, found: Found, white: LikelihoodFit) -> tuple[LikelihoodSearch, Found] | None:
-    """Return a search of the same causes with white process noise, and its result; None where that predicts no better.
+class WhiteProcessNoise(RigEstimator):
+    """White process noise, for a rig in closed loop on which coloured process noise acts.
 
     White noise is better where it lowers the error over the horizon by a thousandth of the nominal model's. Coloured
     process noise is itself predicted over its time constant, so that a cause which takes its place gains nothing there.
     No further cause is searched: the residual is coloured, and a likelihood of white noise would be too sure of
     differences between causes.
-
-    Parameters
-    ----------
-    white
-        The fit of `found_with_white_process_noise`.
     """
 
-    def begun() -> LikelihoodModels | None:
-        many = [[(f, found.best, f.trials)] for f in (found.nominal, found.best, white)]
-        nominal, coloured, new = (squared_errors(one, search.models.horizon_s) for one in many)
-        if not held_out_gain(nominal, coloured, new, search.models.seed).percent > NOTHING_PERCENT:
-            return None
-        return search.models.begun_with([white, *_parts_and_rivals(found)])
+    fit: LikelihoodFit | None = None
+    """The set of the first estimator, fitted with white process noise; None where no coloured process noise acts."""
 
-    sets = attempted(begun, None, search.seconds_left)
-    if sets is None:
-        return None
-    again = LikelihoodSearch(sets, search.progress, Policy(given=white.names))
-    return _ended(again, attempted(again.run, None, search.seconds_left))
+    def searched(self, first: RigState) -> tuple[LikelihoodSearch, Found] | None:
+        """Return a search of the same causes, and its result; None where the first set predicts no better."""
+        found, search, models = first.found, first.search, first.search.models
+        if not models.answered or not _has_coloured_noise(found.best):
+            return None
+        self.fit = white = attempted(lambda: with_white_process_noise(found.best), None, search.seconds_left)
+        if white is None:
+            return None
+
+        def begun() -> LikelihoodModels | None:
+            many = [[(f, found.best, f.trials)] for f in (found.nominal, found.best, white)]
+            nominal, coloured, new = (squared_errors(one, models.horizon_s) for one in many)
+            if not held_out_gain(nominal, coloured, new, models.seed).percent > NOTHING_PERCENT:
+                return None
+            return models.begun_with([white, *_parts_and_rivals(found)])
+
+        sets = attempted(begun, None, search.seconds_left)
+        if sets is None:
+            return None
+        again = LikelihoodSearch(sets, search.progress, Policy(given=white.names))
+        return _ended(again, attempted(again.run, None, search.seconds_left))
 
 
 def _parts_and_rivals(found: Found) -> list[LikelihoodFit]:

@@ -11,7 +11,7 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.decide.chosen_again import share_of
 from fes_pin.diagnosis.decide.rivals import alike_in, estimates, experiment, not_identifiable, ranking
 from fes_pin.diagnosis.errors_ahead import AheadErrors, free_errors, noise_that_is_small
-from fes_pin.diagnosis.estimators import WHITE_PROCESS_NOISE
+from fes_pin.diagnosis.estimators import WHITE_PROCESS_NOISE, LeastSquares, WhiteProcessNoise
 from fes_pin.diagnosis.likelihood_models import Found, LikelihoodSearch
 from fes_pin.diagnosis.rejected import UNMOVED, is_moved_by_what_is_recorded
 from fes_pin.diagnosis.result import Diagnosis
@@ -20,6 +20,7 @@ from fes_pin.identify.correlation_time import words_of_reading
 from fes_pin.identify.fit import rough_noise
 from fes_pin.identify.likelihood import is_simulated
 from fes_pin.identify.likelihood_fit import LikelihoodFit
+from fes_pin.infer.estimators import choose
 from fes_pin.infer.result import CROSS_VALIDATED, FITTED, HELD_OUT, STOPPED, Cause, Remainder
 from fes_pin.infer.scatter import as_wide_as_estimates_differ, as_wide_as_trials_differ, with_honest_intervals
 from fes_pin.infer.verdict import share_in, word_of
@@ -43,12 +44,14 @@ def diagnosis_of(
     study: Study, search: LikelihoodSearch, found: Found, trials: tuple[list[Trial], list[Trial]]
 ) -> Diagnosis:
     """Return the diagnosis of a rig from a search by the likelihood that has run."""
-    verdict = RigVerdict(search, trials[1])
-    state = verdict.of(found)
-    found, left = state.found, verdict.lack_of_fit(state)
-    again = [f.best for f in state.weighed.folds if f.within]
-    best, other = as_wide_as_trials_differ(with_honest_intervals(found.best), again), verdict.by_the_other(state)
-    if other is not None:
+    first, white = RigVerdict(search, trials[1]).of(found), WhiteProcessNoise(trials[1])
+    state: RigState = choose(first, (white, LeastSquares(trials[1])), search.models.seed)
+    verdict, found = state.verdict, state.found
+    assert isinstance(verdict, RigVerdict)
+    left, again = verdict.lack_of_fit(state), [f.best for f in state.weighed.folds if f.within]
+    best, other = as_wide_as_trials_differ(with_honest_intervals(found.best), again), white.fit
+    other = other if state is first else first.found.best
+    if other is not None and other.names == best.names:
         best = as_wide_as_estimates_differ(best, other)
     fitted, *others = verdict.errors(state)
     held = others[0] if others else None

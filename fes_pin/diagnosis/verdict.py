@@ -8,17 +8,27 @@ simulations.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.decide.chosen_again import ChosenAgain, is_chosen, share_of
 from fes_pin.diagnosis.decide.rivals import alike_in
-from fes_pin.diagnosis.errors_ahead import Ahead, Pairs, RandomPart, are_large, errors_ahead, random_parts
-from fes_pin.diagnosis.estimators import found_with_white_process_noise, judged_again, least_error
+from fes_pin.diagnosis.errors_ahead import (
+    Ahead,
+    Pairs,
+    RandomPart,
+    are_large,
+    errors_ahead,
+    random_parts,
+    squared_errors,
+)
 from fes_pin.diagnosis.held_out import Again, Fold, as_random_as_in_all, evidence_of, gains_of, make_folds, refit
 from fes_pin.diagnosis.likelihood_models import Found, LikelihoodModels, LikelihoodSearch
 from fes_pin.diagnosis.rejected import is_moved_by_what_is_recorded, no_noise, with_rejected_causes
+from fes_pin.identify.error_measures import FREE
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.per_trial import falls
+from fes_pin.infer.held_out import Errors
 from fes_pin.infer.result import FITTED, Remainder
 from fes_pin.infer.verdict import State, Verdict, Weighed
 from fes_pin.remainder.lack_of_fit import lack_of_fit
@@ -65,7 +75,6 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
         self.models, self.test = search.models, tuple(test)
         self.refitted, self._alike = Again(refit), Again(as_random_as_in_all)
         self._chosen: dict[int, tuple[Found, list[LikelihoodFit]]] = {}
-        self._with_white_noise: LikelihoodFit | None = None
 
     def weigh(self, found: Found) -> RigWeighed:
         """Return the evidence of held-out trials and of the tests of lack of fit on a set."""
@@ -82,12 +91,10 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
             no_noise=no_noise(found.best),
         )
 
-    def of(self, found: Found, search: LikelihoodSearch | None = None, replaced: RigState | None = None) -> RigState:
+    def of(self, found: Found, replaced: State[Any, Any, Any] | None = None) -> RigState:
         """Return the state to which no claim objects; one without causes where the input does not move the rig."""
-        search = search or self.search
-        if not is_moved_by_what_is_recorded(found.best):
-            found = search.result(())
-        return super().of(found, search, replaced)
+        moved = is_moved_by_what_is_recorded(found.best)
+        return super().of(found if moved else self.search.result(()), replaced)
 
     def errors_chosen(self, state: RigState) -> tuple[float, float] | None:
         """See `Verdict.errors_chosen`; None without trials that are held out."""
@@ -106,30 +113,26 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
         left = with_rejected_causes(weighed.lack_of_fit, weighed.random, state.rejected, stages)
         if not left.unexplained and weighed.no_noise is not None:
             return replace(left, unexplained=True, where="time", reason=weighed.no_noise)
-        return left if left.unexplained or state.replaced is None else self.lack_of_fit(state.replaced)
+        before = state.replaced
+        return left if left.unexplained or before is None else before.verdict.lack_of_fit(before)
 
     def is_rarely_chosen(self, state: RigState, name: str) -> bool:
         """Return whether most folds choose neither a cause nor one of its equivalents."""
         return not is_chosen(share_of(self.chosen(state), alike_in(state.found, name)))
 
-    def by_another_estimator(self, state: RigState) -> RigState | None:
-        """Return the verdict with white process noise, or by least squares where there is a lack of fit; else None."""
-        self._with_white_noise = white = found_with_white_process_noise(state.search, state.found)
-        other = None if white is None else judged_again(state.search, state.found, white)
-        if other is None and self.lack_of_fit(state).unexplained:
-            other = least_error(state.search)
-        if other is None:
-            return None
-        search, found = other
-        return self.of(found, search, replaced=state)
+    @property
+    def currencies(self) -> tuple[str]:
+        """Predictions over the horizon of a rig in closed loop or of imposed motion, else free simulations."""
+        return (FREE if (ahead_s := self.models.judged_s) is None else f"predictions {ahead_s:g} s ahead",)
 
-    def prediction_error(self, state: RigState) -> float:
-        """Return E of a set on the fitted trials by cross-validation, percent; of a single trial, of the fit itself."""
+    def errors_in(self, state: RigState, currency: str, unit: State[Any, Any, Any]) -> Errors:
+        """Return cross-validated errors of a set on the fitted trials; of a single trial, those of the fit itself."""
         best, train, folds = state.found.best, self.models.trials, self.folds(state)
         if not (folds and folds[0].within):
             folds = make_folds(replace(state.found, nominal=best, without={}), train, (), self.refitted)
-        pairs = [(f.chosen or f.best, f.best, f.test) for f in folds]
-        return self._judged(self._ahead(state, pairs or [(best, best, train)]))
+        floor = unit.found.best
+        pairs = [(f.chosen or f.best, floor, f.test) for f in folds]
+        return squared_errors(pairs or [(best, floor, train)], self.models.judged_s)
 
     def chosen(self, state: RigState) -> list[LikelihoodFit]:
         """Return for each fold the fit to all trials of the set that is chosen without its own; none without folds."""
@@ -158,11 +161,6 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
             nominal = self._ahead(state, [(f.nominal, f.best, f.test) for f in folds])
             out.append((nominal, self._ahead(state, [(f.chosen or f.best, f.best, f.test) for f in folds])))
         return out
-
-    def by_the_other(self, state: RigState) -> LikelihoodFit | None:
-        """Return the same set fitted by the other estimator; None without another, or where that found another set."""
-        other = self._with_white_noise if state.replaced is None else state.replaced.found.best
-        return other if other is not None and other.names == state.found.best.names else None
 
     def _ahead(self, state: RigState, pairs: Pairs) -> Ahead:
         is_falling = self.models.answered and falls(state.found.best.model, self.models.trials)

@@ -13,11 +13,11 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Generic, TypeVar
 
 from fes_pin.infer.fits import F
-from fes_pin.infer.held_out import is_supported
-from fes_pin.infer.levels import FORM_SHARE, NOTHING_PERCENT
+from fes_pin.infer.held_out import Errors, is_supported
+from fes_pin.infer.levels import FORM_SHARE
 from fes_pin.infer.result import FITTED, Evidence, Gain, Remainder, p_shown
 from fes_pin.infer.search import M, Search, SearchResult
-from fes_pin.infer.text import WHOLE, percent, probability
+from fes_pin.infer.text import WHOLE, probability
 
 CLAIMS = {
     "drop_errors_of_form": "process noise is large, and it gains no more than an error of form may",
@@ -30,7 +30,6 @@ CLAIMS = {
     "drop_of_no_model": "a constant predicts as well as the model, or a nominal parameter is at a bound",
     "drop_impossible": "the size of a candidate is not physically possible",
     "drop_uncertain": "its size is not twice its deviation",
-    "switch_estimator": "another estimator predicts better",
 }
 """The claims in their order, each with the reason, in words, for which it rejects a candidate or changes the answer."""
 
@@ -72,16 +71,16 @@ class Rejected:
 
 @dataclass(frozen=True)
 class Step:
-    """A claim that changed an answer.
+    """A step to an answer.
 
     Attributes
     ----------
     claim
-        One of `CLAIMS`.
+        The claim that changed the answer, one of `CLAIMS`; or another step.
     name
         The candidate that it rejected; empty if it rejected none.
     words
-        What else it found, in words.
+        What it found, in words.
     """
 
     claim: str
@@ -89,7 +88,7 @@ class Step:
     words: str = ""
 
     def __str__(self) -> str:
-        return f"{self.name}{': ' * bool(self.name)}{CLAIMS[self.claim]}{', ' * bool(self.words)}{self.words}"
+        return f"{self.name}: {CLAIMS[self.claim]}" if self.name else self.words or CLAIMS[self.claim]
 
     def record(self) -> dict[str, str]:
         """As JSON files have it."""
@@ -134,8 +133,8 @@ class State(Generic[F, M, W]):
 
     Attributes
     ----------
-    search
-        The search, by one estimator, to which the set belongs.
+    verdict
+        The verdict to which it belongs: the search by one estimator, with its claims.
     found
         A set of candidates, its rivals, and the set without each candidate.
     weighed
@@ -150,13 +149,18 @@ class State(Generic[F, M, W]):
         The state of another estimator of the same data that this one replaces; None if no estimator was replaced.
     """
 
-    search: Search[F, M]
+    verdict: Verdict[F, M, W]
     found: SearchResult[F]
     weighed: W
     rejected: Mapping[str, Rejected]
     settled: frozenset[str]
     steps: tuple[Step, ...] = ()
-    replaced: State[F, M, W] | None = None
+    replaced: State[Any, Any, Any] | None = None
+
+    @property
+    def search(self) -> Search[F, M]:
+        """The search of its verdict."""
+        return self.verdict.search
 
     @property
     def names(self) -> frozenset[str]:
@@ -204,30 +208,35 @@ class Verdict(ABC, Generic[F, M, W]):
         """Return whether most folds of the data choose a set without a candidate."""
         return False
 
-    def by_another_estimator(self, state: State[F, M, W]) -> State[F, M, W] | None:
-        """Return the verdict of another estimator of the same data; None where there is none."""
-        return None
+    @property
+    def currencies(self) -> Sequence[str]:
+        """What its models predict, in words, in the order in which estimators are compared by errors of it."""
+        return ()
 
-    def prediction_error(self, state: State[F, M, W]) -> float:
-        """Return the cross-validated error of the fitted data, by which estimators are compared; 0 of one."""
-        return 0.0
+    def errors_in(self, state: State[F, M, W], currency: str, unit: State[Any, Any, Any]) -> Errors:
+        """Return cross-validated errors of a set on the fitted data, by units of evidence.
 
-    def of(
-        self, found: SearchResult[F], search: Search[F, M] | None = None, replaced: State[F, M, W] | None = None
-    ) -> State[F, M, W]:
+        Parameters
+        ----------
+        currency
+            One of `currencies`.
+        unit
+            State whose noise is the unit of the errors.
+        """
+        raise NotImplementedError
+
+    def of(self, found: SearchResult[F], replaced: State[Any, Any, Any] | None = None) -> State[F, M, W]:
         """Return the state to which no claim objects.
 
         Parameters
         ----------
         found
-            The result of a search.
-        search
-            That search; by default the verdict's own.
+            The result of its search.
         replaced
             The state by another estimator that this one may replace.
         """
         weighed, settled = self.weigh(found), frozenset(found.without)
-        state = State(search or self.search, found, weighed, {}, settled, replaced=replaced)
+        state = State(self, found, weighed, {}, settled, replaced=replaced)
         while True:
             for claim in CLAIMS:
                 if (changed := getattr(self, claim)(state)) is not None:
@@ -296,20 +305,6 @@ class Verdict(ABC, Generic[F, M, W]):
         sets, best = state.search.sets, state.found.best
         return self._without_weakest(state, [n for n in state.weighed.gains if not sets.is_certain(best, n)])
 
-    def switch_estimator(self, state: State[F, M, W]) -> State[F, M, W] | None:
-        """Take the verdict of another estimator of the same data if it predicts materially better; tried once.
-
-        Data that the study itself holds out are not used: gains on them would be optimistic.
-        """
-        other, material = None if state.replaced else self.by_another_estimator(state), 1.0 - NOTHING_PERCENT / WHOLE
-        if other is None:
-            return None
-        before, after = self.prediction_error(state), self.prediction_error(other)
-        if not after < material * before:
-            return None
-        words = f"cross-validated E {percent(before)} -> {percent(after)}"
-        return replace(other, steps=(*state.steps, *other.steps, Step("switch_estimator", "", words)))
-
     def _without_weakest(self, state: State[F, M, W], some: Sequence[str]) -> State[F, M, W] | None:
         """Return the state without the weakest of some candidates; None if there are none."""
         weakest = min(some, key=lambda n: (_low(state.weighed, n), n), default=None)
@@ -331,8 +326,7 @@ def _noted(state: State[F, M, W], claim: str) -> State[F, M, W]:
     """Return a state with a claim that changed it; what the claim rejected says so."""
     new = [n for n, one in state.rejected.items() if not one.claim]
     rejected = {n: replace(one, claim=one.claim or claim) for n, one in state.rejected.items()}
-    steps = [Step(claim, n) for n in new or [""] if claim != "switch_estimator"]
-    return replace(state, steps=(*state.steps, *steps), rejected=rejected)
+    return replace(state, steps=(*state.steps, *(Step(claim, n) for n in new or [""])), rejected=rejected)
 
 
 def share_in(found: SearchResult[F], name: str) -> float:

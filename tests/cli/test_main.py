@@ -116,7 +116,7 @@ def test_the_record_is_as_the_contract_says(made):
     found = json.loads((made / "one/diagnosis.json").read_text())
     assert list(found) == [
         *("study", "verdict", "causes", "remainder", "explained", "absorbed", "nominal", "extended", "noise"),
-        *("ceiling_percent", "next_experiment", "horizon_s", "warnings", "wall_s", "provenance", *SAVED),
+        *("ceiling_percent", "next_experiment", "horizon_s", "why", "warnings", "wall_s", "provenance", *SAVED),
     ]
     (cause,) = found["causes"]
     assert list(cause) == ["name", "stage", "parameters", "equivalents", "p_value", "gain_percent", "judged_by"]

@@ -9,7 +9,7 @@ from driven_rigs.arm import CAUSES, draw_arm
 from fes_pin.data.study import read_study
 from fes_pin.diagnosis.diagnosis import diagnose_joint
 from fes_pin.diagnosis.errors_ahead import errors_ahead
-from fes_pin.diagnosis.estimators import found_with_white_process_noise
+from fes_pin.diagnosis.estimators import WhiteProcessNoise
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import maximise, with_white_process_noise
 from fes_pin.identify.process_noise import first_guess, without_memory
@@ -89,7 +89,8 @@ def test_a_diagnosis_names_the_friction_as_large_as_it_is(seed, tmp_path):
 def test_a_search_that_has_no_time_left_is_not_judged_again(left, fitted):
     _, likeliest, _ = fitted[2]
     search = SimpleNamespace(models=SimpleNamespace(answered=True), **left)
-    assert found_with_white_process_noise(search, SimpleNamespace(best=likeliest)) is None
+    first, estimator = SimpleNamespace(search=search, found=SimpleNamespace(best=likeliest)), WhiteProcessNoise(())
+    assert estimator.state(first) is None and estimator.fit is None
 
 
 def test_intervals_hold_the_other_estimate_where_chance_does_not_set_both_apart(fitted):

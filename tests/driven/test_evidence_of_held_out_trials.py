@@ -42,9 +42,9 @@ def unsupported(evidence, low, random, held_out=Judged.held_out):
     found = SimpleNamespace(
         without=dict.fromkeys(gains, fit), p_values=dict.fromkeys(gains, 0.0), nominal=fit, best=fit
     )
-    search = SimpleNamespace(result=lambda names: SimpleNamespace(without={}))
+    verdict.search = SimpleNamespace(result=lambda names: SimpleNamespace(without={}))
     weighed = RigWeighed(gains, evidence, NOTHING, is_random=are_large(random), folds=(None,), random=random)
-    state = State(search, found, weighed, {}, frozenset(gains))
+    state = State(verdict, found, weighed, {}, frozenset(gains))
     claims = verdict.drop_errors_of_form, verdict.drop_unsupported, verdict.drop_that_predict_no_better
     return [claim.__name__ for claim in claims if claim(state) is not None]
 

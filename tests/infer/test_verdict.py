@@ -32,16 +32,14 @@ def unsupported(gains, evidence, left=NOISE):
         without=dict.fromkeys(gains, FIT), p_values=dict.fromkeys(gains, 0.0), nominal=FIT, best=FIT
     )
     search = SimpleNamespace(result=lambda names: SimpleNamespace(without=dict.fromkeys(names, FIT)))
-    state = CLAIMS.drop_unsupported(State(search, found, Weighed(gains, evidence, left), {}, frozenset(gains)))
+    verdict = Claims(search)
+    state = verdict.drop_unsupported(State(verdict, found, Weighed(gains, evidence, left), {}, frozenset(gains)))
     return [] if state is None else list(state.rejected)
 
 
 class Claims(Verdict):
     def weigh(self, found):
         return Weighed({}, {}, NOISE)
-
-
-CLAIMS = Claims(SimpleNamespace())
 
 
 def test_a_candidate_together_with_others_gains_something():
@@ -135,33 +133,6 @@ def test_what_one_run_alone_shows_is_refused_and_said_to_be_refused(judged):
     assert "do not confirm" in found.rejected["x07"].reason
 
 
-class TwoEstimators(Claims):
-    """Another estimator of the same data, whose prediction error is given."""
-
-    def __init__(self, error):
-        super().__init__(SimpleNamespace(sets=None))
-        self.asked, self.error = 0, error
-
-    def weigh(self, found):
-        return Weighed({}, {}, NOISE)
-
-    def by_another_estimator(self, state):
-        self.asked += 1
-        return self.of(SimpleNamespace(without={"friction": None}, best=None), replaced=state)
-
-    def prediction_error(self, state):
-        return 1.0 if state.replaced is None else self.error
-
-
-@pytest.mark.parametrize(("error", "names"), [(0.5, {"friction"}), (1.0, {"spring"}), (2.0, {"spring"})])
-def test_another_estimator_is_asked_once_and_taken_where_it_predicts_better(error, names):
-    verdict = TwoEstimators(error)
-    found = verdict.of(SimpleNamespace(without={"spring": None}, best=None))
-    assert found.names == names and verdict.asked == 1
-    assert [s.claim for s in found.steps] == ["switch_estimator"] * (error < 1.0)
-    assert (found.replaced is not None) == (error < 1.0)
-
-
 @pytest.mark.parametrize(
     ("on", "percent", "is_material"), [(CROSS_VALIDATED, 0.02, True), (FITTED, 0.02, False), (FITTED, 5.0, True)]
 )
@@ -227,6 +198,6 @@ def test_a_candidate_that_a_given_level_finds_insignificant_is_dropped(two_colum
 
 def test_the_table_of_claims_is_whole_and_the_same_for_every_front_end():
     drops = {n for n in vars(Verdict) if n.startswith("drop_")}
-    assert {"settle", "switch_estimator"} == set(TABLE) - drops and all(TABLE.values())
+    assert {"settle"} == set(TABLE) - drops and all(TABLE.values())
     fronts = RigVerdict, ContrastVerdict, WalkVerdict
     assert not any(set(TABLE) & set(vars(front)) or "evidence" in vars(front) for front in fronts)
