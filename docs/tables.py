@@ -230,20 +230,8 @@ def public_text() -> str:
 
 
 REASONED = (
-    *(
-        "infer",
-        "identify",
-        "remainder",
-        "search",
-        "prepare",
-        "faults",
-        "diagnosis",
-        "contrasts",
-        "walk",
-        "comparison",
-        "cohort",
-        "verdict",
-    ),
+    *("infer", "identify", "remainder", "search", "prepare", "faults"),
+    *("diagnosis", "contrasts", "walk", "comparison", "cohort", "verdict"),
     "models/plausibility.py",
 )
 """Rooms of inference, and a file of another room, whose numbers are listed with their reasons."""
@@ -290,22 +278,32 @@ def kinds() -> dict[str, str]:
 
 
 def unnamed_numbers() -> list[str]:
-    """Numbers that stand in a comparison, or as a default of an argument, without a name: "file:line value".
+    """Numbers that stand in a comparison, or as a default of an argument or of a class, without a name.
 
     Those that say empty, first, one, a pair, a half or percent, and those that only guard arithmetic, are none.
+
+    Returns
+    -------
+    list of str
+        "file:line value" each.
     """
     root, found = Path(fes_pin.__file__).parent, []
     for path in sorted(_reasoned(root)):
-        for node in ast.walk(ast.parse(path.read_text())):
-            parts: list[ast.expr] = []
-            if isinstance(node, ast.Compare):
-                parts = [x for one in (node.left, *node.comparators) for x in ast.walk(one) if isinstance(x, ast.expr)]
-            elif isinstance(node, ast.arguments):
-                parts = [d for d in (*node.defaults, *node.kw_defaults) if d is not None]
-            for x in parts:
-                if isinstance(x, ast.Constant) and type(x.value) in (int, float) and not _says_nothing(x.value):
-                    found.append(f"{path.relative_to(root)}:{x.lineno} {x.value}")
+        for x in (x for node in ast.walk(ast.parse(path.read_text())) for x in _deciding(node)):
+            if isinstance(x, ast.Constant) and type(x.value) in (int, float) and not _says_nothing(x.value):
+                found.append(f"{path.relative_to(root)}:{x.lineno} {x.value}")
     return found
+
+
+def _deciding(node: ast.AST) -> list[ast.AST]:
+    """Expressions of a node that may hold a number that decides."""
+    if isinstance(node, ast.Compare):
+        return [x for one in (node.left, *node.comparators) for x in ast.walk(one)]
+    if isinstance(node, ast.arguments):
+        return [d for d in (*node.defaults, *node.kw_defaults) if d is not None]
+    if isinstance(node, ast.ClassDef):
+        return [one.value for one in node.body if isinstance(one, ast.Assign | ast.AnnAssign) and one.value]
+    return []
 
 
 def _says_nothing(value: float) -> bool:
@@ -313,19 +311,16 @@ def _says_nothing(value: float) -> bool:
 
 
 def _named(path: Path) -> Iterable[tuple[str, str, str]]:
+    """Name, value and reason of every number that a file names, several in a line too."""
     body = ast.parse(path.read_text()).body
     for one, after in zip(body, [*body[1:], None], strict=True):
         target = one.targets[0] if isinstance(one, ast.Assign) else getattr(one, "target", None)
         value = getattr(one, "value", None)
-        if (
-            not isinstance(target, ast.Name)
-            or not target.id.isupper()
-            or target.id.startswith("_")
-            or not _is_numeric(value)
-        ):
-            continue
+        many = isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple)
         reason = after.value.value if isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant) else ""
-        yield target.id, ast.unparse(value), " ".join(str(reason).split())
+        for name, number in zip(target.elts, value.elts, strict=True) if many else [(target, value)]:
+            if isinstance(name, ast.Name) and name.id.isupper() and name.id[0] != "_" and _is_numeric(number):
+                yield name.id, ast.unparse(number), " ".join(str(reason).split())
 
 
 def _is_numeric(value: ast.AST | None) -> bool:

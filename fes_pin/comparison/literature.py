@@ -31,6 +31,8 @@ from fes_pin.models.stage import Effect, Stage
 
 TAU_C_S = 0.020
 """Time constant of calcium and troponin, s: Ding et al. 2003, held for all subjects."""
+MAX_STEP_S = TAU_C_S / 16.0
+"""Longest step of integration, s: a sixteenth of the shortest time constant."""
 TAU_1_S = 0.050957
 """Time constant of the force without strong cross bridges, s: Ding et al. 2000, at rest; it also scales `gain`."""
 TAU_2_S = 0.060
@@ -65,7 +67,7 @@ class Ding2003(Effect):
     name, stage, signal, rigs = "ding2003", Stage.MUSCLE, "activation", ("muscle",)
     states = ("calcium", "troponin", "tension")
     memories = ("primed", "weight")
-    max_step_s = 1.25e-3
+    max_step_s = MAX_STEP_S
 
     def apply(self, value: Any, s: Any) -> Any:
         return s.own.tension

@@ -24,8 +24,9 @@ from fes_pin.search.possible import are_possible
 from fes_pin.search.starts import STARTS, number_of_forms, refinements
 from fes_pin.workers import in_parallel
 
-FITTED, FITTED_DRIVEN = 10, 6
-"""Items of largest score that are fitted with a set; on driven rigs a fit takes some five times as long."""
+FITTED, FITTED_DRIVEN, CONVERGED = 10, 6, 3
+"""Items of largest score that are fitted with a set, as on driven rigs a fit takes some five times as long; and sets of
+a size that are fitted until they converge."""
 
 POLICY = Policy(fitted=None)
 """`candidates` are those of largest score."""
@@ -35,7 +36,7 @@ Found = SearchResult[Grouped]
 
 
 class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
-    """Sets of items, "cause" or "cause@group", fitted to the trials of several groups.
+    """Sets of items, "cause" or "cause:group", fitted to the trials of several groups.
 
     Parameters
     ----------
@@ -46,7 +47,7 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
     """
 
     most_candidates: int | None = MOST_ITEMS
-    converged_sets = 3
+    converged_sets = CONVERGED
 
     def __init__(self, maxima: GroupedFits, seed: int = 0) -> None:
         super().__init__()

@@ -30,6 +30,9 @@ class Fitted(Protocol):
         """Degrees of freedom."""
 
 
+CONVERGED = 4
+"""Best sets of a size that are fitted until they converge."""
+
 F = TypeVar("F", bound=Fitted)
 S = TypeVar("S")
 
@@ -52,7 +55,7 @@ class Sets(ABC, Generic[F]):
     """
 
     most_candidates: int | None = MOST_CAUSES
-    converged_sets = 4
+    converged_sets = CONVERGED
     family: Family
 
     def __init__(self) -> None:

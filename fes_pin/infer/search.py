@@ -17,6 +17,9 @@ from fes_pin.infer.levels import UNUSUAL_LEVEL
 from fes_pin.workers import OutOfTime, Progress, seconds_left, time_limit
 
 M = TypeVar("M", bound=Sets[Any])
+BEAM, FITTED = 3, 8
+"""Sets of a size that are extended, and candidates that are fitted with each; a greedy search (1) names fewer pairs
+exactly."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +30,7 @@ class Policy:
     ----------
     beam
         Number of sets of a size that are judged, lowest criterion first, until one is accepted; and that are extended
-        after. A greedy search (1) names fewer pairs exactly.
+        after.
     fitted
         Number of candidates of largest score that are fitted together with a set; None for all. With the nominal model
         all are fitted.
@@ -35,8 +38,8 @@ class Policy:
         A set that is judged without a search and without further rivals; None for a search.
     """
 
-    beam: int = 3
-    fitted: int | None = 8
+    beam: int = BEAM
+    fitted: int | None = FITTED
     given: Names | None = None
 
 
