@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.held_out import Again, Found, gains_of, make_folds, refit
+from fes_pin.diagnosis.held_out import Again, Fold, Found, gains_of, make_folds, refit
 from fes_pin.diagnosis.likelihood_models import LikelihoodSearch
 from fes_pin.diagnosis.restate import Made, with_first
 from fes_pin.diagnosis.result import Diagnosis
@@ -207,7 +207,9 @@ def with_fault(
     values = fault.values(best, relative)
     found = SearchResult(nominal, best, {}, {}, {effect.name: one})
     horizon = diagnosis.ahead.horizon_s if diagnosis.ahead and diagnosis.is_driven else None
-    gain = gains_of(make_folds(found, best.trials, test, Again(refit)), found.without, horizon, seed)[effect.name]
+    whole = [Fold(nominal, best, found.without, best.trials)]
+    held = make_folds(found, best.trials, test, Again(refit)) or whole
+    gain, fitted = (gains_of(folds, found.without, horizon, seed)[effect.name] for folds in (held, whole))
     column = "effort" if effect.signal == "effort" else best.model.rig.output(best.trials[0].kind)
     said = ", ".join(f"{n} {v.value:.3g}" for n, v in values.items())
     unit = " of their mean" if relative else f" {next(iter(values.values())).unit}".rstrip()
@@ -218,7 +220,7 @@ def with_fault(
         parameters=values,
         equivalents=(),
         p_value=fault.p_value,
-        gain_fit=100.0 * (one.sse - best.sse) / max(nominal.sse - best.sse, 1e-9),
+        gain_fit=fitted.percent,
         gain_held_out=replace(gain, on=diagnosis.held_out_by),
         words=f"the {'scale' if effect.scales else 'zero'} of {column} differs between trials: {said}{unit}",
     )

@@ -164,8 +164,8 @@ def gains_of(
     horizon_s, seed
         The horizon, s, None for free simulations; the seed of the bootstrap of intervals.
     """
-    found_over = _gains_over(folds, tuple(without), horizon_s, seed)
-    if horizon_s is None:
+    found_over = _gains_over(folds, tuple(without) if folds else (), horizon_s, seed)
+    if horizon_s is None or not found_over:
         return found_over
     shortest = min(t.duration for f in folds for t in f.test)
     for name, gain in found_over.items():

@@ -21,9 +21,9 @@ from fes_pin.identify.fit import rough_noise
 from fes_pin.identify.likelihood import is_simulated
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.estimators import choose
-from fes_pin.infer.result import CROSS_VALIDATED, FITTED, HELD_OUT, STOPPED, Cause, Remainder
+from fes_pin.infer.result import CROSS_VALIDATED, FITTED, HELD_OUT, STOPPED, Cause, Gain, Remainder
 from fes_pin.infer.scatter import as_wide_as_estimates_differ, as_wide_as_trials_differ, with_honest_intervals
-from fes_pin.infer.verdict import share_in, word_of
+from fes_pin.infer.verdict import word_of
 from fes_pin.infer.why import why_of
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
@@ -56,7 +56,8 @@ def diagnosis_of(
     fitted, *others = verdict.errors(state)
     held = others[0] if others else None
     on = HELD_OUT if trials[1] else CROSS_VALIDATED if held else FITTED
-    causes = [_cause(verdict, state, one, best, on) for one in best.model.effects if not one.is_fault]
+    fits = verdict.gains_fitted(found)
+    causes = [_cause(verdict, state, e, best, (fits[e.name], on)) for e in best.model.effects if not e.is_fault]
     causes.sort(key=lambda c: -c.gain_held_out.percent)
     said = (*words_of_reading(best.noise, best.model.rig, trials[0]), *_words_of_far(search.models, found.nominal))
     reached = [e for e in (fitted[1].free, held and held[1].free) if e is not None]
@@ -110,11 +111,17 @@ def unfitted(study: Study, nominal: LikelihoodFit, reason: str, test: Sequence[T
     )
 
 
-def _cause(verdict: RigVerdict, state: RigState, one: Effect, best: LikelihoodFit, on: str) -> Cause:
-    """Return the report of one cause, whose gains are found `on` such data.
+def _cause(verdict: RigVerdict, state: RigState, one: Effect, best: LikelihoodFit, judged: tuple[Gain, str]) -> Cause:
+    """Return the report of one cause.
 
-    `best` has the intervals of the sandwich estimator.
+    Parameters
+    ----------
+    best
+        The fit, with the intervals of the sandwich estimator.
+    judged
+        Its gain on the fitted trials, and the data on which it is judged.
     """
+    fitted, on = judged
     found, name, evidence = state.found, one.name, verdict.evidence(state)[one.name]
     alike = alike_in(found, name)
     return Cause(
@@ -123,7 +130,7 @@ def _cause(verdict: RigVerdict, state: RigState, one: Effect, best: LikelihoodFi
         parameters=estimates(best, name),
         equivalents=alike[1:],
         p_value=found.p_values[name],
-        gain_fit=100.0 * share_in(found, name),
+        gain_fit=fitted.percent,
         gain_held_out=replace(state.weighed.gains[name], on=on),
         evidence=None if evidence is None else replace(evidence, on=on),
         chosen_again=share_of(verdict.chosen(state), alike),

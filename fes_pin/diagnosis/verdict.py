@@ -29,7 +29,7 @@ from fes_pin.identify.error_measures import FREE
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.per_trial import falls
 from fes_pin.infer.held_out import Errors
-from fes_pin.infer.result import FITTED, Remainder
+from fes_pin.infer.result import FITTED, Gain, Remainder
 from fes_pin.infer.verdict import State, Verdict, Weighed
 from fes_pin.remainder.lack_of_fit import lack_of_fit
 
@@ -79,10 +79,9 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
     def weigh(self, found: Found) -> RigWeighed:
         """Return the evidence of held-out trials and of the tests of lack of fit on a set."""
         folds = make_folds(found, self.models.trials, self.test, self.refitted)
-        within = folds or [Fold(found.nominal, found.best, found.without, self.models.trials)]
-        gains = gains_of(within, found.without, self.models.judged_s, self.models.seed)
+        gains = gains_of(folds, found.without, self.models.judged_s, self.models.seed)
         return RigWeighed(
-            gains=gains if folds else {n: replace(one, on=FITTED) for n, one in gains.items()},
+            gains=gains if folds else self.gains_fitted(found),
             evidence=evidence_of(folds, found, self._alike),
             lack_of_fit=lack_of_fit(found.best),
             is_random=are_large(random := random_parts(found.best)),
@@ -90,6 +89,12 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
             random=random,
             no_noise=no_noise(found.best),
         )
+
+    def gains_fitted(self, found: Found) -> dict[str, Gain]:
+        """Return the gain of each cause on the fitted trials, by fits to all of them."""
+        whole = Fold(found.nominal, found.best, found.without, self.models.trials)
+        gains = gains_of([whole], found.without, self.models.judged_s, self.models.seed)
+        return {n: replace(one, on=FITTED) for n, one in gains.items()}
 
     def of(self, found: Found, replaced: State[Any, Any, Any] | None = None) -> RigState:
         """Return the state to which no claim objects; one without causes where the input does not move the rig."""
