@@ -9,7 +9,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-from fes_pin.infer.held_out import held_out_gain
+import numpy as np
+
+from fes_pin.infer.held_out import Errors, held_out_gain
 from fes_pin.infer.levels import NOTHING_PERCENT
 from fes_pin.infer.text import percent
 from fes_pin.infer.verdict import State, Step
@@ -30,8 +32,9 @@ class Estimator(ABC):
 def choose(first: AnyState, others: Sequence[Estimator], seed: int = 0) -> AnyState:
     """Return the state of the first estimator, or of one that predicts materially better; the first such one.
 
-    It predicts better where the 95 % interval of the share of the error above the noise that it removes is above
-    `NOTHING_PERCENT`. Data that the study itself holds out are not used: gains on them would be optimistic.
+    It predicts better where the 95 % interval of the share of the squared error that it removes is above
+    `NOTHING_PERCENT`. Noise is not subtracted: each estimator has its own, and that of a wrong model is large. Data that
+    the study itself holds out are not used: gains on them would be optimistic.
     """
     for estimator in others:
         other = estimator.state(first)
@@ -41,9 +44,15 @@ def choose(first: AnyState, others: Sequence[Estimator], seed: int = 0) -> AnySt
         if (currency := next(both, None)) is None:
             continue
         before, after = (one.verdict.errors_in(one, currency, first) for one in (first, other))
-        gain = held_out_gain(before, before, after, seed)
+        gain = held_out_gain(before, before, _without_noise(after), seed)
         if gain.low > NOTHING_PERCENT:
             errors = f"E of {currency} {percent(before.error_percent())} -> {percent(after.error_percent())}"
             step = Step(CHOICE, words=f"{other.search.sets.estimator} predicts better: {errors}, gain {gain}")
             return replace(other, steps=(*first.steps, *other.steps, step))
     return first
+
+
+def _without_noise(errors: Errors) -> Errors:
+    """Return errors of which none is taken for noise."""
+    none = np.zeros_like(errors.noise)
+    return replace(errors, noise=none, variances=none + np.finfo(float).tiny)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from fes_pin.infer.fits import Fitted, Names, Sets, more_degrees
-from fes_pin.infer.result import p_shown, shown
+from fes_pin.infer.result import Held, p_shown, shown
 from fes_pin.infer.text import listed, probability
 from fes_pin.infer.verdict import Rejected, State, Step
 
@@ -37,9 +37,10 @@ class Tried:
 
     def words(self, level: float) -> str:
         """Return why the candidate is not named, in words."""
-        size, names = f"{shown(abs(self.gain), PRINTED):g}", listed(list(self.names))
+        names = listed(list(self.names))
         if not self.is_possible:
             return f"in the nearest set a size is not physically possible ({names})"
+        size = f"{shown(abs(self.gain), PRINTED):g}"
         if math.isnan(self.p_value):
             return f"twice the log-likelihood of the nearest set ({names}) is {size} less than that of the answer"
         test = f"added to the answer it raises twice the log-likelihood by {size} ({probability(self.p_value)}"
@@ -101,7 +102,7 @@ def why_of(state: State[Any, Any, Any]) -> Why:
         for one in set(names) - named - set(state.rejected):
             nearest.setdefault(one, names)
     tried = {n: _tried(sets, best, names, named < set(names)) for n, names in sorted(nearest.items())}
-    return Why(sets.estimator, sets.level(best), state.steps, state.rejected, tried)
+    return Why(sets.estimator, sets.level(best), state.steps, Held(state.rejected), Held(tried))
 
 
 def _tried(sets: Sets[Any], best: Fitted, names: Names, extends: bool) -> Tried:

@@ -112,6 +112,20 @@ def test_the_seed_changes_only_what_is_simulated(made):
     assert found["causes"][0]["gain_percent"]["ci95"] != usual["causes"][0]["gain_percent"]["ci95"]
 
 
+def test_every_cause_has_an_answer_to_why(made, diagnosis, tmp_path, monkeypatch, capsys):
+    words = [word for name in ("coulomb_friction", "sensor_lag", "nonsense") for word in ("--why", name)]
+    assert run(monkeypatch, "diagnose", made / "study", "--out", tmp_path / "why", *words) == 0
+    named, other, unknown = capsys.readouterr().out.splitlines()[-4:-1]
+    assert named.startswith("coulomb_friction: named (p ") and "twice the log-likelihood" in named
+    assert other.startswith("sensor_lag: ") and diagnosis.explain("sensor_lag") == [other]
+    assert unknown.startswith("nonsense: not searched; candidates were ") and "sensor_lag" in unknown
+    told = record(tmp_path / "why")["why"]
+    assert set(told) == {"estimator", "level", "steps", "rejected", "tried"} and "sensor_lag" in told["tried"]
+    searched = {*told["tried"], *told["rejected"], *diagnosis.absorbed, *(c.name for c in diagnosis.causes)}
+    assert searched >= {e.name for e in EFFECTS if "ankle" in e.rigs and not e.is_fault}
+    assert "Why these, and no others" in (tmp_path / "why/report.html").read_text()
+
+
 def test_the_record_is_as_the_contract_says(made):
     found = json.loads((made / "one/diagnosis.json").read_text())
     assert list(found) == [

@@ -41,7 +41,7 @@ def test_the_cause_is_named(row):
     assert cause in named(diagnosis)[0]
     assert diagnosis.causes[0].p_value < 0.01
     assert diagnosis.causes[0].gain_held_out.low > 0.0
-    assert diagnosis.causes[0].gain_held_out.percent > 80.0
+    assert diagnosis.causes[0].gain_held_out.percent > 80.0 and diagnosis.causes[0].gain_fit > 80.0
     assert not diagnosis.remainder.unexplained and diagnosis.remainder.where is None
     assert cause in str(diagnosis)
 

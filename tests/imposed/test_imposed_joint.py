@@ -139,7 +139,7 @@ def test_a_hidden_cause_is_named_and_predicted(tmp_path, cause):
 def test_nothing_hidden_is_adequate(tmp_path, monkeypatch):
     """And the effort, which is what is read here, is never moved."""
     made = joint.study((), 0.0, np.random.default_rng(11), tmp_path)
-    for owner, asked in ((logged, "lateness_of"), (logged.LogFaults, "_noise")):
+    for owner, asked in ((logged, "lateness_of"), (logged.LogFaults, "of")):
         monkeypatch.setattr(owner, asked, lambda *_: pytest.fail("the effort of an imposed motion was doubted"))
     assert diagnose_joint(made).verdict == "adequate"
 

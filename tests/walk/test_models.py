@@ -35,10 +35,10 @@ def models(gait, tmp_path_factory):
 
 def test_a_set_has_no_two_forms_of_one_cause_at_one_site(models):
     forms = models.designs.forms
-    base = models.fits[("segment_com (trunk, forward)",)]
+    base = models.fits[("segment_com@trunk, forward",)]
     further = models.candidates(base)
     assert not any(forms[n].cause == "segment_com" and forms[n].site.startswith("trunk") for n in further)
-    assert "segment_com (pelvis, forward)" in further and "segment_mass (trunk)" in further
+    assert "segment_com@pelvis, forward" in further and "segment_mass@trunk" in further
 
 
 def test_sizes_that_cannot_be_are_no_explanation(models):
@@ -81,10 +81,10 @@ def test_what_strides_held_out_do_not_bear_out_is_refused(models):
     state = verdict.of(found)
     assert state.found.best.names == found.best.names and not state.rejected
     assert all(e.low > 0.0 for e in state.weighed.evidence.values())
-    further = tuple(sorted((*found.best.names, "plate_gain (left plate, sideways)")))
+    further = tuple(sorted((*found.best.names, "plate_gain@left plate, sideways")))
     known.fit(further)
     state = verdict.of(search.result(further))
-    assert set(state.rejected) == {"plate_gain (left plate, sideways)"}
+    assert set(state.rejected) == {"plate_gain@left plate, sideways"}
     assert verdict.lack_of_fit(state).unexplained
 
 

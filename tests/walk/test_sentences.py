@@ -58,13 +58,13 @@ def test_no_cause_removes_more_than_all(diagnosed):
 def test_a_cause_that_was_rejected_is_no_residual_that_repeats(diagnosed):
     """Once "a residual repeats in every stride (p = 0.4)": the test of the residual finds none."""
     none, seen = Remainder(False, 0.4, None), Remainder(True, 1e-9, "vertical force, mean")
-    rejected = {"plate_gain (both plates)": None}
+    rejected = {"plate_gain@both plates": None}
     said = [
         WalkVerdict.lack_of_fit(None, SimpleNamespace(weighed=SimpleNamespace(lack_of_fit=left), rejected=some))
         for left, some in ((none, {}), (none, rejected), (seen, rejected))
     ]
     assert said[0] == none and said[2] == seen
-    assert said[1].unexplained and said[1].reason == "strides held out reject plate_gain (both plates)"
+    assert said[1].unexplained and said[1].reason == "strides held out reject plate_gain@both plates"
     words = dict(replace(diagnosed(2), remainder=said[1], reason=said[1].reason, causes=()).notes())["lack of fit"]
     assert words == "none repeats in every stride (p = 0.4)"
 

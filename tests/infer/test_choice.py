@@ -1,6 +1,6 @@
 """A second estimator of the same data: fits of its own type, judged by errors alone, candidates at two sites."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -155,6 +155,14 @@ def test_the_estimator_that_predicts_better_answers(outliers, takes):
     if takes:
         assert state.replaced is first and isinstance(state.verdict, ByErrors)
         assert state.steps[-1].claim == CHOICE and f"E of {CLIPPED}" in str(state.steps[-1])
+
+
+def test_an_estimator_that_takes_its_errors_for_noise_is_replaced_all_the_same():
+    columns, runs = drawn(2, 0.05)
+    first = first_state(columns, runs)
+    usual = first.verdict.errors_in
+    first.verdict.errors_in = lambda *asked: replace(usual(*asked), noise=1e6 * np.ones(len(runs)))
+    assert choose(first, [ByAbsoluteErrors(columns, runs)]) is not first
 
 
 def test_pages_of_steps_know_the_other_estimator_and_its_sites():
