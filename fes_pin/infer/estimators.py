@@ -33,8 +33,8 @@ def choose(first: AnyState, others: Sequence[Estimator], seed: int = 0) -> AnySt
     """Return the state of the first estimator, or of one that predicts materially better; the first such one.
 
     It predicts better where the 95 % interval of the share of the squared error that it removes is above
-    `NOTHING_PERCENT`. Noise is not subtracted: each estimator has its own, and that of a wrong model is large. Data that
-    the study itself holds out are not used: gains on them would be optimistic.
+    `NOTHING_PERCENT`. Noise is not subtracted: each estimator has its own, and that of a wrong model is large. Data
+    that the study itself holds out are not used: gains on them would be optimistic.
     """
     for estimator in others:
         other = estimator.state(first)
