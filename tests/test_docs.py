@@ -256,3 +256,30 @@ def test_the_page_of_decisions_names_files_that_are_there():
     names = set(re.findall(r"`(\w+/[\w/]+\.py)`", text))
     assert len(names) > 30
     assert [n for n in names if not any((ROOT / top / n).exists() for top in ("", "fes_pin"))] == []
+
+
+PATHS = re.compile(r"`([a-z_]+(?:\.\w+)+)`")
+"""Dotted names in docstrings."""
+FILES = (".toml", ".json", ".csv")
+
+
+def test_docstrings_name_modules_that_are_there():
+    """`infer.scatter` is a file, and `infer.scatter.excess_scatter` is a name in it."""
+    root, dead = ROOT / "fes_pin", []
+    rooms = {p.name for p in root.iterdir() if p.is_dir()} - {"body"}  # `body.joint_names` is an attribute
+    for path in root.rglob("*.py"):
+        texts = (n.value for n in ast.walk(ast.parse(path.read_text())) if isinstance(n, ast.Constant))
+        for name in (n for text in texts if isinstance(text, str) for n in PATHS.findall(text)):
+            room, *parts = name.split(".")
+            if room in rooms and not name.endswith(FILES) and not _is_there(root / room, parts):
+                dead.append(f"{path.relative_to(root)}: {name}")
+    assert dead == []
+
+
+def _is_there(place, parts):
+    """Whether parts of a dotted name lead from a folder to a file, and from the file to a name in it."""
+    for k, part in enumerate(parts):
+        if (file := place / f"{part}.py").exists():
+            return k + 1 == len(parts) or re.search(rf"\b{parts[k + 1]}\b", file.read_text()) is not None
+        place = place / part
+    return place.is_dir()

@@ -197,7 +197,7 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
         return bool(Key.of(name).group)
 
     def excess_scatter(self, larger: Grouped, smaller: Grouped) -> float:
-        """See `identify.scatter.excess_scatter`."""
+        """See `infer.scatter.excess_scatter`."""
         return excess_scatter(larger, smaller)
 
     def p_value(self, larger: Grouped, smaller: Grouped, gain: float | None = None) -> float:

@@ -71,7 +71,7 @@ def missing_input(model: Model, measured: Trial, simulated: Trial | None = None)
     simulated
         What the model predicts of it. None for a rig whose effort answers the reading: it integrates or falls over, so
         that a free simulation is no reference that a motion could be near to. Then it is the effort that the model,
-        its effects included, lacks along the measured motion; see `models.tracking`.
+        its effects included, lacks along the measured motion; see `models.free_run`.
     """
     rig, count = model.rig, _averaged(measured.time)
     step = count * measured.dt

@@ -24,7 +24,7 @@ FAR_M = 1.5
 """No centre of pressure lies further from the body than this, level: a long step is 1 m."""
 CARRIED = 0.6
 """Share of the required vertical force below which plates do not carry the whole body: errors of plates and masses are
-below a third (`fits.POSSIBLE`)."""
+below a third (`infer.levels.POSSIBLE_SIZES`)."""
 NEARER = 0.6
 """Share of its distance to one ankle at which a centre of pressure is the other foot's; one who stands may share it."""
 FULLY = 0.9
