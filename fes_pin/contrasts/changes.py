@@ -8,7 +8,7 @@ from fes_pin.contrasts.words import of_cause, of_nominal
 from fes_pin.faults.misread import NAME, Misread
 from fes_pin.infer.distributions import normal_quantile
 from fes_pin.infer.keys import Key
-from fes_pin.infer.levels import CLAIM_LEVEL, IDENTIFIABLE_SHARE, SEEN_POWER, SEPARABLE
+from fes_pin.infer.levels import CLAIM_LEVEL, IDENTIFIABLE_SHARE, SEEN_POWER
 from fes_pin.infer.result import Change, Evidence, ParameterEstimate
 from fes_pin.models.catalogue import Catalogue
 
@@ -59,16 +59,9 @@ def _by_group(best: Grouped, item: Key, wider: float) -> dict[str, dict[str, Par
 
 
 def _equivalents(models: ContrastModels, found: Found, item: Key) -> tuple[str, ...]:
-    """Return the equivalents of a change; of driven rigs also with more parameters, if they are as likely.
-
-    An equivalent is significant by the test of the change itself.
-    """
-    best, near = found.best, set[str]()
-    for rival in found.rivals[str(item)]:
-        criterion = min(rival.criterion, rival.sse + best.criterion - best.sse) if best.is_driven else rival.criterion
-        if criterion < best.criterion + SEPARABLE and models.p_value(rival, found.without[str(item)]) < CLAIM_LEVEL:
-            near |= {i.name for i in rival.items - best.items}
-    return tuple(sorted(near - {item.name}))
+    """Return the names of the equivalents of a change."""
+    near = models.equivalents(found.best, found.without[str(item)], found.rivals[str(item)])
+    return tuple(sorted({i.name for rival in near for i in rival.items - found.best.items} - {item.name}))
 
 
 def not_changed(

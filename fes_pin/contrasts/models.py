@@ -11,7 +11,15 @@ from fes_pin.identify.afar import misfit_percent
 from fes_pin.infer.distributions import chi2_tail
 from fes_pin.infer.fits import Candidate, FittedSets, Names, more_degrees
 from fes_pin.infer.keys import Key
-from fes_pin.infer.levels import CLAIM_LEVEL, CONFIDENCE_95, DRIVEN_LEVEL, MOST_CAUSES, MOST_ITEMS, UNUSUAL_LEVEL
+from fes_pin.infer.levels import (
+    CLAIM_LEVEL,
+    CONFIDENCE_95,
+    DRIVEN_LEVEL,
+    MOST_CAUSES,
+    MOST_ITEMS,
+    SEPARABLE,
+    UNUSUAL_LEVEL,
+)
 from fes_pin.infer.scatter import excess_scatter
 from fes_pin.infer.search import Policy, Search, SearchResult
 from fes_pin.infer.spread import ByUnit, Spread
@@ -191,6 +199,10 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
     def is_certain(self, fitted: Grouped, name: str) -> bool:
         """Return whether a change is twice its deviation."""
         return next(fitted.certainty(i) for i in fitted.changes if str(i) == name) > CONFIDENCE_95
+
+    def is_distinguished(self, best: Grouped, without: Grouped, rival: Grouped, lead: float) -> bool:
+        """Return whether a rival is less likely, or not significant by the test of the change itself."""
+        return lead >= SEPARABLE or not self.p_value(rival, without) < CLAIM_LEVEL
 
     def is_claimed(self, name: str) -> bool:
         """Return whether an item is a change: a cause of all groups is none."""

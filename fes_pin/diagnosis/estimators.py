@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.decide.by_prediction import FEWEST, best_predicting
-from fes_pin.diagnosis.decide.rivals import not_excluded
 from fes_pin.diagnosis.errors_ahead import squared_errors
 from fes_pin.diagnosis.likelihood_models import Found, LikelihoodModels, LikelihoodSearch
 from fes_pin.diagnosis.verdict import RigState, RigVerdict
@@ -123,7 +122,7 @@ class WhiteProcessNoise(RigEstimator):
             nominal, coloured, new = (squared_errors(one, models.horizon_s) for one in many)
             if not held_out_gain(nominal, coloured, new, models.seed).percent > NOTHING_PERCENT:
                 return None
-            return models.begun_with([white, *_parts_and_rivals(found)])
+            return models.begun_with([white, *_parts_and_rivals(models, found)])
 
         sets = attempted(begun, None, search.seconds_left)
         if sets is None:
@@ -132,10 +131,11 @@ class WhiteProcessNoise(RigEstimator):
         return _ended(again, attempted(again.run, None, search.seconds_left))
 
 
-def _parts_and_rivals(found: Found) -> list[LikelihoodFit]:
+def _parts_and_rivals(models: LikelihoodModels, found: Found) -> list[LikelihoodFit]:
     """Return fits with white process noise of the subsets of the best set, and of the rivals equivalent to it."""
     parts = {f.names: f for f in (*found.without.values(), found.nominal)}
-    parts |= {f.names: f for many in found.rivals.values() for f in not_excluded(found.best, many)}
+    near = (models.equivalents(found.best, found.without[n], many) for n, many in found.rivals.items())
+    parts |= {f.names: f for many in near for f in many}
     parts.pop(found.best.names, None)
     return in_parallel(with_white_process_noise, list(parts.values()))
 

@@ -9,7 +9,7 @@ from fes_pin.identify.likelihood import is_simulated
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.distributions import chi2_tail
 from fes_pin.infer.levels import FORM_SHARE, NOTHING_PERCENT
-from fes_pin.infer.scatter import excess_scatter
+from fes_pin.infer.scatter import excess_scatter, least_apart
 from fes_pin.infer.search import Search
 from fes_pin.remainder.lack_of_fit import lack_of_fit
 from fes_pin.search.likelihood_fits import WHITE, LikelihoodFits
@@ -56,6 +56,15 @@ class LikelihoodModels(LikelihoodFits):
         if self.misfit(smaller) < NOTHING_PERCENT and is_rounding(smaller):
             return math.inf
         return excess_scatter(larger, smaller)
+
+    def is_distinguished(self, best: LikelihoodFit, without: LikelihoodFit, rival: LikelihoodFit, lead: float) -> bool:
+        """See `infer.scatter.least_apart`; none that predicts the readings to their rounding is distinguished."""
+        return lead >= least_apart(best, rival) and not is_rounding(rival)
+
+    def alike(self, found: Found, name: str) -> tuple[str, ...]:
+        """Return a cause and its equivalents."""
+        near = self.equivalents(found.best, found.without[name], found.rivals[name])
+        return name, *sorted({n for f in near for n in f.names} - set(found.best.names))
 
     def level(self, fitted: LikelihoodFit) -> float:
         """See `LikelihoodFit.level`."""

@@ -9,7 +9,7 @@ import numpy as np
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.decide.chosen_again import share_of
-from fes_pin.diagnosis.decide.rivals import alike_in, estimates, experiment, not_identifiable, ranking
+from fes_pin.diagnosis.decide.rivals import estimates, experiment, not_identifiable, ranking
 from fes_pin.diagnosis.errors_ahead import AheadErrors, free_errors, noise_that_is_small
 from fes_pin.diagnosis.estimators import WHITE_PROCESS_NOISE, LeastSquares, WhiteProcessNoise
 from fes_pin.diagnosis.likelihood_models import Found, LikelihoodSearch
@@ -123,7 +123,7 @@ def _cause(verdict: RigVerdict, state: RigState, one: Effect, best: LikelihoodFi
     """
     fitted, on = judged
     found, name, evidence = state.found, one.name, verdict.evidence(state)[one.name]
-    alike = alike_in(found, name)
+    alike = state.search.models.alike(found, name)
     return Cause(
         name=name,
         stage=str(one.stage),

@@ -12,7 +12,6 @@ from typing import Any
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.decide.chosen_again import ChosenAgain, is_chosen, share_of
-from fes_pin.diagnosis.decide.rivals import alike_in
 from fes_pin.diagnosis.errors_ahead import (
     Ahead,
     Pairs,
@@ -123,7 +122,7 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
 
     def is_rarely_chosen(self, state: RigState, name: str) -> bool:
         """Return whether most folds choose neither a cause nor one of its equivalents."""
-        return not is_chosen(share_of(self.chosen(state), alike_in(state.found, name)))
+        return not is_chosen(share_of(self.chosen(state), self.models.alike(state.found, name)))
 
     @property
     def currencies(self) -> tuple[str]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
 from fes_pin.infer.family import Family
-from fes_pin.infer.levels import CLAIM_LEVEL, MOST_CAUSES
+from fes_pin.infer.levels import CLAIM_LEVEL, MOST_CAUSES, SEPARABLE
 from fes_pin.infer.optimize import WORTH
 
 Names = tuple[str, ...]
@@ -107,6 +107,25 @@ class Sets(ABC, Generic[F]):
     def is_certain(self, fitted: F, name: str) -> bool:
         """Return whether the size of a candidate of a fit is twice its deviation."""
         return True
+
+    def equivalents(self, best: F, without: F, rivals: Sequence[F]) -> list[F]:
+        """Return the rivals in the place of a candidate that the data do not distinguish from it.
+
+        The criterion chooses which is named, the likelihood which are equivalent: a rival that fits as well with more
+        parameters, as a spring in the place of a constant torque, is not excluded.
+
+        Parameters
+        ----------
+        without
+            The best set without the candidate.
+        """
+        leads = (min(r.criterion - best.criterion, r.sse - best.sse) for r in rivals)
+        each = zip(rivals, leads, strict=True)
+        return [r for r, lead in each if not self.is_distinguished(best, without, r, lead)]
+
+    def is_distinguished(self, best: F, without: F, rival: F, lead: float) -> bool:
+        """Return whether the lead of the best set in twice the log-likelihood excludes a rival."""
+        return lead >= SEPARABLE
 
     def is_claimed(self, name: str) -> bool:
         """Return whether a candidate of the best set is a claim, for which rivals are searched."""

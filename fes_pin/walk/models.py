@@ -189,9 +189,13 @@ class WalkModels(FittedSets[WalkFit, None]):
         sizes, deviations = self.sizes(fitted)[name], self.deviations(fitted)[name]
         return bool(np.any(np.abs(sizes) > CONFIDENCE_95 * deviations))
 
+    def is_distinguished(self, best: WalkFit, without: WalkFit, rival: WalkFit, lead: float) -> bool:
+        """Return whether there is strong evidence against a rival."""
+        return lead >= STRONG_EVIDENCE
+
     def near_rivals(self, found: SearchResult[WalkFit], name: str) -> list[WalkFit]:
-        """Return sets with another form in the place of one that are not strongly excluded, best first."""
-        return [r for r in found.rivals[name] if r.criterion - found.best.criterion < STRONG_EVIDENCE]
+        """Return sets with another form in the place of one that are not excluded, best first."""
+        return self.equivalents(found.best, found.without[name], found.rivals[name])
 
     def sizes(self, one: WalkFit) -> dict[str, np.ndarray]:
         """Return values of a set's parameters by form; a shift is relative to the clock as read."""

@@ -15,7 +15,6 @@ from fes_pin.infer.family import Family
 from fes_pin.infer.fits import Candidate, FittedSets, Names
 from fes_pin.infer.held_out import Errors, added_likelihood, deal, held_out_gain
 from fes_pin.infer.keys import Key
-from fes_pin.infer.levels import SEPARABLE
 from fes_pin.infer.optimum import Optimum
 from fes_pin.infer.problem import Linearized, normal_equations, whitened_sse
 from fes_pin.infer.projection import Products, Projection
@@ -144,8 +143,3 @@ class RegressionVerdict(Verdict[Optimum, Regression, Weighed]):
         errors = {n: Errors(np.array(v), spread, noise) for n, v in squares.items()}
         gains = {n: held_out_gain(errors[""], errors[n], errors["+"], seed=0) for n in found.without}
         return Weighed(gains, evidence, SimpleNamespace(unexplained=not models.leaves_noise(found.best)))
-
-
-def equivalents(best: Optimum, rivals: list[Optimum], fits: dict[Names, Optimum]) -> list[Names]:
-    """Sets that a difference of `SEPARABLE` in price does not tell from the best."""
-    return [n for n, f in fits.items() if any(f is r for r in rivals) and f.criterion < best.criterion + SEPARABLE]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import scipy.stats
-from infer.regression import COUNT, Regression, equivalents
+from infer.regression import COUNT, Regression
 
 from fes_pin.infer.levels import CLAIM_LEVEL
 from fes_pin.infer.search import Search
@@ -57,7 +57,8 @@ def test_a_column_that_is_nearly_another_is_its_equivalent_and_no_other_is():
     models = Regression(x, 0.5 * x["x03"] + rng.standard_normal((RUNS, COUNT)))
     found = searched(models)
     (name,) = found.best.free
-    assert equivalents(found.best, found.rivals[name], models.fits) == [tuple({"x03", "x05"} - {name})]
+    near = models.equivalents(found.best, found.without[name], found.rivals[name])
+    assert [f.free for f in near] == [tuple({"x03", "x05"} - {name})]
 
 
 @pytest.mark.parametrize("changed", [False, True])

@@ -4,13 +4,10 @@ from collections.abc import Mapping, Sequence
 
 from fes_pin.data.study import Study
 from fes_pin.diagnosis.experiment import NextExperiment, next_experiment
-from fes_pin.diagnosis.held_out import Found
-from fes_pin.identify.afar import is_rounding
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.per_trial import amplitude
 from fes_pin.infer.levels import IDENTIFIABLE_SHARE
 from fes_pin.infer.result import Cause, ParameterEstimate, Ranked
-from fes_pin.infer.scatter import least_apart
 from fes_pin.search.score import Scored, best_by_effect
 
 
@@ -28,28 +25,6 @@ def estimates(fitted: LikelihoodFit, name: str) -> dict[str, ParameterEstimate]:
             continue
         out[n] = ParameterEstimate.of(fitted, key, info[key].unit)
     return out
-
-
-def alike_in(found: Found, name: str) -> tuple[str, ...]:
-    """Return a cause and its equivalents: the criterion chooses which is named, the likelihood which are equivalent.
-
-    A rival that fits as well with more parameters, as a spring in the place of a constant torque, is not excluded.
-    """
-    near = {n for f in not_excluded(found.best, found.rivals[name]) for n in f.names}
-    return name, *sorted(near - set(found.best.names))
-
-
-def not_excluded(best: LikelihoodFit, rivals: Sequence[LikelihoodFit]) -> list[LikelihoodFit]:
-    """Return the rivals whose criterion or cost is not significantly larger than that of the best set.
-
-    One that predicts the readings to their rounding is none either.
-    """
-
-    def is_near(rival: LikelihoodFit) -> bool:
-        apart = min(rival.criterion - best.criterion, rival.sse - best.sse)
-        return apart < least_apart(best, rival) or is_rounding(rival)
-
-    return [f for f in rivals if is_near(f)]
 
 
 def not_identifiable(best: LikelihoodFit, scored: Sequence[Scored], not_excited: Sequence[str]) -> tuple[str, ...]:
