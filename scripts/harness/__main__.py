@@ -13,7 +13,8 @@ import fes_pin as fp
 from fes_pin.data.sources import code_hash
 from harness import page, varied
 from harness.compare import compared
-from harness.generator import GENERATORS, Item, generator_of
+from harness.generator import Item
+from harness.generators import GENERATORS, generator_of
 from harness.row import Row
 from harness.run import REGRESSION, TEN_LINES, rows_of, run
 from harness.table import HEAD, against, counts, families, lines_of, notes, table, totals, worse, wrong

@@ -1,11 +1,10 @@
-"""What makes studies with known causes: one interface, and the generators by name."""
+"""What makes studies with known causes: one interface."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from importlib import import_module
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -79,42 +78,6 @@ class Generator(Protocol):
         ...
 
 
-GENERATORS = {
-    "free": ("free", "Free"),
-    "driven": ("driven", "Driven", "plain"),
-    "recorded": ("driven", "Driven", "recorded"),
-    "low-passed": ("driven", "Driven", "low-passed"),
-    "every-fifth": ("driven", "Driven", "every-fifth"),
-    "play": ("driven", "Driven", "play"),
-    "laboratory": ("driven", "Driven", "laboratory"),
-    "swing-up": ("driven", "Driven", "swing-up"),
-    "arm": ("driven", "Driven", "arm"),
-    "stimulated": ("driven", "Driven", "stimulated"),
-    "imposed": ("imposed", "Imposed"),
-    "contrast": ("contrast", "Pairs"),
-    "halved": ("contrast", "Halved"),
-    "misread": ("misread", "Misread"),
-    "large": ("large", "Large"),
-    "by-trial": ("by_trial", "ByTrial"),
-    "walking": ("walking", "Walks"),
-}
-"""By name: module of this package, class, and what it is made with."""
-
-
 def shared() -> Path:
     """Folder of the measured data: FES_PIN_DATA, or `shared` beside the repository."""
     return Path(os.environ.get("FES_PIN_DATA") or Path(__file__).parents[3] / "shared")
-
-
-def generator_of(name: str) -> Generator:
-    """The generator of a name, or of a folder of studies whose answers lie in its folder `answers`.
-
-    Raises
-    ------
-    KeyError
-        There is none.
-    """
-    if Path(name, "answers").is_dir():
-        return import_module("harness.practice").Practice(Path(name))
-    module, kind, *given = GENERATORS[name]
-    return getattr(import_module(f"harness.{module}"), kind)(*given)

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from harness.generator import GENERATORS
+from harness.generators import GENERATORS
 from harness.row import Row
 from harness.table import HEAD, counts, interval, lines_of, table
 

@@ -22,7 +22,8 @@ import fes_pin as fp
 from fes_pin.data.sources import code_hash
 from harness import regression as regressions
 from harness import ten_lines
-from harness.generator import Generator, Item, Truth, generator_of
+from harness.generator import Generator, Item, Truth
+from harness.generators import generator_of
 from harness.row import Row, judged
 
 TRUTH = "truth.json"

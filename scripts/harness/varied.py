@@ -21,7 +21,8 @@ import numpy as np
 
 import fes_pin as fp
 from fes_pin.models.rigs import pulse_period
-from harness.generator import Item, Truth, generator_of, shared
+from harness.generator import Item, Truth, shared
+from harness.generators import generator_of
 from harness.row import STOPPED, read_only, sets_of
 from harness.run import TRUTH, code_of, each_of, ended_after, limited, lines_of_store, made
 from harness.table import CONFIDENCE_95, interval

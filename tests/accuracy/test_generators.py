@@ -10,7 +10,8 @@ from confusion_matrix import stimuli
 from frozen_answers.answers import beside_truth
 from frozen_answers.studies import COUNTS, studies
 from harness import run as runs
-from harness.generator import GENERATORS, Item, Truth, generator_of
+from harness.generator import Item, Truth
+from harness.generators import GENERATORS, generator_of
 from harness.run import answered
 
 import fes_pin as fp

@@ -11,7 +11,8 @@ import typer
 from harness import run as runs
 from harness.__main__ import main
 from harness.compare import compared
-from harness.generator import GENERATORS, Item, Truth, generator_of
+from harness.generator import Item, Truth
+from harness.generators import GENERATORS, generator_of
 from harness.row import Row, judged
 from harness.run import answered, rows_of, run
 from harness.table import counts, interval, lines_of, notes, worse, wrong

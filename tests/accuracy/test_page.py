@@ -3,7 +3,7 @@
 import json
 
 from harness import page
-from harness.generator import GENERATORS
+from harness.generators import GENERATORS
 from harness.row import Row
 
 

@@ -8,7 +8,7 @@ import gc
 from collections import Counter
 
 import pytest
-from harness.generator import generator_of
+from harness.generators import generator_of
 
 
 @pytest.fixture
