@@ -68,7 +68,7 @@ def as_wide_as_trials_differ(fitted: F, again: Sequence[Optimum]) -> F:
 def as_wide_as_estimates_differ(fitted: F, other: Optimum) -> F:
     """Return the fit with intervals that include the difference to another estimate, where that is significant.
 
-    Where the model is right both estimate the same, and the variance of their difference is at most that of the less
+    Parameters that the other fit does not have keep their intervals. Where the model is right both estimate the same, and the variance of their difference is at most that of the less
     efficient one. Where the difference is unusually large, the model is wrong by about that difference, and either
     estimate may be off by it.
 
@@ -77,11 +77,11 @@ def as_wide_as_estimates_differ(fitted: F, other: Optimum) -> F:
     Parameters
     ----------
     other
-        A fit of the same causes to the same trials by a less efficient estimator.
+        A fit to the same data by a less efficient estimator. What both have must mean the same in both.
     """
     known = dict(zip(other.free, np.diag(with_honest_intervals(other).covariance), strict=True))
     varies = np.array([known.get(n, np.inf) for n in fitted.free])
-    apart = np.array([other.values[n] - fitted.values[n] for n in fitted.free])
+    apart = np.array([other.values.get(n, fitted.values[n]) - fitted.values[n] for n in fitted.free])
     with np.errstate(all="ignore"):
         ratio = np.where(np.isfinite(varies) & (varies > 0.0), apart**2 / varies, 0.0)
     apart = np.where(ratio > chi2_quantile(1.0 - UNUSUAL_LEVEL, 1), apart, 0.0)

@@ -186,7 +186,7 @@ def test_they_hold_the_truth_where_an_error_of_form_sets_both_apart():
 
 def test_a_parameter_that_the_other_estimate_has_not_keeps_its_interval():
     one = level(np.random.default_rng(0).normal(size=400), np.ones(400))
-    other = replace(one, values={"level": 9.0}, free=("another",))
+    other = replace(one, values={"another": 9.0}, free=("another",))
     assert as_wide_as_estimates_differ(one, other).covariance == one.covariance
 
 
