@@ -1,7 +1,7 @@
 """The constants that decide about claims: levels, penalties, shares and orders, each with its source.
 
-The kinds of all other constants of inference are in docs/data/numbers.toml: most control an algorithm, guard arithmetic,
-or describe a sensor or a person.
+The kinds of all other constants of inference are in docs/data/numbers.toml: most of them control an algorithm, guard
+arithmetic, or describe a sensor or a person.
 """
 
 from fes_pin.infer.distributions import chi2_quantile, normal_quantile

@@ -68,7 +68,9 @@ def as_wide_as_trials_differ(fitted: F, again: Sequence[Optimum]) -> F:
 def as_wide_as_estimates_differ(fitted: F, other: Optimum) -> F:
     """Return the fit with intervals that include the difference to another estimate, where that is significant.
 
-    Parameters that the other fit does not have keep their intervals. Where the model is right both estimate the same, and the variance of their difference is at most that of the less
+    Parameters that the other fit does not have keep their intervals.
+
+    Where the model is right both estimate the same, and the variance of their difference is at most that of the less
     efficient one. Where the difference is unusually large, the model is wrong by about that difference, and either
     estimate may be off by it.
 

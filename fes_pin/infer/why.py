@@ -48,6 +48,12 @@ class Tried:
             return f"{test}), and does not lower the errors of prediction, or no more than an error of form may"
         return f"{test}, level {level:g}): not significant"
 
+    def cells(self) -> tuple[str, str, str]:
+        """Return its cells of a table: the set, its gain, and the p-value of the gain."""
+        test = "-" if math.isnan(self.p_value) else probability(self.p_value).removeprefix("p = ")
+        gain = f"{shown(self.gain, PRINTED):g}" if math.isfinite(self.gain) else "-"
+        return ", ".join(self.names), gain if self.is_possible else "impossible size", test
+
     def record(self) -> dict[str, Any]:
         """As JSON files have it."""
         test = {} if math.isnan(self.p_value) else {"p_value": p_shown(self.p_value)}
@@ -70,6 +76,8 @@ class Why:
         Candidates that a claim rejected.
     tried
         All other candidates that were fitted and are not named.
+    further
+        Family-wise p-value of the score of the most significant further candidate; 0 where all were fitted.
     """
 
     estimator: str
@@ -77,6 +85,7 @@ class Why:
     steps: tuple[Step, ...] = ()
     rejected: Mapping[str, Rejected] = field(default_factory=dict)
     tried: Mapping[str, Tried] = field(default_factory=dict)
+    further: float = 0.0
 
     def reasons(self) -> dict[str, str]:
         """Return why each candidate is not named, in words, those that a claim rejected first."""
@@ -89,6 +98,7 @@ class Why:
             "estimator": self.estimator,
             "level": self.level,
             "steps": [one.record() for one in self.steps],
+            **({"further_p_value": p_shown(self.further)} if self.further else {}),
             "rejected": {n: one.record() for n, one in self.rejected.items()},
             "tried": {n: one.record() for n, one in self.tried.items()},
         }
@@ -102,7 +112,8 @@ def why_of(state: State[Any, Any, Any]) -> Why:
         for one in set(names) - named - set(state.rejected):
             nearest.setdefault(one, names)
     tried = {n: _tried(sets, best, names, named < set(names)) for n, names in sorted(nearest.items())}
-    return Why(sets.estimator, sets.level(best), state.steps, Held(state.rejected), Held(tried))
+    further = sets.extension_p_value(best)
+    return Why(sets.estimator, sets.level(best), state.steps, Held(state.rejected), Held(tried), further)
 
 
 def _tried(sets: Sets[Any], best: Fitted, names: Names, extends: bool) -> Tried:

@@ -148,11 +148,17 @@ def _why(result: Result) -> list[Markup]:
     """How the answer was reached, and why each other candidate is not named."""
     if (why := result.why) is None:
         return []
-    rows: list[list[Content]] = [[element("code", name), words] for name, words in why.reasons().items()]
     said = f"Estimator: {why.estimator}. A cause is named at a family-wise level of {why.level:g}. "
     said += f"What changed the answer of the search: {'; '.join(map(str, why.steps)) or 'nothing'}."
-    table = html_table(("candidate", "why it is not named"), rows, prose=True)
-    return [element("p", said), *([folded(f"{len(rows)} other candidates", table)] if rows else [])]
+    if why.further:
+        said += f" By its score the most significant further cause of the answer has {probability(why.further)}."
+    rejected: list[list[Content]] = [
+        [element("code", n), one.reason, probability(one.p_value)] for n, one in why.rejected.items()
+    ]
+    tried: list[list[Content]] = [[element("code", n), *one.cells()] for n, one in why.tried.items()]
+    head = ("candidate", "nearest fitted set", "twice the log-likelihood, against the answer", "p")
+    parts = [html_table(("rejected", "why", "p"), rejected, prose=True)] if rejected else []
+    return [element("p", said), *parts, folded(f"{len(tried)} other candidates", html_table(head, tried, (2, 3)))]
 
 
 def _by_group(change: Change) -> Markup:

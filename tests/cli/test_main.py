@@ -120,7 +120,10 @@ def test_every_cause_has_an_answer_to_why(made, diagnosis, tmp_path, monkeypatch
     assert other.startswith("sensor_lag: ") and diagnosis.explain("sensor_lag") == [other]
     assert unknown.startswith("nonsense: not searched; candidates were ") and "sensor_lag" in unknown
     told = record(tmp_path / "why")["why"]
-    assert set(told) == {"estimator", "level", "steps", "rejected", "tried"} and "sensor_lag" in told["tried"]
+    assert (
+        set(told) == {"estimator", "level", "steps", "further_p_value", "rejected", "tried"}
+        and "sensor_lag" in told["tried"]
+    )
     searched = {*told["tried"], *told["rejected"], *diagnosis.absorbed, *(c.name for c in diagnosis.causes)}
     assert searched >= {e.name for e in EFFECTS if "ankle" in e.rigs and not e.is_fault}
     assert "Why these, and no others" in (tmp_path / "why/report.html").read_text()
