@@ -8,7 +8,7 @@ from fes_pin.identify.afar import is_rounding
 from fes_pin.identify.likelihood import is_simulated
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.distributions import chi2_tail
-from fes_pin.infer.levels import FORM_SHARE, NOTHING_PERCENT
+from fes_pin.infer.levels import FORM_GAIN, NOTHING_PERCENT
 from fes_pin.infer.scatter import excess_scatter, least_apart
 from fes_pin.infer.search import Search
 from fes_pin.remainder.lack_of_fit import lack_of_fit
@@ -72,7 +72,7 @@ class LikelihoodModels(LikelihoodFits):
 
     def is_error_of_form(self, larger: LikelihoodFit, gain: float, explained: float) -> bool:
         """Return whether a gain is no more than an error of form may leave, and no process noise takes that up."""
-        return not larger.noise.acting and gain < FORM_SHARE * explained
+        return not larger.noise.acting and gain < FORM_GAIN * explained
 
     def predicts_better(self, larger: LikelihoodFit, smaller: LikelihoodFit) -> bool:
         """Return whether a larger set has the smaller error by which it is judged, on the trials it was fitted to."""

@@ -9,7 +9,7 @@ from fes_pin.diagnosis.errors_ahead import RandomPart, are_large, random_parts
 from fes_pin.identify.fit import Fit, noise_of, rough_noise
 from fes_pin.identify.likelihood import LikelihoodProblem, is_simulated
 from fes_pin.identify.likelihood_fit import LikelihoodFit
-from fes_pin.infer.levels import CERTAIN_LEVEL, FORM_SHARE, NOTHING_PERCENT, SEPARABLE, SMALL_PERCENT, SMALL_SHARE
+from fes_pin.infer.levels import CERTAIN_LEVEL, FORM_GAIN, NOTHING_PERCENT, SEPARABLE, SMALL_PERCENT, SMALL_SHARE
 from fes_pin.infer.result import Remainder
 from fes_pin.infer.text import WHOLE
 from fes_pin.infer.verdict import Rejected
@@ -56,7 +56,7 @@ def with_rejected_causes(
     if are_large(random):
         share = max(WHOLE * r.share for r in random)
         return replace(left, unexplained=True, where="effort", reason=f"a random effort of {share:.2g} % is needed")
-    certain = [n for n, r in rejected.items() if r.p_value < CERTAIN_LEVEL and r.share >= FORM_SHARE]
+    certain = [n for n, r in rejected.items() if r.p_value < CERTAIN_LEVEL and r.share >= FORM_GAIN]
     certain = [n for n in certain if rejected[n].gain.percent > NOTHING_PERCENT]
     if certain:
         surest = min(certain, key=lambda n: rejected[n].p_value)

@@ -49,9 +49,12 @@ MISREAD_SCORE = 10.0
 
 SMALL_SHARE = 0.1
 """Small share of a whole, in amplitude. Theory: it adds half a percent to a root mean square."""
-FORM_SHARE = 0.0625
-"""Share of the gain of all causes that an error of form may leave. Theory: an error of a quarter in a cause's form
-leaves a quarter, squared, of its likelihood to another, similar cause."""
+FORM_SHARE = 0.25**2
+"""Share of the squared error of all causes that an error of form may leave. Theory: an error of a quarter in a cause's
+form leaves a quarter, squared, of what the cause explains to another, similar cause."""
+FORM_GAIN = FORM_SHARE
+"""Share of the gain of all causes in log-likelihood that it may leave. Theory: the same, as the log-likelihood of small
+errors is proportional to their squares."""
 IDENTIFIABLE_SHARE = 0.04
 """Share of its norm that a sensitivity must keep, once fitted parameters are projected off, to be testable. Theory:
 a share s inflates a standard deviation by 1 / s, here 25 times (variance inflation: Belsley, Kuh and Welsch
