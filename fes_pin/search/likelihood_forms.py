@@ -1,17 +1,21 @@
 """Forms of the causes of a fitted set: one refinement more or one fewer, and whether refinements are identified."""
 
 from collections.abc import Callable, Mapping, Sequence
+from typing import TypeVar
 
 import numpy as np
 
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood_fit import LikelihoodFit, maximum_from
 from fes_pin.infer.distributions import chi2_quantile, chi2_tail
-from fes_pin.infer.fits import F, more_degrees
+from fes_pin.infer.fits import more_degrees
 from fes_pin.infer.levels import CONFIDENCE_95
+from fes_pin.infer.scatter import excess_scatter
 from fes_pin.search.likelihood_maxima import better, less, look
 from fes_pin.search.starts import STARTED, STARTS, number_of_forms, refinements
 from fes_pin.workers import in_parallel
+
+FormFit = TypeVar("FormFit", bound=Fit)
 
 
 def refined_form(base: LikelihoodFit, measured: Mapping[str, np.ndarray]) -> LikelihoodFit | None:
@@ -42,11 +46,12 @@ def simplified_form(base: LikelihoodFit) -> LikelihoodFit | None:
 
 
 def demanded_form(
-    base: F, looks: Sequence[F], level: float, finished: Callable[[Sequence[F]], Sequence[F]]
-) -> F | None:
+    base: FormFit, looks: Sequence[FormFit], level: float, finished: Callable[[Sequence[FormFit]], Sequence[FormFit]]
+) -> FormFit | None:
     """Return the best fit of a set in another form that is significant; None where none is.
 
-    A form is fitted further only if its first fit, at the noise of the base, gains half of what is required.
+    Its gain is corrected for scatter between pieces of the data, as that of a cause is. A form is fitted further only
+    if its first fit, at the noise of the base, gains half of what is required.
 
     Parameters
     ----------
@@ -61,9 +66,10 @@ def demanded_form(
     demanded = chi2_quantile(1.0 - level, 1)
     worth = [f for f in looks[:STARTS] if base.sse - f.sse > STARTED * max(demanded, base.sse - looks[0].sse)]
     best = min(finished(worth), key=lambda f: f.criterion, default=None)
-    if best is None or not chi2_tail(max(base.sse - best.sse, 0.0), more_degrees(best, base)) < level:
+    if best is None:
         return None
-    return best
+    gain = max(base.sse - best.sse, 0.0) / excess_scatter(best, base)
+    return best if chi2_tail(gain, more_degrees(best, base)) < level else None
 
 
 def is_identified(fitted: Fit, before: Fit | None = None) -> bool:
