@@ -21,7 +21,8 @@ class Tried:
     Attributes
     ----------
     names
-        That set: the answer with the candidate if it was fitted, else the set of lowest criterion.
+        That set: the answer with the candidate if it was fitted, else the set of lowest criterion; without rejected
+        candidates, where one was fitted.
     gain
         Its gain over the answer in twice the log-likelihood.
     p_value
@@ -42,10 +43,11 @@ class Tried:
             return f"in the nearest set a size is not physically possible ({names})"
         size = f"{shown(abs(self.gain), PRINTED):g}"
         if math.isnan(self.p_value):
-            return f"twice the log-likelihood of the nearest set ({names}) is {size} less than that of the answer"
+            than = f"{'more' if self.gain > 0.0 else 'less'} than that of the answer"
+            return f"twice the log-likelihood of the nearest set ({names}) is {size} {than}"
         test = f"added to the answer it raises twice the log-likelihood by {size} ({probability(self.p_value)}"
         if self.p_value < level:
-            return f"{test}), and does not lower the errors of prediction, or no more than an error of form may"
+            return f"{test}), and lowers no error of prediction, or gains no more than an error of form may"
         return f"{test}, level {level:g}): not significant"
 
     def cells(self) -> tuple[str, str, str]:
@@ -108,8 +110,9 @@ def why_of(state: State[Any, Any, Any]) -> Why:
     """Return how the state of a verdict was reached, and why its other candidates are not named."""
     sets, best, named = state.search.sets, state.found.best, state.names
     nearest: dict[str, Names] = {}
-    for names in sorted(sets.fits, key=lambda k: (not named < set(k), sets.fits[k].criterion)):
-        for one in set(names) - named - set(state.rejected):
+    rejected = set(state.rejected)
+    for names in sorted(sets.fits, key=lambda k: (bool(rejected & {*k}), not named < {*k}, sets.fits[k].criterion)):
+        for one in {*names} - named - rejected:
             nearest.setdefault(one, names)
     tried = {n: _tried(sets, best, names, named < set(names)) for n, names in sorted(nearest.items())}
     further = sets.extension_p_value(best)
