@@ -11,7 +11,7 @@ from fes_pin.infer.text import listed, percent, probability
 from fes_pin.models.catalogue import Catalogue, installed
 from fes_pin.models.stage import Effect
 
-SEEN = "(would have been seen in 95 of 100 beyond)"
+SEEN = "would have been seen in 95 of 100"
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -56,10 +56,12 @@ class Contrast(Result):
         """The changes, most significant first."""
         return self.causes
 
-    @property
-    def untested(self) -> tuple[str, ...]:
-        """Parameters and causes whose change is not testable."""
-        return self.untestable
+    def not_fitted(self) -> list[tuple[str, str]]:
+        """Return what is said of changes by their scores, in words."""
+        seen = {n: f"{p.value:.2g} {p.unit}".strip() for n, p in self.excluded.items()}
+        seen |= {n: percent(100.0 * share) for n, share in self.unchanged.items()}
+        said = [(n, f"did not change by its score: more than {size} {SEEN}") for n, size in seen.items()]
+        return said + [(n, "not testable with these data") for n in self.untestable]
 
     def title(self) -> str:
         """The verdict in a few words."""
@@ -99,8 +101,8 @@ class Contrast(Result):
         rows = [
             ("in all groups alike, so no change", ", ".join(self.common)),
             ("repeats scatter by (standard deviation)", _shares(self.repeats)),
-            (f"did not change {SEEN}", _shares(self.unchanged)),
-            (f"did not come {SEEN}", ", ".join(sizes)),
+            (f"did not change ({SEEN} beyond)", _shares(self.unchanged)),
+            (f"did not come ({SEEN} beyond)", ", ".join(sizes)),
             ("could have changed unseen", ", ".join(self.untestable)),
             ("fitted by", "predictions one sample ahead" if self.driven else "simulations from the inputs"),
             ("lack of fit", state),  # a lack of fit that all groups share is an error of the model, and is a warning

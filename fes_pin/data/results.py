@@ -177,10 +177,9 @@ class Result(Saveable):
         """The gain of all causes together, with its reference and measure; None without errors."""
         return next((one for one in reversed(self.errors()) if one.what == self.judged_on), None)
 
-    @property
-    def untested(self) -> tuple[str, ...]:
-        """Causes that are not testable with these data."""
-        return ()
+    def not_fitted(self) -> list[tuple[str, str]]:
+        """Return what is said of candidates without a fit of them, in words."""
+        return []
 
     def title(self) -> str:
         """Return the verdict in a few words."""
@@ -226,10 +225,10 @@ class Result(Saveable):
         said = [(one.name, f"named ({one.tested()})") for one in self.causes]
         said += [(n, f"equivalent to {one.name}, which is named") for one in self.causes for n in one.equivalents]
         said += list(self.why.reasons().items()) if self.why else []
-        said += [(n, "not testable with these data") for n in self.untested]
+        said += self.not_fitted()
         lines = [f"{n}: {words}" for n, words in said if name in (n, Key.of(n).name)]
         known = listed(sorted({Key.of(n).name for n, _ in said}))
-        return lines or [f"{name}: not searched; candidates were {known}"]
+        return lines or [f"{name}: not fitted; candidates were {known}"]
 
     def judged(self) -> list[tuple[str, str]]:
         """Return the measure and the data by which each cause is judged, with its gain."""
@@ -330,10 +329,9 @@ class ModelResult(Result):
     extended_error: tuple[float | None, float | None]
     ceiling_percent: float
 
-    @property
-    def untested(self) -> tuple[str, ...]:
-        """Causes that are not testable with these data."""
-        return self.absorbed
+    def not_fitted(self) -> list[tuple[str, str]]:
+        """Return the causes that are not testable, in words."""
+        return [(n, "not testable with these data") for n in self.absorbed]
 
     @property
     def model(self) -> Any:

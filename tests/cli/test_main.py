@@ -118,7 +118,7 @@ def test_every_cause_has_an_answer_to_why(made, diagnosis, tmp_path, monkeypatch
     named, other, unknown = capsys.readouterr().out.splitlines()[-4:-1]
     assert named.startswith("coulomb_friction: named (p ") and "twice the log-likelihood" in named
     assert other.startswith("sensor_lag: ") and diagnosis.explain("sensor_lag") == [other]
-    assert unknown.startswith("nonsense: not searched; candidates were ") and "sensor_lag" in unknown
+    assert unknown.startswith("nonsense: not fitted; candidates were ") and "sensor_lag" in unknown
     told = record(tmp_path / "why")["why"]
     assert (
         set(told) == {"estimator", "level", "steps", "further_p_value", "rejected", "tried"}

@@ -76,6 +76,10 @@ def test_one_change_is_named_alone_with_its_size(tmp_path):
     (item,), alone = found.fit.changes, found.fit.std("sensor_offset.offset:after")
     assert found.fit.certainty(item) == pytest.approx(one.value / alone)
     assert "sensor_offset" not in found.excluded
+    assert found.explain("sensor_offset")[0].startswith("sensor_offset: named (p ")
+    for name in (*found.excluded, *found.unchanged):
+        assert any("would have been seen in 95 of 100" in line for line in found.explain(name))
+    assert found.explain("nonsense")[0].startswith("nonsense: not fitted; candidates were ")
 
 
 def test_the_certainty_of_a_change_is_that_of_the_difference_between_groups(tmp_path):
