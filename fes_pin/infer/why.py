@@ -45,7 +45,8 @@ class Tried:
         if math.isnan(self.p_value):
             than = f"{'more' if self.gain > 0.0 else 'less'} than that of the answer"
             return f"twice the log-likelihood of the nearest set ({names}) is {size} {than}"
-        test = f"added to the answer it raises twice the log-likelihood by {size} ({probability(self.p_value)}"
+        changes = "raises" if self.gain > 0.0 else "lowers"
+        test = f"added to the answer it {changes} twice the log-likelihood by {size} ({probability(self.p_value)}"
         if self.p_value < level:
             return f"{test}), and lowers no error of prediction, or gains no more than an error of form may"
         return f"{test}, level {level:g}): not significant"

@@ -48,12 +48,13 @@ def test_a_rejected_candidate_has_its_claim_and_its_numbers(judged):
     ("tried", "words"),
     [
         (Tried(("a", "b"), 3.0, 0.2, True), "p = 0.2, level 0.01): not significant"),
+        (Tried(("a", "b"), -4.32, 1.0, True), "it lowers twice the log-likelihood by 4.32 (p = 1, level"),
         (Tried(("a", "b"), 90.0, 1e-9, True), "lowers no error of prediction"),
         (Tried(("b", "c"), 7.0, float("nan"), True), "(b and c) is 7 more than that of the answer"),
         (Tried(("b",), -1234.0, float("nan"), True), "(b) is 1230 less than that of the answer"),
         (Tried(("b",), 40.0, 1e-9, False), "not physically possible (b)"),
     ],
-    ids=["chance", "no better", "likelier", "in its place", "impossible"],
+    ids=["chance", "evidence against it", "no better", "likelier", "in its place", "impossible"],
 )
 def test_the_reason_follows_from_the_numbers(tried, words):
     assert words in tried.words(0.01)
