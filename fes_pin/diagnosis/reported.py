@@ -48,15 +48,11 @@ def diagnosis_of(
     state: RigState = choose(first, (white, LeastSquares(trials[1])), search.models.seed)
     verdict, found = state.verdict, state.found
     assert isinstance(verdict, RigVerdict)
-    left, again = verdict.lack_of_fit(state), [f.best for f in state.weighed.folds if f.within]
-    best, other = as_wide_as_trials_differ(with_honest_intervals(found.best), again), white.fit
-    other = other if state is first else first.found.best
-    if other is not None and other.names == best.names:
-        best = as_wide_as_estimates_differ(best, other)
+    left, best = verdict.lack_of_fit(state), _with_intervals(state, white.fit if state is first else first.found.best)
     fitted, *others = verdict.errors(state)
     held = others[0] if others else None
     on = HELD_OUT if trials[1] else CROSS_VALIDATED if held else FITTED
-    fits = verdict.gains_fitted(found)
+    fits = verdict.gains_fitted(found) if state.weighed.folds else state.weighed.gains
     causes = [_cause(verdict, state, e, best, (fits[e.name], on)) for e in best.model.effects if not e.is_fault]
     causes.sort(key=lambda c: -c.gain_held_out.percent)
     said = (*words_of_reading(best.noise, best.model.rig, trials[0]), *_words_of_far(search.models, found.nominal))
@@ -82,6 +78,21 @@ def diagnosis_of(
         why=why_of(state),
         ahead=AheadErrors(search.models.horizon_s, *fitted, *(held or (None, None))),
     )
+
+
+def _with_intervals(state: RigState, other: LikelihoodFit | None) -> LikelihoodFit:
+    """Return the fit of a set with intervals that include the differences between folds, and between two estimators.
+
+    Parameters
+    ----------
+    other
+        Fit by another estimator, which counts if it is of the same set; None without one.
+    """
+    again = [f.best for f in state.weighed.folds if f.within]
+    best = as_wide_as_trials_differ(with_honest_intervals(state.found.best), again)
+    if other is None or other.names != best.names:
+        return best
+    return as_wide_as_estimates_differ(best, other)
 
 
 def _words_of_far(models: LikelihoodFits, nominal: LikelihoodFit) -> list[str]:

@@ -115,8 +115,8 @@ def products_of(names: Sequence[str], info: Mapping[str, ParameterInfo]) -> list
     """Return places of shapes and of the amplitudes that they multiply, within one group where there are groups."""
     out = []
     for at, name in enumerate(names):
-        path, _, group = Key.of(name)
-        amplitude = str(Key(f"{path.rpartition('.')[0]}.{info[name].times}", group=group))
+        key = Key.of(name)
+        amplitude = str(key._replace(name=f"{key.name.rpartition('.')[0]}.{info[name].times}"))
         if info[name].times and amplitude in names:
             out.append((at, names.index(amplitude)))
     return out

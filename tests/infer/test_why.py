@@ -1,4 +1,4 @@
-"""Why candidates are named or not: rejected by a claim, not significant beside the answer, less likely in its place."""
+"""Why candidates are named or not: rejected by a claim, not significant in the extended answer, or less likely."""
 
 import numpy as np
 import pytest
@@ -29,8 +29,8 @@ def test_every_candidate_is_named_rejected_or_tried(judged):
     assert all(
         "not significant" in words or "less than that of the answer" in words for words in found.reasons().values()
     )
-    beside = [one for one in found.tried.values() if {"x03", "x11"} < set(one.names)]
-    assert all(one.p_value >= found.level and one.gain >= 0.0 for one in beside)
+    extended = [one for one in found.tried.values() if {"x03", "x11"} < set(one.names)]
+    assert all(one.p_value >= found.level and one.gain >= 0.0 for one in extended)
 
 
 def test_a_rejected_candidate_has_its_claim_and_its_numbers(judged):
