@@ -3,10 +3,10 @@
 import math
 import time
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from fes_pin.contrasts.changes import change_of, misread_change, not_changed
-from fes_pin.contrasts.faults import GroupConditions, is_likelier, late_in_groups
+from fes_pin.contrasts.faults import ASKED, GroupConditions, comparable
 from fes_pin.contrasts.fits import GroupedFits
 from fes_pin.contrasts.grouped import Grouped
 from fes_pin.contrasts.groups import BY_GROUP, grouped_study, in_groups, labels_of
@@ -20,10 +20,10 @@ from fes_pin.data.schema import IMPOSED
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.faults.conditions import Restated
-from fes_pin.faults.effort_noise import EffortNoise, words_of_noise
+from fes_pin.faults.effort_noise import EffortNoise
 from fes_pin.identify.correlation_time import words_of_reading
-from fes_pin.identify.effort_timing import words_of_lateness
 from fes_pin.identify.feedback import is_fed_back
+from fes_pin.infer.corrected import Correction
 from fes_pin.infer.why import why_of
 from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
 from fes_pin.models.nominal import nominal_model
@@ -31,9 +31,6 @@ from fes_pin.prepare.long_records import searched_part
 from fes_pin.prepare.measured import measured_study, split
 from fes_pin.prepare.plausibility import check_study
 from fes_pin.workers import Progress, noting_stops, one_thread_each, time_limit
-
-GroupsRestated = Restated[Grouped, ContrastModels]
-Searched = tuple[ContrastSearch, Found, GroupsRestated | None]
 
 UNCONFIRMED = "{} is significant in the fitted trials, but {}"
 
@@ -99,6 +96,22 @@ def contrast(
     return found.ended(began, made, limit if stops else None)
 
 
+@dataclass(frozen=True)
+class _Answer:
+    """A search that has run: its result, the trials that were restated for it, the log that was applied.
+
+    `recorded` are the trials that would be searched of the log as it is.
+    """
+
+    search: ContrastSearch
+    found: Found
+    made: Restated[Grouped, ContrastModels] | None
+    log: Log
+    recorded: list[Trial]
+    said: list[str]
+    tests: list[Correction]
+
+
 class _Work:
     """The steps from a study of groups to its contrast.
 
@@ -125,18 +138,24 @@ class _Work:
 
     def contrast(self) -> Contrast:
         """Search the changes, judge them, and return the contrast."""
-        noise = self._noise_of_efforts()
-        log, unit = Log(effort_noise=noise), self.nominal.rig.units()["effort"]
-        trials, said = self._searched([log.applied(t) for t in self.study.trials])
-        said += [words_of_noise(noise, unit)] if noise else []
-        search, found, made = self._found(trials)
-        if not self.stops and (late_s := late_in_groups(search.models, found)) is not None:
-            timed = Log(effort_late_s=late_s)
-            again = self._found([timed.applied(t) for t in trials])
-            if is_likelier(again[1].best, found.best):
-                (search, found, made), said = again, [words_of_lateness(timed), *said]
+        answer, tests = self._logged(Log(effort_noise=self._noise_of_efforts())), list[Correction]()
+        for estimate in ASKED:
+            fault = None if self.stops else estimate(answer.search.models, answer.found, answer.log, answer.recorded)
+            if fault is not None:
+                answer, test = fault.decided(answer, self._logged, lambda one: one.found.best, comparable)
+                tests.append(test)
         self.tell(0.9, "held-out evidence")
-        return self._judged(search, found, made, said)
+        said = [one.words for one in reversed(tests) if one.is_named]
+        return self._judged(answer, [*answer.said, *said], (*tests, *answer.tests))
+
+    def _logged(self, log: Log) -> _Answer:
+        """Return the answer for a log, before it is judged."""
+        trials, said = self._searched([log.applied(t) for t in self.study.trials])
+        recorded, _ = self._searched(self.study.trials)
+        conditions = GroupConditions(self.nominal, self._run)
+        with time_limit(self.end - time.perf_counter()):
+            found = conditions.search(trials)
+        return _Answer(*found, log, recorded, said, conditions.tests)
 
     def _noise_of_efforts(self) -> float:
         """Return the noise of recorded efforts in all groups, in their unit; 0 where the likelihood supports none."""
@@ -156,20 +175,16 @@ class _Work:
             said.append("a group has one trial only: differences between repeats are estimated from its parts")
         return out, said
 
-    def _found(self, trials: Sequence[Trial]) -> Searched:
-        """Return a search, its result, and the trials that were restated for it."""
-        with time_limit(self.end - time.perf_counter()):
-            return GroupConditions(self.nominal, self._run).search(trials)
-
     def _run(self, trials: Sequence[Trial]) -> tuple[ContrastSearch, Found]:
         effects = self.catalogue.effects_for(self.nominal.rig)
         models = ContrastModels(GroupedFits(self.nominal, in_groups(trials), self.driven, effects), self.seed)
         search = ContrastSearch(models, self.tell, POLICY)
         return search, search.run()
 
-    def _judged(self, search: ContrastSearch, found: Found, made: GroupsRestated | None, said: list[str]) -> Contrast:
+    def _judged(self, answer: _Answer, said: list[str], tests: tuple[Correction, ...]) -> Contrast:
         """Return the contrast of a search that has run."""
-        state = ContrastVerdict(search).of(found)
+        search, made = answer.search, answer.made
+        state = ContrastVerdict(search).of(answer.found)
         models, found, best, left = search.models, state.found, state.found.best, state.weighed.lack_of_fit
         evidence = state.weighed.evidence
         changes = [change_of(models, found, i, self.catalogue, evidence.get(str(i))) for i in best.changes]
@@ -197,7 +212,7 @@ class _Work:
             repeats=best.repeats,
             warnings=tuple(said),
             catalogue=self.catalogue,
-            why=why_of(state),
+            why=replace(why_of(state), corrections=tests),
         )
 
 

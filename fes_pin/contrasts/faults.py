@@ -1,8 +1,8 @@
 """Faults of a recording that are no change: a trial that states a wrong condition, efforts that were recorded late."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -10,14 +10,18 @@ from fes_pin.contrasts.fits import GroupedFits
 from fes_pin.contrasts.grouped import Grouped
 from fes_pin.contrasts.groups import in_groups
 from fes_pin.contrasts.models import ContrastModels, Found
-from fes_pin.data.log import EFFORT
+from fes_pin.data.log import EFFORT, Log
 from fes_pin.data.trial import Trial
 from fes_pin.faults.conditions import Conditions, Restated
+from fes_pin.faults.effort_noise import words_of_noise
+from fes_pin.faults.log_faults import EFFORT_NOISE, LATE_EFFORT, LogFault
 from fes_pin.faults.misread import Misread, find_misread
-from fes_pin.identify.effort_timing import lateness_of
+from fes_pin.identify.effort_timing import Lateness, lateness_of, words_of_lateness
 from fes_pin.identify.likelihood_fit import maximum_from
-from fes_pin.infer.levels import CLAIM_LEVEL
+from fes_pin.infer.levels import CERTAIN_GAIN, CLAIM_LEVEL
 from fes_pin.workers import attempted, in_parallel
+
+Fault = LogFault[Grouped]
 
 
 class GroupConditions(Conditions[Grouped, ContrastModels]):
@@ -37,38 +41,61 @@ class GroupConditions(Conditions[Grouped, ContrastModels]):
         """Return True: where nothing changed and nothing is wrong, no explanation is simpler."""
         return True
 
-    def saved(self, searched: Found, trials: Sequence[Trial], made: Restated[Grouped, ContrastModels]) -> float:
-        """Return the fall of the criterion, with the noise of the restated trials."""
-        best, after = searched.best, made.searched.best
-        fits = GroupedFits(self.nominal, in_groups(trials), best.is_driven)
-        return fits.again(best, after.weights).criterion - after.criterion
+    def pair(
+        self, made: Restated[Grouped, ContrastModels], trials: Sequence[Trial], searched: Found | None
+    ) -> tuple[Grouped, Grouped]:
+        """Return both fits with the noise of the restated trials."""
+        after = made.searched.best
+        best = after if searched is None else searched.best
+        return after, GroupedFits(self.nominal, in_groups(trials), best.is_driven).again(best, after.weights)
 
 
-def late_in_groups(models: ContrastModels, found: Found) -> float | None:
-    """Return the mean delay over groups with which efforts were recorded, s; None where those of a group are in time.
+def noise_in_groups(models: ContrastModels, found: Found, log: Log, recorded: Sequence[Trial]) -> Fault | None:
+    """Return the noise of efforts that was removed before the search, with a fit to the efforts as recorded."""
+    if not log.effort_noise:
+        return None
+    best = found.best
+    fits = GroupedFits(models.nominal_model, in_groups(recorded), best.is_driven)
+    bare = attempted(lambda: fits.again(best), best)
+    unit = models.nominal_model.rig.units()["effort"]
+    words = words_of_noise(log.effort_noise, unit)
+    return Fault(EFFORT_NOISE, replace(log, effort_noise=0.0), log, bare.sse - best.sse, words, bare)
 
-    A cause of all groups may be mistaken for a delay: the delay is then estimated with the nominal model as well.
+
+def late_in_groups(models: ContrastModels, found: Found, log: Log, recorded: Sequence[Trial]) -> Fault | None:
+    """Return the mean delay over groups with which efforts were recorded; None where no effort can be late.
+
+    Its gain is the least of a group. A cause of all groups may be mistaken for a delay: the delay is then estimated
+    with the nominal model as well.
     """
-    rig, trials = models.nominal_model.rig, [t for many in models.trials.values() for t in many]
-    if not models.driven or not all(EFFORT in rig.input_columns(t) for t in trials):
+    rig = models.nominal_model.rig
+    if not models.driven or not all(EFFORT in rig.input_columns(t) for t in recorded):
         return None
     asked = [found.best, found.nominal] if set(found.best.items) - set(found.best.changes) else [found.best]
-    return next((late for one in asked if (late := _late_in(models, one)) is not None), None)
+    late = [one for one in (attempted(partial(_late_in, models, f), None) for f in asked) if one is not None]
+    if not late:
+        return None
+    late_s, gain = next((one for one in late if one[1] > CERTAIN_GAIN), late[0])
+    timed = replace(log, effort_late_s=late_s)
+    return Fault(LATE_EFFORT, log, timed, gain, words_of_lateness(timed))
 
 
-def _late_in(models: ContrastModels, one: Grouped) -> float | None:
-    """Return the delay by a set, each group with nominal values of its own; None where one group is in time."""
+def _late_in(models: ContrastModels, one: Grouped) -> tuple[float, float]:
+    """Return the delay by a set, each group with nominal values of its own, and its least gain."""
 
-    def late_in(group: str) -> float:
+    def late_in(group: str) -> Lateness:
         part = models.maxima.part(one, group)
-        late = lateness_of(maximum_from(part, part.trials), min(t.dt for t in part.trials))
-        return math.nan if late is None else late.log.effort_late_s
+        return lateness_of(maximum_from(part, part.trials), min(t.dt for t in part.trials))
 
-    mean = attempted(lambda: float(np.mean(in_parallel(late_in, models.trials))), math.nan)
-    return mean if math.isfinite(mean) else None
+    late = in_parallel(late_in, models.trials)
+    return float(np.mean([each.log.effort_late_s for each in late])), min(each.gain for each in late)
 
 
-def is_likelier(timed: Grouped, recorded: Grouped) -> bool:
-    """Return whether corrected efforts explain the same readings with a lower criterion."""
-    one, other = ({n.correlation_s for n in f.weights.noise.values()} for f in (timed, recorded))
-    return one == other and timed.criterion < recorded.criterion
+def comparable(one: Grouped, other: Grouped) -> tuple[Grouped, Grouped] | None:
+    """Return two fits as they are; None where their noise has other correlation times, so that other readings count."""
+    times = ({n.correlation_s for n in f.weights.noise.values()} for f in (one, other))
+    return (one, other) if next(times) == next(times) else None
+
+
+ASKED = (noise_in_groups, late_in_groups)
+"""Faults of a log in the order in which they are estimated."""

@@ -4,7 +4,7 @@ An amplifier that is balanced before each trial may have another zero in each. W
 the penalised likelihood of the set that was found, in addition to its causes or in the place of one, the causes are
 searched again in a model that has it. That search is the answer if
 
-1. its penalised likelihood is lower,
+1. its penalised likelihood is lower, by more than what distinguishes the two (`infer.corrected`),
 2. the zeros differ significantly between trials, corrected for errors of form as any further parameter is,
 3. a nominal parameter that differs between trials cannot explain as much,
 4. a zero that is estimated from other parts of its trial lowers the errors of prediction.
@@ -23,6 +23,7 @@ from fes_pin.diagnosis.restate import Made, with_first
 from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.identify.likelihood_fit import LikelihoodFit, at_noise, maximum_from
 from fes_pin.identify.per_trial import as_parameters, cross_fitted_unknowns, halves, pieces
+from fes_pin.infer.corrected import Correction, lead_of
 from fes_pin.infer.distributions import chi2_quantile, chi2_tail
 from fes_pin.infer.fits import more_degrees
 from fes_pin.infer.levels import IDENTIFIABLE_SHARE, SEPARABLE, UNUSUAL_LEVEL
@@ -58,6 +59,11 @@ class ByTrial:
 
     effect: Effect
     p_value: float = 1.0
+
+    @property
+    def name(self) -> str:
+        """Of the fault."""
+        return SCALE if self.effect.scales else ZERO
 
     @property
     def path(self) -> str:
@@ -97,23 +103,27 @@ class ByTrial:
         return {t.name: ParameterEstimate(float(v), float(s), unit) for t, v, s in each}
 
 
-def with_faults(ran: Ran, ask: Ask, kinds: Sequence[type[Effect]]) -> tuple[Ran, list[ByTrial]]:
+def with_faults(
+    ran: Ran, ask: Ask, kinds: Sequence[type[Effect]], tests: list[Correction]
+) -> tuple[Ran, list[ByTrial]]:
     """Return a search, or that of a model with zeros and scales by trial, and these.
 
     Parameters
     ----------
     ran
         The search in a model without them.
+    tests
+        The tests of faults of the record, to which those of zeros and scales are added.
     """
     kinds = [e for e in kinds if e.of_record and e.name not in {one.name for one in ran[0].models.model.effects}]
-    found = attempted(lambda: _further(ran, ask, kinds), None)
+    found = attempted(lambda: _further(ran, ask, kinds, tests), None)
     if found is None:
         return ran, []
-    last, faults = with_faults(found[0], ask, kinds)
+    last, faults = with_faults(found[0], ask, kinds, tests)
     return last, [found[1], *faults]
 
 
-def _further(ran: Ran, ask: Ask, kinds: Sequence[type[Effect]]) -> tuple[Ran, ByTrial] | None:
+def _further(ran: Ran, ask: Ask, kinds: Sequence[type[Effect]], tests: list[Correction]) -> tuple[Ran, ByTrial] | None:
     """Return the search with a further kind of fault, and that; None where it is not the answer.
 
     It is not where a trial is restated as well, since that takes the place of the trial's zero.
@@ -126,8 +136,10 @@ def _further(ran: Ran, ask: Ask, kinds: Sequence[type[Effect]]) -> tuple[Ran, By
     one = fault.common(best)
     gain = max(one.sse - best.sse, 0.0) / excess_scatter(as_parameters(best, fault.effect), one)
     p_value = len(kinds) * float(chi2_tail(gain, more_degrees(best, one)))
-    lower = best.criterion < _on(ran[1].best, best.trials).criterion - SEPARABLE
-    named = p_value < best.level and lower and not (search.was_stopped or again or _is_scatter(best, fault.effect))
+    lead = lead_of(best, _on(ran[1].best, best.trials))
+    test = Correction(fault.name, min(p_value, 1.0), best.level, f"{kind.name} of each trial's own", *lead)
+    tests.append(test)
+    named = test.is_named and not (search.was_stopped or again or _is_scatter(best, fault.effect))
     return (other, replace(fault, p_value=p_value)) if named and search.models.predicts_better(best, one) else None
 
 
@@ -214,7 +226,7 @@ def with_fault(
     said = ", ".join(f"{n} {v.value:.3g}" for n, v in values.items())
     unit = " of their mean" if relative else f" {next(iter(values.values())).unit}".rstrip()
     cause = Cause(
-        name=SCALE if effect.scales else ZERO,
+        name=fault.name,
         stage=str(Stage.SENSOR),
         site=column,
         parameters=values,

@@ -4,6 +4,7 @@ import math
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -16,15 +17,21 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.by_trial import Ask, Ran, with_fault, with_faults
 from fes_pin.diagnosis.estimators import searched
 from fes_pin.diagnosis.likelihood_models import Found, LikelihoodModels, LikelihoodSearch, NominalFitError
-from fes_pin.diagnosis.logged import LogFaults, likelier, with_timing_of, with_words
+from fes_pin.diagnosis.logged import (
+    ASKED_OF_EFFORTS,
+    ASKED_OF_READINGS,
+    LogFaults,
+    comparable,
+    with_tests,
+    with_warnings,
+)
 from fes_pin.diagnosis.reported import diagnosis_of, unfitted
 from fes_pin.diagnosis.restate import StudyConditions, with_misread
 from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.diagnosis.testable import given_away
-from fes_pin.faults.misread import NAME as MISREAD
 from fes_pin.faults.misread import restated_trials
 from fes_pin.identify.feedback import is_fed_back, is_stimulus_fed_back
-from fes_pin.identify.recording import improves, low_pass_of
+from fes_pin.infer.corrected import Correction
 from fes_pin.infer.held_out import FOLDS
 from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
 from fes_pin.models.model import Model
@@ -34,7 +41,7 @@ from fes_pin.prepare.long_records import in_parts, searched_part
 from fes_pin.prepare.measured import measured_study, split
 from fes_pin.prepare.plausibility import check_study
 from fes_pin.search.likelihood_fits import MEASUREMENT, PROCESS
-from fes_pin.workers import Progress, attempted, noting_stops, one_thread_each, time_limit
+from fes_pin.workers import Progress, noting_stops, one_thread_each, time_limit
 
 LOOKED = 0.1
 """Share of a limit of time that the checks of the fitted nominal model may take in addition."""
@@ -110,7 +117,14 @@ class _Work:
         Time at which searches stop, of `time.perf_counter`.
     stops
         Not empty once a search was stopped; see `noting_stops`.
+
+    Attributes
+    ----------
+    tests
+        The tests of faults of the record of the study that was searched last.
     """
+
+    tests: list[Correction]
 
     def __init__(self, catalogue: Catalogue, seed: int, tell: Progress, end: float, stops: list[float]) -> None:
         self.catalogue, self.seed, self.tell, self.end, self.stops = catalogue, seed, tell, end, stops
@@ -119,22 +133,17 @@ class _Work:
         """Return the diagnosis of a study as recorded, with the faults of its log corrected where that is possible."""
         nominal, (train, _) = nominal_model(study), split(study)
         driven = _is_answered(nominal.rig, train)
-        logged = all(EFFORT in nominal.rig.input_columns(t) for t in study.trials)
+        logged = driven and all(EFFORT in nominal.rig.input_columns(t) for t in study.trials)
         faults = LogFaults(study.trials, lambda trials: _searched(study, trials, driven), self.end)
-        log = Log(effort_noise=faults.of_nominal(nominal)) if driven and logged else Log()
-        found = self._logged(study, log)
-        if not self.stops and (passed := _low_passed(found, self.end)) is not None:
-            found = _likelier(self.diagnosis(passed), found)
-        if not (driven and logged):
-            return found
-        if not self.stops and (noise := faults.effort_noise_of(found)) != found.log.effort_noise:
-            found = likelier(self._logged(study, replace(found.log, effort_noise=noise)), found)
-        late = None if self.stops else faults.lateness(found)
-        if late is not None:
-            recorded, log = found, with_timing_of(found.log, late.log)
-            found = likelier(self._logged(study, log), recorded)
-            late = None if found is recorded else late
-        return with_words(faults.with_timing(found, late))
+        answer = self._logged(study, Log(effort_noise=faults.of_nominal(nominal)) if logged else Log())
+        tests = list[Correction]()
+        for estimate in ASKED_OF_EFFORTS if logged else () if driven else ASKED_OF_READINGS:
+            fault = None if self.stops else estimate(faults, answer)
+            if fault is not None:
+                again = partial(self._logged, study)
+                answer, test = fault.decided(answer, again, lambda one: one.extended, comparable)
+                tests.append(test)
+        return with_warnings(with_tests(faults.with_timing(answer) if logged else answer, tests), tests)
 
     def _logged(self, study: Study, log: Log) -> Diagnosis:
         """Return the diagnosis of a study with the given faults of its log corrected."""
@@ -150,6 +159,7 @@ class _Work:
         test = test or spared
         effects = self.catalogue.effects_for(nominal.rig)
         ran: list[LikelihoodSearch] = []
+        self.tests = []
 
         def asked_of(model: Model) -> Ran:
             known = [e for e in effects if e.name not in {one.name for one in model.effects}]
@@ -161,7 +171,10 @@ class _Work:
                 ran.append(LikelihoodSearch(LikelihoodModels(model, parts, *own), self.tell))
                 return searched(ran[-1])
 
-            return StudyConditions(model, run).search(train)
+            conditions = StudyConditions(model, run)
+            found = conditions.search(train)
+            self.tests += conditions.tests
+            return found
 
         try:
             found = self._judged(study, nominal, asked_of, train, test)
@@ -175,7 +188,7 @@ class _Work:
         with time_limit(self.end - time.perf_counter()):
             first = ask(nominal)
             kinds = self.catalogue.effects_for(nominal.rig) if len(train) > 1 else ()
-            (search, found, again), faults = with_faults(first, ask, kinds)
+            (search, found, again), faults = with_faults(first, ask, kinds, self.tests)
         self.tell(0.88, "held-out gain")
         whole, stated = study, train
         if again is not None:
@@ -184,7 +197,9 @@ class _Work:
         diagnosis = diagnosis_of(whole, search, found, (train, test))
         for fault in faults:
             diagnosis = with_fault(diagnosis, fault, first[1].nominal, test, self.seed)
-        return diagnosis if again is None else with_misread(diagnosis, again, stated, test, self.seed)
+        if again is not None:
+            diagnosis = with_misread(diagnosis, again, stated, test, self.seed)
+        return with_tests(diagnosis, self.tests)
 
 
 def _is_answered(rig: Rig, trials: Sequence[Trial]) -> bool:
@@ -196,33 +211,6 @@ def _searched(study: Study, trials: Sequence[Trial], driven: bool) -> list[Trial
     """Return the trials of a study, or the parts of them, that a search fits."""
     train, _ = split(replace(study, trials=tuple(trials)))
     return in_parts(nominal_model(study).rig, searched_part(train, study.schema, driven)[0], driven)
-
-
-def _low_passed(diagnosis: Diagnosis, end: float) -> Study | None:
-    """Return the study with a low pass of its readings estimated; None where the likelihood does not support one.
-
-    A low pass is estimated only where a test of lack of fit rejects the model. For rigs in closed loop
-    `identify.correlation_time` estimates the correlation time of the noise instead.
-    """
-    restated = any(c.name == MISREAD for c in diagnosis.causes)
-    if not diagnosis.remainder.unexplained or diagnosis.is_driven or restated:
-        return None
-    nominal, study = diagnosis.nominal, diagnosis.study
-    cutoff = attempted(lambda: low_pass_of(nominal.model, nominal.trials), None, end - time.perf_counter())
-    log = Log(low_pass_hz=cutoff)
-    return None if cutoff is None else replace(study, trials=tuple(log.applied(t) for t in study.trials))
-
-
-def _likelier(passed: Diagnosis, recorded: Diagnosis) -> Diagnosis:
-    """Return the diagnosis with the low pass if it improves the likelihood of the residual noise enough."""
-    fits = passed.extended, recorded.extended
-    if not improves(*fits):
-        return recorded
-    trials = passed.extended.trials
-    names = " and ".join(dict.fromkeys(n for t in trials for n in passed.extended.model.rig.outputs(t.kind) if n in t))
-    cutoff = trials[0].low_pass_hz
-    said = f"{names} seems low-passed at {cutoff:.2g} Hz: the simulation was low-passed there as well"
-    return replace(passed, log=replace(passed.log, low_pass_hz=cutoff), warnings=(said, *passed.warnings))
 
 
 def few_trials(count: int) -> list[str]:

@@ -1,11 +1,14 @@
-"""Faults of a log: efforts that were recorded late or with noise."""
+"""Faults of a log as candidates: efforts that were recorded late or with noise, readings that were low-passed."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from fes_pin.data.log import Log
 from fes_pin.diagnosis.decide.rivals import estimates
 from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.faults.effort_noise import EffortNoise, words_of_noise
+from fes_pin.faults.log_faults import EFFORT_NOISE, LATE_EFFORT, LOW_PASS, LogFault
+from fes_pin.faults.misread import NAME as MISREAD
 from fes_pin.identify.effort_timing import (
     Lateness,
     lateness_of,
@@ -13,61 +16,95 @@ from fes_pin.identify.effort_timing import (
     with_timing_of_readings,
     words_of_lateness,
 )
-from fes_pin.identify.likelihood_fit import LikelihoodFit, maximum_from, with_white_process_noise
+from fes_pin.identify.likelihood import LikelihoodProblem, is_simulated
+from fes_pin.identify.likelihood_fit import LikelihoodFit, at_noise, maximum_from, with_white_process_noise
+from fes_pin.identify.recording import low_pass_of, words_of_low_pass
+from fes_pin.infer.corrected import Correction
 from fes_pin.infer.levels import PARAMETER_PENALTY
+
+Fault = LogFault[LikelihoodFit]
 
 
 class LogFaults(EffortNoise):
-    """Estimates of what a log did to the effort that drives a rig: its noise and its delay."""
+    """Estimates of what a log did to efforts and readings, each under an answer for the log as known so far."""
 
-    def effort_noise_of(self, diagnosis: Diagnosis) -> float:
-        """Return the same under a diagnosis; 0 where the efforts as recorded are likelier than the corrected ones."""
-        fitted, known = diagnosis.extended, diagnosis.log.effort_noise
-        if known:
-            as_recorded = self.prepared(self.trials)
-            return known * self.in_time(lambda: float(fitted.sse < maximum_from(fitted, as_recorded).sse), 1.0)
-        return self.in_time(lambda: self.of(fitted), 0.0) if diagnosis.verdict != "adequate" else 0.0
+    _late: Lateness | None = None
 
-    def lateness(self, diagnosis: Diagnosis) -> Lateness | None:
-        """Return the delay with which efforts were recorded; None where there is none, or no time to estimate it.
+    def low_pass(self, answer: Diagnosis) -> Fault | None:
+        """Return the low pass of the readings; None where no test of lack of fit asks for one.
 
-        Causes that were found may be mistaken for a delay. The delay is therefore estimated with the nominal model too;
-        it counts if the set has a lack of fit, or if it gives a lower criterion than all causes that were found.
+        For rigs in closed loop `identify.correlation_time` estimates the correlation time of the noise instead.
         """
-        return self.in_time(lambda: self._lateness(diagnosis), None)
+        restated = any(c.name == MISREAD for c in answer.causes)
+        if not answer.remainder.unexplained or answer.is_driven or restated:
+            return None
+        nominal = answer.nominal
+        found = self.in_time(lambda: low_pass_of(nominal.model, nominal.trials), None)
+        if found is None:
+            return None
+        hz, gain = found
+        names = [n for t in nominal.trials for n in nominal.model.rig.outputs(t.kind) if n in t]
+        log = replace(answer.log, low_pass_hz=hz)
+        return Fault(LOW_PASS, answer.log, log, gain, words_of_low_pass(hz, names))
 
-    def _lateness(self, diagnosis: Diagnosis) -> Lateness | None:
-        nominal, extended = diagnosis.nominal, diagnosis.extended
+    def effort_noise(self, answer: Diagnosis) -> Fault | None:
+        """Return the noise of efforts; None where the answer has no lack of fit or cause that it may explain."""
+        fitted, noise, bare = answer.extended, answer.log.effort_noise, None
+        if noise:
+            bare = self.in_time(lambda: maximum_from(fitted, self.prepared(self.trials)), fitted)
+            gain = bare.sse - fitted.sse
+        elif answer.verdict == "adequate":
+            return None
+        else:
+            noise, gain = self.in_time(lambda: self.of(fitted), (0.0, 0.0))
+        plain, log = (replace(answer.log, effort_noise=one) for one in (0.0, noise))
+        words = words_of_noise(noise, answer.model.rig.units()["effort"])
+        return Fault(EFFORT_NOISE, plain, log, gain, words, bare)
+
+    def lateness(self, answer: Diagnosis) -> Fault | None:
+        """Return the delay with which efforts were recorded; None where no time is left to estimate it."""
+        late = self.in_time(lambda: self._lateness(answer), None)
+        if late is None:
+            return None
+        self._late, log = late, with_timing_of(answer.log, late.log)
+        return Fault(LATE_EFFORT, answer.log, log, late.gain, words_of_lateness(late.log))
+
+    def _lateness(self, answer: Diagnosis) -> Lateness:
+        """Return the delay under an answer, or under the nominal model: causes may be mistaken for a delay.
+
+        That of the nominal model counts if the answer has a lack of fit, or a higher criterion.
+        """
+        nominal, extended = answer.nominal, answer.extended
         row_s = min(t.dt for t in extended.trials)
         as_logged = round(row_s / min(t.dt for t in self.trials)) == 1
         late = lateness_of(extended, row_s, as_logged)
-        if late is None and diagnosis.causes:
-            late = lateness_of(nominal, row_s, as_logged)
-            if late is not None and not diagnosis.remainder.unexplained:
-                criterion = late.cost + PARAMETER_PENALTY * (nominal.degrees + 1)
-                late = late if criterion < extended.criterion else None
-        return late
+        if late.is_certain or not answer.causes:
+            return late
+        plain = lateness_of(nominal, row_s, as_logged)
+        criterion = plain.cost + PARAMETER_PENALTY * (nominal.degrees + 1)
+        counts = answer.remainder.unexplained or criterion < extended.criterion
+        return plain if plain.is_certain and counts else late
 
-    def with_timing(self, diagnosis: Diagnosis, late: Lateness | None) -> Diagnosis:
-        """Return the diagnosis with intervals that include the uncertain timing of readings and efforts.
-
-        Parameters
-        ----------
-        late
-            The delay of the efforts, if they were moved.
-        """
-        row_s, fitted = min(t.dt for t in self.trials), diagnosis.extended
+    def with_timing(self, answer: Diagnosis) -> Diagnosis:
+        """Return an answer with intervals that include the uncertain timing of readings and efforts."""
+        row_s, fitted, late = min(t.dt for t in self.trials), answer.extended, self._late
 
         def widened(wide: LikelihoodFit, timed: Log) -> LikelihoodFit:
-            log = with_timing_of(diagnosis.log, timed)
+            log = with_timing_of(answer.log, timed)
             moved = self.prepared([log.applied(t) for t in self.trials])
             return with_lateness(wide, maximum_from(fitted, moved))
 
         wide = known = self.in_time(lambda: with_timing_of_readings(fitted, row_s), fitted)
-        if late is not None:
-            wide = self.in_time(lambda: widened(known, late.at_most), known)
-        causes = tuple(c if c.words else replace(c, parameters=estimates(wide, c.name)) for c in diagnosis.causes)
-        return replace(diagnosis, extended=wide, causes=causes)
+        if late is not None and with_timing_of(answer.log, late.log) == answer.log:
+            at_most = late.at_most
+            wide = self.in_time(lambda: widened(known, at_most), known)
+        causes = tuple(c if c.words else replace(c, parameters=estimates(wide, c.name)) for c in answer.causes)
+        return replace(answer, extended=wide, causes=causes)
+
+
+ASKED_OF_READINGS: tuple[Callable[[LogFaults, Diagnosis], Fault | None], ...] = (LogFaults.low_pass,)
+ASKED_OF_EFFORTS = (LogFaults.effort_noise, LogFaults.lateness)
+"""Faults in the order in which they are estimated, of logs without and with efforts in closed loop."""
 
 
 def with_timing_of(log: Log, timed: Log) -> Log:
@@ -75,30 +112,34 @@ def with_timing_of(log: Log, timed: Log) -> Log:
     return replace(log, effort_late_s=timed.effort_late_s, effort_over_s=timed.effort_over_s)
 
 
-def likelier(other: Diagnosis, one: Diagnosis) -> Diagnosis:
-    """Return the likelier of two diagnoses of the same readings with different efforts.
+def comparable(one: LikelihoodFit, other: LikelihoodFit) -> tuple[LikelihoodFit, LikelihoodFit]:
+    """Return two fits of the same readings under noise of the same kind.
 
-    It has the lower criterion, both at the longer correlation time of measurement noise. If the process noise of one is
-    white, both are fitted with white process noise.
+    Measurement noise has the longer correlation time, and process noise is white if that of one is. Free simulations
+    have the autoregressive noise that their own residuals support.
     """
-    fits = [d.extended for d in (other, one)]
-    correlation_s, timed = max(f.noise.correlation_s for f in fits), any(f.noise.timed for f in fits)
-    first, second = (_as_random(f, correlation_s, timed) for f in fits)
-    return other if first.criterion < second.criterion else one
-
-
-def with_words(diagnosis: Diagnosis) -> Diagnosis:
-    """Return the diagnosis with warnings about efforts that are corrected."""
-    log, said = diagnosis.log, []
-    if log.effort_late_s or log.effort_over_s:
-        said.append(words_of_lateness(log))
-    if log.effort_noise:
-        said.append(words_of_noise(log.effort_noise, diagnosis.model.rig.units()["effort"]))
-    return replace(diagnosis, warnings=(*said, *diagnosis.warnings))
+    correlation_s = max(one.noise.correlation_s, other.noise.correlation_s)
+    timed = bool(one.noise.timed or other.noise.timed)
+    return _as_random(one, correlation_s, timed), _as_random(other, correlation_s, timed)
 
 
 def _as_random(fitted: LikelihoodFit, correlation_s: float, timed: bool) -> LikelihoodFit:
-    """Return the fit at a correlation time of measurement noise, with white process noise if asked for."""
     if fitted.noise.correlation_s != correlation_s:
         fitted = maximum_from(fitted, fitted.trials, replace(fitted.noise, correlation_s=correlation_s))
+    if is_simulated(fitted.noise, fitted.trials):
+        problem = LikelihoodProblem(fitted.model, fitted.trials, fitted.noise)
+        problem.noise = problem.with_orders(fitted.values, fitted.unknowns)
+        problem.renew(fitted.values, fitted.unknowns)
+        return at_noise(fitted, problem.noise)
     return with_white_process_noise(fitted) if timed and not fitted.noise.timed else fitted
+
+
+def with_tests(answer: Diagnosis, tests: Sequence[Correction]) -> Diagnosis:
+    """Return an answer with further tests of faults of its record; of a fault that was tested again, the last."""
+    known = {one.name: one for one in (*(answer.why.corrections if answer.why else ()), *tests)}
+    return replace(answer, why=answer.why and replace(answer.why, corrections=tuple(known.values())))
+
+
+def with_warnings(answer: Diagnosis, tests: Sequence[Correction]) -> Diagnosis:
+    """Return an answer with a warning about each fault of the log that is corrected."""
+    return replace(answer, warnings=(*(one.words for one in tests if one.is_named), *answer.warnings))

@@ -43,9 +43,12 @@ class StudyConditions(Conditions[LikelihoodFit, LikelihoodModels]):
         """Return whether no test finds a lack of fit in the restated trials."""
         return not lack_of_fit(made.searched.best).unexplained
 
-    def saved(self, searched: Found, trials: Sequence[Trial], made: Made) -> float:
-        """Return by how much the criterion falls."""
-        return searched.best.criterion - made.searched.best.criterion
+    def pair(self, made: Made, trials: Sequence[Trial], searched: Found | None) -> tuple[LikelihoodFit, LikelihoodFit]:
+        """Return the fits of both answers."""
+        best = made.searched.best
+        if searched is not None:
+            return best, searched.best
+        return best, maximum_from(best, in_parts(best.model.rig, trials, made.search.models.answered))
 
 
 def with_misread(

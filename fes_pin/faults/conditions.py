@@ -7,16 +7,16 @@ causes that the restated trials still need, with the parameter of the condition,
 need.
 """
 
-import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Generic
 
 from fes_pin.data.trial import Trial
-from fes_pin.faults.misread import Misread, restated_trials, takes_most
+from fes_pin.faults.misread import NAME, Misread, restated_trials, takes_most
+from fes_pin.infer.corrected import Answer, Correction, lead_of
 from fes_pin.infer.fits import F
-from fes_pin.infer.levels import PARAMETER_PENALTY, SEPARABLE
+from fes_pin.infer.levels import CLAIM_LEVEL
 from fes_pin.infer.search import M, Search, SearchResult
 from fes_pin.models.model import Model
 from fes_pin.workers import attempted
@@ -51,18 +51,29 @@ class Conditions(ABC, Generic[F, M]):
         The nominal model, with start values.
     run
         Search of trials.
+
+    Attributes
+    ----------
+    tests
+        The tests of the conditions that were doubted.
     """
 
     def __init__(self, nominal: Model, run: Callable[[list[Trial]], tuple[Search[F, M], SearchResult[F]]]) -> None:
         self.nominal, self.run = nominal, run
+        self.tests: list[Correction] = []
 
     @abstractmethod
     def misread(self, trials: Sequence[Trial], searched: SearchResult[F] | None) -> Misread | None:
         """Return the trial that is an outlier under the causes that were found, or under the nominal model."""
 
     @abstractmethod
-    def saved(self, searched: SearchResult[F], trials: Sequence[Trial], made: Restated[F, M]) -> float:
-        """Return by how much the criterion falls from the trials as stated to the restated ones."""
+    def pair(
+        self, made: Restated[F, M], trials: Sequence[Trial], searched: SearchResult[F] | None
+    ) -> tuple[Answer, Answer]:
+        """Return the fits of the answers for the restated trials and for the trials as stated, under the same noise.
+
+        Where the trials as stated were not searched, the second is a fit of the same set.
+        """
 
     def leaves_noise(self, made: Restated[F, M]) -> bool:
         """Return whether no test finds a lack of fit in the restated trials."""
@@ -80,6 +91,7 @@ class Conditions(ABC, Generic[F, M]):
         first = self._misread(trials, None)
         made = self._restated(trials, first) if first is not None and takes_most(first) else None  # one is always worst
         if made is not None and not made.searched.without and self.leaves_noise(made):
+            self._tested(made, trials, None)
             return made.search, made.searched, made
         search, searched = self.run(list(trials))
         if made is None and not search.was_stopped:
@@ -87,18 +99,17 @@ class Conditions(ABC, Generic[F, M]):
             misread = self._misread(trials, searched) if searched.without else first
             made = None if misread is None else self._restated(trials, misread)
             made = made if made is not None and self.is_explained(made) else None
-        if made is None or not self._is_cheaper(search, searched, trials, made):
+        if made is None or search.was_stopped or made.search.was_stopped:
             return search, searched, None
-        return made.search, made.searched, made
+        named = self._tested(made, trials, searched).is_named
+        return (made.search, made.searched, made) if named else (search, searched, None)
 
-    def _is_cheaper(
-        self, search: Search[F, M], searched: SearchResult[F], trials: Sequence[Trial], made: Restated[F, M]
-    ) -> bool:
-        """Return whether the criterion falls by more than the penalty of one condition among all that are stated."""
-        if search.was_stopped or made.search.was_stopped:
-            return False
-        criterion = PARAMETER_PENALTY + 2.0 * math.log(sum(len(self.nominal.rig.stated(t)) for t in trials))
-        return self.saved(searched, trials, made) > criterion + SEPARABLE
+    def _tested(self, made: Restated[F, M], trials: Sequence[Trial], searched: SearchResult[F] | None) -> Correction:
+        """Return the test of a misreading, one condition among all that are stated."""
+        misread, stated = made.misread, sum(len(self.nominal.rig.stated(t)) for t in trials)
+        lead = lead_of(*self.pair(made, trials, searched), degrees=1, tried=stated)
+        self.tests.append(Correction(NAME, misread.p_value, CLAIM_LEVEL, misread.words, *lead))
+        return self.tests[-1]
 
     def _misread(self, trials: Sequence[Trial], searched: SearchResult[F] | None) -> Misread | None:
         """Return a misreading; None where time is over, or where the model cannot be evaluated."""

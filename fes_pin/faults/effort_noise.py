@@ -53,19 +53,27 @@ class EffortNoise:
 
     def of_nominal(self, nominal: Model) -> float:
         """Return the noise of recorded efforts under the nominal model, in their unit; 0 where it is not supported."""
-        return self.in_time(lambda: self.of(LikelihoodFits(nominal, self.prepared(self.trials), ()).nominal()), 0.0)
 
-    def of(self, fitted: LikelihoodFit) -> float:
-        """Return the noise of recorded efforts under a fit to the prepared trials; 0 where none is supported."""
+        def certain() -> float:
+            noise, gain = self.of(LikelihoodFits(nominal, self.prepared(self.trials), ()).nominal())
+            return noise if gain > CERTAIN_GAIN else 0.0
+
+        return self.in_time(certain, 0.0)
+
+    def of(self, fitted: LikelihoodFit) -> tuple[float, float]:
+        """Return the likeliest noise of recorded efforts under a fit to the prepared trials, and its gain; 0 of none.
+
+        The gain is in twice the log-likelihood.
+        """
         left = np.concatenate([a.left_std for a in self.answers])
         std, time_s = (part.get("effort", 0.0) for part in (fitted.noise.std, fitted.noise.time))
         least = np.sqrt(EFFORT_NOISE_SHARE * 2.0 * std**2 * time_s / min(t.dt for t in self.trials))
         tried = [0.0, *(float(v) for v in np.unique(np.quantile(left, TRIED)) if v > least)]
         if len(tried) == 1:
-            return 0.0
+            return 0.0, 0.0
         costs = in_parallel(lambda noise: maximum_from(fitted, self.prepared(self._quieted(noise))).sse, tried)
         best = int(np.argmin(costs))
-        return tried[best] if costs[best] < costs[0] - CERTAIN_GAIN else 0.0
+        return tried[best], float(costs[0] - costs[best])
 
     def _quieted(self, noise: float) -> list[Trial]:
         """Return the trials with noise of that size removed from their efforts."""

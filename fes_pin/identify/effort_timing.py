@@ -76,15 +76,23 @@ class Lateness:
         the feedback of efforts, which is too large.
     at_most
         The log with the larger estimate.
+    gain
+        What the delay adds to twice the log-likelihood of the same model.
     """
 
     log: Log
     cost: float
     at_most: Log
+    gain: float
+
+    @property
+    def is_certain(self) -> bool:
+        """Whether the gain is significant."""
+        return self.gain > CERTAIN_GAIN
 
 
-def lateness_of(fitted: LikelihoodFit, row_s: float, as_logged: bool = False) -> Lateness | None:
-    """Return the delay with which the efforts of a fit's trials were recorded; None where there is none.
+def lateness_of(fitted: LikelihoodFit, row_s: float, as_logged: bool = False) -> Lateness:
+    """Return the delay with which the efforts of a fit's trials were recorded; the least delay where none is certain.
 
     Parameters
     ----------
@@ -111,14 +119,15 @@ def lateness_of(fitted: LikelihoodFit, row_s: float, as_logged: bool = False) ->
     ways = _WAYS if as_logged else _WAYS[:1]
     begun = in_parallel(lambda way: moved(way[0](LEAST_LATE_ROWS * row_s)).sse, ways)
     if min(begun) > fitted.sse - CERTAIN_GAIN:
-        return None
+        least = ways[int(np.argmin(begun))][0](LEAST_LATE_ROWS * row_s)
+        return Lateness(least, min(begun), least, fitted.sse - min(begun))
     worth = [way for way, sse in zip(ways, begun, strict=True) if sse < fitted.sse]
     found = {lowest(way, lambda log: moved(log).sse): way for way in worth}
     best = min(found, key=lambda log: moved(log).sse)
     answering = lowest(found[best], lambda log: moved(log).sse + cost_of_answers(moved(log), fitted.trials, log))
     late_s, over_s = (0.5 * (getattr(best, n) + getattr(answering, n)) for n in ("effort_late_s", "effort_over_s"))
     between = Log(effort_late_s=late_s, effort_over_s=over_s)
-    return Lateness(between, moved(between).sse, answering)
+    return Lateness(between, moved(between).sse, answering, fitted.sse - moved(best).sse)
 
 
 _WAYS: tuple[_Way, ...] = (

@@ -27,8 +27,11 @@ TRIED = 12
 """Cut-offs on a logarithmic grid, between which the best is then sought."""
 
 
-def low_pass_of(model: Model, trials: Sequence[Trial]) -> float | None:
-    """Estimate the cut-off of a low pass that readings went through, Hz; None of readings without one.
+def low_pass_of(model: Model, trials: Sequence[Trial]) -> tuple[float, float] | None:
+    """Estimate the low pass that readings went through; None of readings without one.
+
+    The power of the innovations must fall by `SMALL_SHARE`. For readings that were low-passed twice the log-likelihood
+    rises by 0.2 to 10 a sample; for others whose model misses a cause, by 0.07 at most.
 
     Parameters
     ----------
@@ -39,8 +42,9 @@ def low_pass_of(model: Model, trials: Sequence[Trial]) -> float | None:
 
     Returns
     -------
-    float or None
-        The cut-off in Hz, between ten periods in the shortest trial and a fifth of the sampling rate.
+    tuple or None
+        The cut-off in Hz, between ten periods in the shortest trial and a fifth of the sampling rate, and the gain in
+        twice the log-likelihood.
 
     Raises
     ------
@@ -67,16 +71,14 @@ def low_pass_of(model: Model, trials: Sequence[Trial]) -> float | None:
         return None
     near = (grid[best - 1], grid[best + 1])
     found = minimize_scalar(lambda x: _cost(fitted(x)), bounds=near, method="bounded", options={"xatol": 0.01})
-    return float(np.exp(found.x)) if improves(fitted(found.x), begun) else None
+    gain = _cost(begun) - _cost(fitted(found.x))
+    return (float(np.exp(found.x)), gain) if gain > SMALL_SHARE * sum(map(len, trials)) else None
 
 
-def improves(passed: Fit, recorded: Fit) -> bool:
-    """Return whether the residual noise of a fit with a low pass is likelier than that of a fit without.
-
-    The power of the innovations must fall by `SMALL_SHARE`. For readings that were low-passed twice the log-likelihood
-    rises by 0.2 to 10 a sample; for others whose model misses a cause, by 0.07 at most.
-    """
-    return _cost(passed) < _cost(recorded) - SMALL_SHARE * sum(map(len, recorded.trials))
+def words_of_low_pass(hz: float, names: Sequence[str]) -> str:
+    """Return a warning about readings that were low-passed."""
+    which = " and ".join(dict.fromkeys(names))
+    return f"{which} seems low-passed at {hz:.2g} Hz: the simulation was low-passed there as well"
 
 
 def _cost(fitted: Fit) -> float:
@@ -86,4 +88,4 @@ def _cost(fitted: Fit) -> float:
     return float(sum(2.0 * count * math.log(noise[n].innovation_std) for n, count in counts.items()))
 
 
-__all__ = ["improves", "low_pass_of"]
+__all__ = ["low_pass_of", "words_of_low_pass"]

@@ -12,7 +12,7 @@ difference chi-square test statistic for moment structure analysis, Psychometrik
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TypeVar
+from typing import Protocol, TypeVar
 
 import numpy as np
 
@@ -24,6 +24,19 @@ from fes_pin.infer.problem import Linearized, normal_equations
 from fes_pin.infer.projection import without_locals
 
 F = TypeVar("F", bound=Optimum)
+
+
+class Residuals(Protocol):
+    """A fit with its whitened residuals."""
+
+    @property
+    def sse(self) -> float:
+        """Twice the negative log-likelihood, up to a constant."""
+
+    @property
+    def parts(self) -> Sequence[Linearized]:
+        """Whitened residuals by trial."""
+
 
 PIECES = 40
 """Pieces of the data whose scores show a model's errors of form: enough to estimate a standard deviation within a
@@ -103,7 +116,7 @@ def excess_scatter(larger: Optimum, smaller: Optimum) -> float:
     return max(1.0, float(np.trace(np.linalg.pinv(own, hermitian=True) @ wide)) / len(more))
 
 
-def least_apart(likelier: Optimum, other: Optimum) -> float:
+def least_apart(likelier: Residuals, other: Residuals) -> float:
     """Return the lead in twice the log-likelihood above which a fit is distinguished from another of the same trials.
 
     With Delta the difference of their whitened residuals, the lead of the right one of two has the mean |Delta|^2 and

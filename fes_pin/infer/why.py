@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from fes_pin.infer.corrected import Correction
 from fes_pin.infer.fits import Fitted, Names, Sets, more_degrees
 from fes_pin.infer.result import Held, p_shown, shown
 from fes_pin.infer.text import listed, probability
@@ -81,6 +82,8 @@ class Why:
         All other candidates that were fitted and are not named.
     further
         Family-wise p-value of the score of the most significant further candidate; 0 where all were fitted.
+    corrections
+        The tests of the faults of the record.
     """
 
     estimator: str
@@ -89,11 +92,16 @@ class Why:
     rejected: Mapping[str, Rejected] = field(default_factory=dict)
     tried: Mapping[str, Tried] = field(default_factory=dict)
     further: float = 0.0
+    corrections: tuple[Correction, ...] = ()
 
     def reasons(self) -> dict[str, str]:
-        """Return why each candidate is not named, in words, those that a claim rejected first."""
+        """Return why each candidate is not named, in words, and the tests of faults of the record.
+
+        Those that a claim rejected come first.
+        """
         rejected = {n: str(one) for n, one in self.rejected.items()}
-        return rejected | {n: one.words(self.level) for n, one in self.tried.items()}
+        tried = {n: one.words(self.level) for n, one in self.tried.items()}
+        return rejected | tried | {one.name: str(one) for one in self.corrections}
 
     def record(self) -> dict[str, Any]:
         """As JSON files have it."""
@@ -104,6 +112,7 @@ class Why:
             **({"further_p_value": p_shown(self.further)} if self.further else {}),
             "rejected": {n: one.record() for n, one in self.rejected.items()},
             "tried": {n: one.record() for n, one in self.tried.items()},
+            "faults_of_record": {one.name: one.record() for one in self.corrections},
         }
 
 

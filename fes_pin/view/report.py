@@ -158,6 +158,8 @@ def _why(result: Result) -> list[Markup]:
     tried: list[list[Content]] = [[element("code", n), *one.cells()] for n, one in why.tried.items()]
     head = ("candidate", "nearest fitted set", "twice the log-likelihood, against the answer", "p")
     parts = [html_table(("rejected", "why", "p"), rejected, prose=True)] if rejected else []
+    doubted: list[list[Content]] = [[element("code", one.name), str(one)] for one in why.corrections]
+    parts += [html_table(("fault of the record", "test"), doubted, prose=True)] if doubted else []
     return [element("p", said), *parts, folded(f"{len(tried)} other candidates", html_table(head, tried, (2, 3)))]
 
 
