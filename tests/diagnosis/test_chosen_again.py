@@ -11,6 +11,7 @@ from fes_pin.diagnosis.decide.chosen_again import ChosenAgain, share_of
 from fes_pin.identify.fit import fit, fit_problem
 from fes_pin.identify.problem import Problem
 from fes_pin.infer.distributions import chi2_tail
+from fes_pin.infer.left_out import LeftOut
 from fes_pin.infer.levels import PARAMETER_PENALTY
 from fes_pin.infer.problem import normal_equations
 from fes_pin.models.effects import effect_named
@@ -36,12 +37,12 @@ def fits():
 
 @pytest.mark.parametrize("name", [(), *((n,) for n in NAMES)], ids=str)
 def test_a_step_ends_where_a_fit_to_the_other_trials_does(fits, name):
-    whole, again = fits[name], ChosenAgain(fits, improves)
+    whole = fits[name]
     for held in folds_of(whole.trials):
         others = [t for i, t in enumerate(whole.trials) if i not in held]
         refitted = fit_problem(Problem(whole.model, others, whole.noise), whole.values)
         many = sum(map(len, whole.trials)) / sum(map(len, others))
-        assert again._cost(name, held) == pytest.approx(many * refitted.sse, abs=PARAMETER_PENALTY)
+        assert LeftOut(whole).cost(held) == pytest.approx(many * refitted.sse, abs=PARAMETER_PENALTY)
 
 
 def test_the_true_cause_is_chosen_without_any_of_the_trials(fits):
@@ -87,10 +88,10 @@ def test_what_all_trials_promise_together_and_no_step_has_kept_counts_for_no_fol
     noise = StateSpaceNoise({"position": 1.0})
 
     def gained(fitted, held):
-        again = ChosenAgain({(): fitted}, improves)
-        others = [t for i, t in enumerate(again._trials[()]) if i not in held]
-        many = sum(t.readings for t in again._trials[()]) / sum(t.readings for t in others)
-        return many * sum(t.cost for t in others) - again._cost((), held)
+        left = LeftOut(fitted)
+        others = [t for i, t in enumerate(left.each) if i not in held]
+        many = sum(t.readings for t in left.each) / sum(t.readings for t in others)
+        return many * sum(t.cost for t in others) - left.cost(held)
 
     for held in folds_of(offset.trials):
         same = gained(as_likely(offset, noise), held)

@@ -6,11 +6,11 @@ import pytest
 from driven_rigs.draw import draw
 
 from fes_pin.data.study import read_study
-from fes_pin.diagnosis.decide.chosen_again import ChosenAgain
 from fes_pin.diagnosis.held_out import as_random_as_in_all, folds_of
 from fes_pin.diagnosis.likelihood_models import LikelihoodModels, LikelihoodSearch
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import maximise
+from fes_pin.infer.left_out import LeftOut
 from fes_pin.infer.levels import PARAMETER_PENALTY
 from fes_pin.infer.scatter import with_honest_intervals
 from fes_pin.models.effects import CoulombFriction, PeriodicTorque
@@ -74,5 +74,5 @@ def test_folds_take_the_end_of_what_moved_together_for_an_end(tmp_path):
     for held in folds_of(fitted.trials):
         others = as_random_as_in_all(fitted, [t for i, t in enumerate(fitted.trials) if i not in held])
         many = every / sum(len(p.residual) for p in others.parts)
-        cost = ChosenAgain({(): fitted}, lambda *_: True)._cost((), held)
+        cost = LeftOut(fitted).cost(held)
         assert cost == pytest.approx(many * others.sse, abs=PARAMETER_PENALTY)

@@ -17,11 +17,10 @@ from fes_pin.identify.ahead import free_residuals
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.problem import limits_of
-from fes_pin.infer.covariance import least_squares_step
 from fes_pin.infer.fits import Names
+from fes_pin.infer.left_out import LeftOut
 from fes_pin.infer.levels import FORM_SHARE
 from fes_pin.infer.optimum import minimise
-from fes_pin.infer.problem import normal_equations
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import StateSpaceNoise
 from fes_pin.workers import in_parallel
@@ -67,7 +66,7 @@ def prediction_error(fitted: LikelihoodFit, noise: StateSpaceNoise, folds: Seque
     """Return the logarithm of the mean squared error of simulations of trials left out in turn, averaged over trials.
 
     The logarithm keeps one large motion from deciding alone. The fit without some trials is approximated by one
-    Gauss-Newton step from the fit to all, as in `chosen_again`. Unknowns of a trial, as its initial state, are
+    Gauss-Newton step from the fit to all. Unknowns of a trial, as its initial state, are
     estimated from that trial.
 
     Parameters
@@ -78,21 +77,15 @@ def prediction_error(fitted: LikelihoodFit, noise: StateSpaceNoise, folds: Seque
         Numbers of the trials that are left out together.
     """
 
+    units, limits = LeftOut(fitted), limits_of(fitted.model, fitted.trials)
+
     def left_out(held: Sequence[int]) -> tuple[float, int]:
-        return _error(_without(fitted, held), [fitted.trials[i] for i in held], noise), len(held)
+        moved = {n: float(np.clip(v, *limits[n])) for n, v in units.values(held).items()}
+        trials = [fitted.trials[i] for i in held]
+        return _error(fitted.model.with_parameters(moved), trials, noise), len(held)
 
     means, counts = zip(*in_parallel(left_out, folds), strict=True)
     return float(np.average(means, weights=counts))
-
-
-def _without(fitted: LikelihoodFit, held: Sequence[int]) -> Model:
-    """Return the model without some trials, by one Gauss-Newton step from the fit to all."""
-    system = normal_equations([p for i, p in enumerate(fitted.parts) if i not in held])
-    moving = [k for k, n in enumerate(fitted.free) if n not in fitted.at_bound]
-    step = least_squares_step(system.hessian[np.ix_(moving, moving)], system.gradient[moving], rcond=1e-12)
-    limits = limits_of(fitted.model, fitted.trials)
-    moved = {n: fitted.values[n] + d for n, d in zip((fitted.free[k] for k in moving), step, strict=True)}
-    return fitted.model.with_parameters({n: float(np.clip(v, *limits[n])) for n, v in moved.items()})
 
 
 def _error(model: Model, trials: Sequence[Trial], noise: StateSpaceNoise) -> float:
