@@ -20,14 +20,12 @@ from fes_pin.infer.spread import ByUnit, Spread, units, usual_spread
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
 from fes_pin.search.library import Library
-from fes_pin.search.score import bounded_step
+from fes_pin.search.score import LEAST_KEPT, bounded_step, kept_of
 from fes_pin.search.starts import near_null, started
 from fes_pin.workers import in_parallel
 
 FITTED = 2
 """Parameters that are fitted along an item: the mean of all trials, and that of one group."""
-LEAST_KEPT = 1e-6
-"""Share of its norm that an item's sensitivity must keep to be scored: below it is rounding."""
 
 
 @dataclass(frozen=True)
@@ -225,8 +223,7 @@ def _score(one: _Probe, gram: np.ndarray, along: np.ndarray, norms: np.ndarray, 
     spread
         Spread of its first amplitude between trials.
     """
-    size = np.sqrt(np.maximum(np.diag(gram), 0.0))
-    kept = float(np.max(size / np.where(norms > 0.0, norms, np.inf), initial=0.0))
+    kept = kept_of(gram, norms)
     degrees = len(one.amplitudes) if one.effect is None else len(one.effect.fitted_parameters())
     if kept < LEAST_KEPT:
         return ItemScore(one.item, one.effect, 0.0, degrees, 0.0, np.inf, {}, spread)

@@ -6,9 +6,10 @@ C. R. Rao, Math. Proc. Camb. Phil. Soc. 44:50 (1948).
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Generic, TypeVar
 
 import numpy as np
 
@@ -18,30 +19,10 @@ from fes_pin.workers import in_parallel
 LARGEST = float(np.finfo(float).max) ** 0.25
 """Largest entry of a column, so that products of inner products stay finite; a column that diverges has no score."""
 
+B = TypeVar("B", bound=Hashable)
+
 DEPENDENT = 1e-10
 """Relative eigenvalue of the Gram matrix of scaled columns below which these are linearly dependent."""
-
-
-@dataclass(frozen=True)
-class Products:
-    """Inner products of columns with the fitted parameters projected off.
-
-    Attributes
-    ----------
-    gram
-        Shape (k, k).
-    along
-        Shape (k,): inner products with the residual.
-    before
-        Shape (k,): squared norms of the columns before projection.
-    by_trial
-        Columns of each trial with its own unknowns projected off.
-    """
-
-    gram: np.ndarray
-    along: np.ndarray
-    before: np.ndarray
-    by_trial: list[np.ndarray]
 
 
 class Projection:
@@ -97,29 +78,8 @@ class Projection:
         ]
         return [*own, self.shared[rows]]
 
-    def products(self, columns: Sequence[np.ndarray]) -> Products:
-        """Return inner products of columns, each of shape (m, any), computed trial by trial."""
-        begun = in_parallel(lambda k: self._partly(columns, k), range(len(self.trials)))
-        before, shared = (np.sum([b[j] for b in begun], axis=0) for j in (1, 2))
-        left = in_parallel(lambda k: self._left(begun[k][0], shared, k), range(len(self.trials)))
-        gram, along = (np.sum([one[j] for one in left], axis=0) for j in (0, 1))
-        return Products(gram, along, before, [b[0] for b in begun])
 
-    def _partly(self, columns: Sequence[np.ndarray], k: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return one trial's part of all columns with its own unknowns projected off, its squared norm before, and its
-        part of the inner products with the basis that all trials share."""
-        joined = np.concatenate([c[self.trials[k]] for c in columns], axis=1)
-        joined[~(np.abs(joined) < LARGEST)] = 0.0
-        left, shared = self.within(k, joined)
-        return left, np.einsum("mi,mi->i", joined, joined), shared
-
-    def _left(self, partly: np.ndarray, shared: np.ndarray, k: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return one trial's part of the Gram matrix of projected columns, and of their products with the residual."""
-        left = partly - self.shared[self.trials[k]] @ shared
-        return left.T @ left, left.T @ self.residual[self.trials[k]]
-
-
-class BlockColumns:
+class BlockColumns(Generic[B]):
     """Columns that are each zero outside one block of trials, with the fitted parameters projected off.
 
     With c such a column, the unknowns of its trials projected off, and B the basis that all trials share, the projected
@@ -135,11 +95,11 @@ class BlockColumns:
         Rows of each block, by name: whole trials.
     """
 
-    def __init__(self, projection: Projection, rows: Mapping[str, slice]) -> None:
+    def __init__(self, projection: Projection, rows: Mapping[B, slice]) -> None:
         self._projection, self._rows = projection, rows
-        self._pieces: dict[str, dict[int, tuple[slice, np.ndarray]]] = {name: {} for name in rows}
+        self._pieces: dict[B, dict[int, tuple[slice, np.ndarray]]] = {name: {} for name in rows}
 
-    def added(self, block: str, columns: np.ndarray) -> slice:
+    def added(self, block: B, columns: np.ndarray) -> slice:
         """Return the place of columns of a block, shape (m of the block, any); an array is added once."""
         known = self._pieces[block]
         if id(columns) not in known:
@@ -148,10 +108,11 @@ class BlockColumns:
         return known[id(columns)][0]
 
     @cached_property
-    def _blocks(self) -> dict[str, _Block]:
+    def _blocks(self) -> dict[B, _Block]:
         """The columns of each block that has some, with their inner products."""
-        pieces = {b: [columns for _, columns in known.values()] for b, known in self._pieces.items() if known}
-        return {b: self._block(self._rows[b], np.concatenate(many, axis=1)) for b, many in pieces.items()}
+        pieces = [(b, [columns for _, columns in known.values()]) for b, known in self._pieces.items() if known]
+        made = in_parallel(lambda one: self._block(self._rows[one[0]], np.concatenate(one[1], axis=1)), pieces)
+        return dict(zip((b for b, _ in pieces), made, strict=True))
 
     def _block(self, rows: slice, columns: np.ndarray) -> _Block:
         columns[~(np.abs(columns) < LARGEST)] = 0.0
@@ -164,29 +125,33 @@ class BlockColumns:
                 shared += part
         return _Block(columns, columns.T @ columns, columns.T @ self._projection.residual[rows], norms, shared)
 
-    def products(self, place: Mapping[str, slice]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def products(self, place: Mapping[B, slice]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return products of k sums of columns, shape (k, k), those with the residual, (k,), and norms before, (k,)."""
         each = [(self._blocks[b], at) for b, at in place.items()]
-        shared = np.sum([one.shared[:, at] for one, at in each], axis=0)
+        shared = self._shared(place)
         gram = np.sum([one.gram[at, at] for one, at in each], axis=0) - shared.T @ shared
         along = np.sum([one.along[at] for one, at in each], axis=0)
         return gram, along, np.sqrt(np.sum([one.norms[at] ** 2 for one, at in each], axis=0))
 
-    def gram(self, places: Sequence[Mapping[str, slice]]) -> tuple[np.ndarray, list[slice]]:
-        """Return the Gram matrix of columns of one block each, and the rows of each of the places."""
-        each = [(b, self._blocks[b], np.arange(at.start, at.stop)) for place in places for b, at in place.items()]
-        none = np.zeros((self._projection.shared.shape[1], 0))
-        shared = np.concatenate([none, *(one.shared[:, at] for _, one, at in each)], axis=1)
-        blocks, out = slices(len(at) for _, _, at in each), -shared.T @ shared
+    def _shared(self, place: Mapping[B, slice]) -> np.ndarray:
+        """Return products of k sums of columns with the basis that all trials share, shape (rank, k)."""
+        return np.asarray(np.sum([self._blocks[b].shared[:, at] for b, at in place.items()], axis=0))
+
+    def gram(self, places: Sequence[Mapping[B, slice]]) -> tuple[np.ndarray, list[slice]]:
+        """Return the Gram matrix of sums of columns, and the rows of each of the places."""
+        shared = [self._shared(place) for place in places]
+        joined = np.concatenate([np.zeros((self._projection.shared.shape[1], 0)), *shared], axis=1)
+        blocks, out = slices(one.shape[1] for one in shared), -joined.T @ joined
         for name, block in self._blocks.items():
-            own = [(rows, at) for rows, (b, _, at) in zip(blocks, each, strict=True) if b == name]
+            own = [(rows, place[name]) for rows, place in zip(blocks, places, strict=True) if name in place]
             if own:
-                here = np.concatenate([np.arange(rows.start, rows.stop) for rows, _ in own])
-                there = np.concatenate([at for _, at in own])
+                here, there = (
+                    np.concatenate([np.arange(s.start, s.stop) for s in many]) for many in zip(*own, strict=True)
+                )
                 out[np.ix_(here, here)] += block.gram[np.ix_(there, there)]
         return out, blocks
 
-    def by_unit(self, places: Sequence[Mapping[str, slice]], units: Sequence[slice]) -> tuple[np.ndarray, np.ndarray]:
+    def by_unit(self, places: Sequence[Mapping[B, slice]], units: Sequence[slice]) -> tuple[np.ndarray, np.ndarray]:
         """Return squares of the first projected column of each place, and products with the residual, by unit of rows.
 
         Returns

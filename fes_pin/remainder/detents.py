@@ -25,8 +25,9 @@ def detent_p_value(fitted: Fit, projection: Projection) -> float:
     free = tuple(f"{AngleWaves.name}.{n}" for n in AngleWaves.amplitudes())
     values = {n: fitted.values.get(n, v) for n, v in model.parameters().items()}
     parts = Problem(model, fitted.trials, fitted.noise, free).linearize(values, fitted.unknowns)
-    made = projection.products([np.concatenate([p.jacobian for p in parts])])
-    pairs = [slice(2 * j, 2 * j + 2) for j in range(len(SHORT_WAVES))]
-    scores = [float(made.along[b] @ least_squares_step(made.gram[b, b], made.along[b])) for b in pairs]
+    left = projection(np.concatenate([p.jacobian for p in parts]))
+    pairs = [left[:, 2 * j : 2 * j + 2] for j in range(len(SHORT_WAVES))]
+    along = [pair.T @ projection.residual for pair in pairs]
+    scores = [float(a @ least_squares_step(pair.T @ pair, a)) for a, pair in zip(along, pairs, strict=True)]
     inflation = max(1.0, float(np.median(scores)) / float(chi2_quantile(0.5, 2)))
     return min(1.0, len(scores) * float(chi2_tail(max(scores) / inflation, 2)))

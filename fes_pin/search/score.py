@@ -5,6 +5,7 @@ C. R. Rao, Math. Proc. Camb. Phil. Soc. 44:50 (1948).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -14,8 +15,11 @@ from fes_pin.infer.covariance import least_squares_step
 from fes_pin.infer.family import Family
 from fes_pin.infer.levels import PARAMETER_PENALTY
 from fes_pin.infer.problem import Linearized
-from fes_pin.infer.projection import Projection, slices
+from fes_pin.infer.projection import BlockColumns, Projection
 from fes_pin.models.stage import Effect
+
+LEAST_KEPT = 1e-6
+"""Share of its norm that a sensitivity must keep to be scored: below it is rounding."""
 
 
 @dataclass(frozen=True)
@@ -55,38 +59,31 @@ def score_test(parts: Sequence[Linearized], probes: Sequence[tuple[Effect, np.nd
     if not probes:
         return Scores([], np.zeros((0, 0)), [])
     projection = Projection(parts)
-    made = projection.products([columns for _, columns in probes])
-    blocks = slices(columns.shape[1] for _, columns in probes)
-    each = [(e, b, float(made.before[b].sum())) for (e, _), b in zip(probes, blocks, strict=True)]
-    out = [_score(e, made.gram[b, b], made.along[b], before) for e, b, before in each]
+    trials = dict(enumerate(projection.trials))
+    columns = BlockColumns(projection, trials)
+    places = [{k: columns.added(k, whole[rows]) for k, rows in trials.items()} for _, whole in probes]
+    each = [(effect, place) for (effect, _), place in zip(probes, places, strict=True)]
+    scored = [_score(effect, *columns.products(place)) for effect, place in each]
     if len(parts) > 1:
-        out += [_each(projection, e, [c[:, b] for c in made.by_trial], before) for e, b, before in each if e.varies]
-    return Scores(out, made.gram, blocks)
+        scored += [_each_trial(columns, effect, place) for effect, place in each if effect.varies]
+    return Scores(scored, *columns.gram(places))
 
 
-def _each(projection: Projection, one: Effect, partly: Sequence[np.ndarray], before: float) -> Scored:
-    """Return the score of a cause with amplitudes of each trial's own: its columns, cut into trials, side by side.
-
-    With c_i the columns of trial i, its own unknowns projected off, and B a basis of the parameters that all trials
-    share, the Gram matrix of the projected columns is diag(c_i' c_i) - (c_i' B_i) (c_j' B_j)'.
-    """
-    count = partly[0].shape[1]
-    gram = np.zeros((count * len(partly),) * 2)
-    for k, columns in enumerate(partly):
-        own = slice(count * k, count * (k + 1))
-        gram[own, own] = columns.T @ columns
-    trials = list(zip(partly, projection.trials, strict=True))
-    shared = np.concatenate([columns.T @ projection.shared[rows] for columns, rows in trials])
-    gram -= shared @ shared.T
-    along = np.concatenate([columns.T @ projection.residual[rows] for columns, rows in trials])
-    after = float(np.trace(gram))
+def _each_trial(columns: BlockColumns[int], one: Effect, place: Mapping[int, slice]) -> Scored:
+    """Return the score of a cause with amplitudes of each trial's own: a column of each amplitude in each trial."""
+    alone = [{k: at} for k, at in place.items()]
+    gram, _ = columns.gram(alone)
+    made = [columns.products(own) for own in alone]
+    along, norms = (np.concatenate([one[j] for one in made]) for j in (1, 2))
     effect = type(one).of_each_trial(**{n: getattr(one, n) for n in one.shapes()})
-    felt = np.diag(gram) > 1e-12 * np.diag(gram).max(initial=1e-300)
-    if not after > 1e-18 * max(before, 1e-300) or not felt.any():
+    felt, kept = np.diag(gram) > LEAST_KEPT**2 * np.diag(gram).max(initial=1e-300), kept_of(gram, norms)
+    if kept < LEAST_KEPT or not felt.any():
         return Scored(effect, 0.0, {}, 0.0)
     gram, along = gram[np.ix_(felt, felt)], along[felt]
-    gain = float(along @ least_squares_step(gram, along)) - PARAMETER_PENALTY * max(len(along) - count, 0)
-    return Scored(effect, gain, {}, float(np.sqrt(after / before)))
+    gain = float(along @ least_squares_step(gram, along)) - PARAMETER_PENALTY * max(
+        len(along) - len(norms) // len(alone), 0
+    )
+    return Scored(effect, gain, {}, kept)
 
 
 @dataclass(frozen=True)
@@ -112,16 +109,20 @@ class Scores:
         return Family(self.gram, self.blocks, seed, sum(s.effect.each_trial for s in self.scored))
 
 
-def _score(effect: Effect, gram: np.ndarray, along: np.ndarray, before: float) -> Scored:
+def _score(effect: Effect, gram: np.ndarray, along: np.ndarray, norms: np.ndarray) -> Scored:
     names, info, null = effect.amplitudes(), effect.parameters(), effect.nulls()
-    after = float(np.trace(gram))
-    if not after > 1e-18 * max(before, 1e-300):
+    kept = kept_of(gram, norms)
+    if kept < LEAST_KEPT:
         return Scored(effect, 0.0, {n: null[n] for n in names}, 0.0)
     nulls = np.array([null[n] for n in names])
     lower, upper = np.array([[info[n].lower, info[n].upper] for n in names]).T
     amplitudes, gain = bounded_step(gram, along, lower - nulls, upper - nulls)
-    values = dict(zip(names, (float(a) for a in amplitudes + nulls), strict=True))
-    return Scored(effect, gain, values, float(np.sqrt(after / before)))
+    return Scored(effect, gain, dict(zip(names, (amplitudes + nulls).tolist(), strict=True)), kept)
+
+
+def kept_of(gram: np.ndarray, norms: np.ndarray) -> float:
+    """Return the share of the norm of columns that is kept once fitted parameters are projected off."""
+    return math.sqrt(max(float(np.trace(gram)), 0.0) / max(float(norms @ norms), 1e-300))
 
 
 def bounded_step(gram: np.ndarray, along: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> tuple[np.ndarray, float]:

@@ -17,7 +17,7 @@ from fes_pin.infer.held_out import Errors, added_likelihood, deal, held_out_gain
 from fes_pin.infer.keys import Key
 from fes_pin.infer.optimum import Optimum
 from fes_pin.infer.problem import Linearized, normal_equations, whitened_sse
-from fes_pin.infer.projection import Products, Projection
+from fes_pin.infer.projection import Projection
 from fes_pin.infer.result import Evidence
 from fes_pin.infer.search import SearchResult
 from fes_pin.infer.verdict import Verdict, Weighed
@@ -84,17 +84,20 @@ class Regression(FittedSets[Optimum, None]):
 
     @cached_property
     def family(self) -> Family:
-        gram = self._products(self.fit(())).gram
+        left, _ = self._left_of_others(self.fit(()))
+        gram = left.T @ left
         return Family(gram, [slice(k, k + 1) for k in range(len(gram))], seed=0)
 
-    def _products(self, base: Optimum) -> Products:
+    def _left_of_others(self, base: Optimum) -> tuple[np.ndarray, np.ndarray]:
+        """The columns that a set lacks, and its residual, with its parameters projected off."""
+        projection = Projection(base.parts)
         others = [c[:, None] for n, c in self.columns.items() if n not in base.free]
-        return Projection(base.parts).products(others)
+        return projection(np.concatenate(others, axis=1)), projection.residual
 
     def _scores(self, base: Optimum) -> dict[str, float]:
-        made, others = self._products(base), [n for n in self.columns if n not in base.free]
-        power = np.diag(made.gram)
-        return {n: float(g**2 / p) for n, g, p in zip(others, made.along, power, strict=True) if p > 1e-9}
+        (left, residual), others = self._left_of_others(base), [n for n in self.columns if n not in base.free]
+        powers = np.sum(left**2, axis=0)
+        return {n: float(g**2 / p) for n, g, p in zip(others, residual @ left, powers, strict=True) if p > 1e-9}
 
     def candidates(self, base: Optimum) -> dict[str, Candidate[None]]:
         return {n: Candidate(score, None) for n, score in self._scores(base).items()}
