@@ -15,7 +15,6 @@ from fes_pin.data.schema import IMPOSED
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.by_trial import Ask, Ran, with_fault, with_faults
-from fes_pin.diagnosis.estimators import searched
 from fes_pin.diagnosis.likelihood_models import Found, LikelihoodModels, LikelihoodSearch, NominalFitError
 from fes_pin.diagnosis.logged import (
     ASKED_OF_EFFORTS,
@@ -169,7 +168,7 @@ class _Work:
                 own = (known, answered, self.seed, study.horizon_s, noise)
                 parts = trials if model.effects else in_parts(model.rig, trials, answered)
                 ran.append(LikelihoodSearch(LikelihoodModels(model, parts, *own), self.tell))
-                return searched(ran[-1])
+                return ran[-1], ran[-1].run()
 
             conditions = StudyConditions(model, run)
             found = conditions.search(train)

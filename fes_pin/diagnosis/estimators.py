@@ -9,39 +9,19 @@ from fes_pin.diagnosis.decide.by_prediction import FEWEST, best_predicting
 from fes_pin.diagnosis.errors_ahead import squared_errors
 from fes_pin.diagnosis.likelihood_models import Found, LikelihoodModels, LikelihoodSearch
 from fes_pin.diagnosis.verdict import RigState, RigVerdict
-from fes_pin.identify.afar import is_rounding
 from fes_pin.identify.likelihood_fit import LikelihoodFit, with_white_process_noise
 from fes_pin.identify.process_noise import step_s
 from fes_pin.infer.estimators import Estimator
 from fes_pin.infer.held_out import held_out_gain
 from fes_pin.infer.levels import NOTHING_PERCENT
 from fes_pin.infer.search import Policy
-from fes_pin.search.likelihood_fits import MEASUREMENT, PROCESS
+from fes_pin.search.likelihood_fits import MEASUREMENT
 from fes_pin.workers import attempted, in_parallel
 
 WHITE_PROCESS_NOISE = (
     "process noise is modelled as white: with coloured process noise the same model predicted worse over the horizon"
 )
 """Warning where the estimator with white process noise is the answer."""
-
-
-def searched(search: LikelihoodSearch) -> tuple[LikelihoodSearch, Found]:
-    """Run a search and return it with its result: without process noise first where the rig is not in closed loop.
-
-    Without process noise every prediction is a free simulation, which takes a third of the time. The search is made
-    again with process noise only if that improves the penalised likelihood of the best set. Errors of rounding are no
-    process noise.
-    """
-    found = search.run()
-    if search.was_stopped or search.models.noise != MEASUREMENT or is_rounding(found.best):
-        return search, found
-    acting = attempted(lambda: search.models.with_process_noise(found.best), found.best, search.seconds_left)
-    if not acting.criterion < found.best.criterion:
-        return search, found
-    other = LikelihoodSearch(search.models.with_noise(PROCESS), search.progress)
-    if acting.names:
-        other.models.calm = {**other.models.calm, acting.names: acting}
-    return _ended(other, attempted(other.run, None, search.seconds_left)) or (search, found)
 
 
 def _ended(search: LikelihoodSearch, found: Found | None) -> tuple[LikelihoodSearch, Found] | None:
