@@ -15,7 +15,7 @@ import numpy as np
 from fes_pin.infer.covariance import covariance_of
 from fes_pin.infer.optimize import WORTH
 from fes_pin.infer.optimum import Optimum, minimise
-from fes_pin.infer.problem import Unknowns, normal_equations
+from fes_pin.infer.problem import Problem, Unknowns, normal_equations
 from fes_pin.infer.scatter import at_rest
 from fes_pin.infer.scoring import LITTLE, NoisyProblem, fisher_scoring
 
@@ -26,13 +26,13 @@ ITERATIONS = 6
 
 
 def alternate(
-    problem: NoisyProblem,
+    problem: Problem,
     start: Mapping[str, float],
     unknowns: Unknowns | None = None,
     rounds: int = ROUNDS,
     iterations: int = ITERATIONS,
 ) -> Optimum:
-    """Fit parameters and noise in turn, and together where that leads further.
+    """Fit parameters and noise in turn, and those of a `NoisyProblem` together where that leads further.
 
     Returns
     -------
@@ -48,7 +48,9 @@ def alternate(
         goes_on = fitted.gradient_norm > WORTH and not problem.is_final
         if fitted.sse < before - (WORTH if goes_on else LITTLE):
             continue
-        return together(problem, fitted.values, fitted.unknowns) if goes_on else fitted
+        if goes_on and isinstance(problem, NoisyProblem):
+            return together(problem, fitted.values, fitted.unknowns)
+        return fitted
     return replace(fitted, converged=False)
 
 

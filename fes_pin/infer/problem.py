@@ -17,7 +17,10 @@ STEEPEST = 1e120
 
 @dataclass(frozen=True)
 class Linearized:
-    """One trial near a parameter value: whitened residual and sensitivities, all channels end to end.
+    """One trial near a parameter value: whitened residual and sensitivities.
+
+    Rows are in the order of time, with the channels of a sample next to each other. A piece of the rows is a piece of
+    time.
 
     Attributes
     ----------
@@ -66,8 +69,15 @@ class Problem(Protocol):
 
     @property
     def is_final(self) -> bool:
-        """False where derivatives are approximate: exact ones then lower the cost further at the end of a descent."""
+        """False where derivatives are approximate: exact ones then lower the cost further at the end of a descent.
+
+        These are the derivatives of a `NoisyProblem`.
+        """
         return True
+
+    def noise_step(self, values: Mapping[str, float], unknowns: Unknowns) -> float:
+        """Improve the noise in place, parameters held; return by how much the cost falls: 0 of known noise."""
+        return 0.0
 
     def start_unknowns(self) -> Unknowns:
         """Return start values of the unknowns of each trial."""

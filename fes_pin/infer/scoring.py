@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -60,6 +60,7 @@ class Evaluation:
         return cls(float(sum(p.cost for p in parts)), *(np.concatenate(each) for each in arrays))
 
 
+@runtime_checkable
 class NoisyProblem(Problem, Protocol):
     """A problem whose noise has parameters of its own."""
 
@@ -77,9 +78,6 @@ class NoisyProblem(Problem, Protocol):
     def costs(self, points: Sequence[tuple[Mapping[str, float], Unknowns]]) -> list[float]:
         """Return the cost at several points without sensitivities: less work than linearizing at one of them."""
         return [one.cost for one in self.evaluate([(values, unknowns, {}) for values, unknowns in points])]
-
-    def noise_step(self, values: Mapping[str, float], unknowns: Unknowns) -> float:
-        """Improve the noise in place, parameters held; return by how much the cost falls."""
 
     def set_noise(self, parameters: Mapping[str, float]) -> None:
         """Change parameters of the noise, in place."""

@@ -111,3 +111,10 @@ def test_noise_is_fitted_by_alternating_maximisation():
     assert found.converged
     assert problem.std == pytest.approx(STD * math.sqrt(2.0 * left.cost / found.samples), rel=0.01)
     assert found.values["rate"] == pytest.approx(left.x[1], abs=math.sqrt(LITTLE) * found.std("rate"))
+
+
+def test_parameters_and_noise_in_turn_need_no_more_than_a_problem_promises():
+    """Where the noise is known there is nothing to take turns with."""
+    problem = Decay()
+    plain, turns = minimise(problem, {"size": 1.0, "rate": 1.0}), alternate(problem, {"size": 1.0, "rate": 1.0})
+    assert turns.converged and turns.sse == pytest.approx(plain.sse, abs=LITTLE)
