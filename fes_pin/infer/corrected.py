@@ -39,7 +39,8 @@ class Correction:
         What was estimated.
     lead, least
         Fall of the penalised likelihood from the answer for the record to that for the corrected record, and the fall
-        that distinguishes them; NaN where no answer was searched for the corrected record.
+        that distinguishes them; NaN where no answer was searched for the corrected record, infinite where two answers
+        have noise of other kinds.
     """
 
     name: str
@@ -61,14 +62,14 @@ class Correction:
 
     def __str__(self) -> str:
         test = f"{probability(self.p_value)}, level {self.level:g}"
-        if math.isnan(self.lead):
-            return f"{test}: not significant"
+        if not math.isfinite(self.lead):
+            return f"{test}: {'the answers cannot be compared' if self.is_significant else 'not significant'}"
         why = f"twice the penalised log-likelihood {'rises' if self.lead > 0.0 else 'falls'} by {abs(self.lead):.3g}"
         return f"{self.words}: {why}, {self.least:.3g} distinguish ({test})"
 
     def record(self) -> dict[str, Any]:
         """As JSON files have it."""
-        searched = {} if math.isnan(self.lead) else {"lead": shown(self.lead), "least_lead": shown(self.least)}
+        searched = {} if not math.isfinite(self.lead) else {"lead": shown(self.lead), "least_lead": shown(self.least)}
         return {"named": self.is_named, "p_value": p_shown(self.p_value), "level": self.level, **searched}
 
 

@@ -45,6 +45,7 @@ def test_an_effort_that_was_written_down_late_is_moved(causes, request, tmp_path
     diagnosis = diagnose_joint(replace(study, trials=recorded))
     assert tuple(c.name for c in diagnosis.causes) == causes, str(diagnosis)
     assert any("ms after it acted, and was moved" in said or "between rows" in said for said in diagnosis.warnings)
+    assert any("distinguish" in said for said in diagnosis.explain("late_effort")), diagnosis.explain("late_effort")
     fitted = diagnosis.extended
     assert abs(fitted.values["inertia_scale"] - 1.0) < 4.0 * fitted.std("inertia_scale")
     check_that_a_prediction_knows(diagnosis, recorded[0], tmp_path)
