@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
 from fes_pin.infer.family import Family
+from fes_pin.infer.keys import Key
 from fes_pin.infer.levels import CLAIM_LEVEL, MOST_CAUSES, SEPARABLE
 from fes_pin.infer.optimize import WORTH
 
@@ -47,7 +48,7 @@ class Sets(ABC, Generic[F]):
     fits
         Fits by names in alphabetical order; `()` is the nominal model.
     most_candidates
-        Most candidates in a set; None for no bound.
+        Most candidates in a set; None for no bound. One candidate at several sites counts as one.
     converged_sets
         Number of best sets of a size that are fitted until they converge.
     family
@@ -79,6 +80,15 @@ class Sets(ABC, Generic[F]):
     @abstractmethod
     def without(self, names: Names, name: str) -> F:
         """Return the fit of a set without one candidate."""
+
+    def is_within(self, names: Names) -> bool:
+        """Return whether a set has no more candidates than `most_candidates`."""
+        most = self.most_candidates
+        return most is None or len({Key.of(n)._replace(site="") for n in names}) <= most
+
+    def has_room(self, names: Names) -> bool:
+        """Return whether a set may be extended by a further candidate, or by one of its own at another site."""
+        return self.is_within((*names, "")) or any(Key.of(n).site for n in names)
 
     def first(self) -> Names:
         """Return the fitted set that a search begins with: the nominal model, or one nearer to the data."""
@@ -265,7 +275,8 @@ class FittedSets(Sets[F], Generic[F, S]):
         known, forms = self.candidates(fitted), self.form_of(fitted)
         chosen = sorted(known, key=lambda n: (-known[n].gain, n))[:most]
         starts = {tuple(sorted((*base, n))): known[n].start for n in chosen}
-        missing = {k: s for k, s in starts.items() if (k, forms) not in self._begun and not self._has(k, forms)}
+        wanted = {k: s for k, s in starts.items() if self.is_within(k)}
+        missing = {k: s for k, s in wanted.items() if (k, forms) not in self._begun and not self._has(k, forms)}
         self._begun.update((k, forms) for k in missing)
         for names, first in self.begin(fitted, missing).items():
             if names not in self.fits or first.criterion < self.fits[names].criterion:

@@ -121,8 +121,10 @@ class Search(Generic[F, M]):
 
     def _forward(self) -> None:
         """Extend the best set so far while a larger one is accepted."""
-        for size in self._sizes():
+        for size in itertools.count(len(self._kept) + 1):
             best = self._kept
+            if not self.sets.has_room(best):
+                break
             self.progress(min(0.1 + 0.2 * size, 0.7), f"sets of {size}")
             if best and not self._worth_extending(best):
                 break
@@ -132,11 +134,6 @@ class Search(Generic[F, M]):
             if larger is None:
                 break
             self._kept = larger
-
-    def _sizes(self) -> Iterable[int]:
-        """Return the sizes of sets that are larger than the best so far."""
-        first, most = len(self._kept) + 1, self.sets.most_candidates
-        return itertools.count(first) if most is None else range(first, most + 1)
 
     def improves(self, larger: F, smaller: F, gain: float, explained: float) -> bool:
         """Return whether a larger set improves on a smaller one by a gain in twice the log-likelihood.

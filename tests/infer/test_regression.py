@@ -80,3 +80,13 @@ def test_what_no_candidate_explains_is_a_lack_of_fit():
     assert not models.leaves_noise(models.nominal())
     other = Regression(x, rng.standard_normal((RUNS, COUNT)))
     assert other.leaves_noise(other.nominal())
+
+
+@pytest.mark.parametrize("site", ["", "@arm"], ids=["five causes", "one cause at five joints, and another"])
+def test_a_cause_at_many_sites_counts_as_one(site):
+    """At most three causes are searched: friction at every joint is one of them."""
+    rng = np.random.default_rng(4)
+    names = [*(f"friction@j{k}" if site else f"x{k}" for k in range(5)), f"offset{site}"]
+    x = {n: rng.standard_normal(COUNT) for n in [*names, "a", "b", "c"]}
+    found = searched(Regression(x, 0.8 * sum(x[n] for n in names) + rng.standard_normal((RUNS, COUNT))))
+    assert found.best.free == tuple(sorted(names)) if site else len(found.best.free) == 3

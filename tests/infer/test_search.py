@@ -36,6 +36,9 @@ class Models:
     def nominal(self):
         return self.fits[()]
 
+    def has_room(self, names):
+        return len(names) < self.most_candidates
+
     def is_claimed(self, name):
         return True
 
