@@ -1,4 +1,4 @@
-"""Estimators of a rig: without process noise, with coloured or white process noise, by least squares."""
+"""Other estimators of a rig than the likelihood: white process noise, and least squares of free simulations."""
 
 from abc import abstractmethod
 from collections.abc import Sequence
