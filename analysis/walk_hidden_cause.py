@@ -8,7 +8,6 @@ Run the cells, or `python analysis/walk_hidden_cause.py`; picture and page go to
 """
 
 # %% A walk with a secret
-import inspect
 import sys
 from pathlib import Path
 
@@ -17,15 +16,13 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
+from walks.synthetic import Wrong, gait_of, make
 
 import fes_pin as fp
 from fes_pin.body.measured_walk import data_folder
 from fes_pin.view.report_walk import show_reactions
 from fes_pin.walk.motion import about
 from fes_pin.walk.recording import recordings_of
-
-sys.path.insert(0, str(Path(inspect.getfile(fp)).parents[1] / "scripts"))
-from walking_matrix.synthetic import Wrong, gait_of, make
 
 OUT = Path("out")
 HIDDEN, SEED = 0.15, 11

@@ -25,7 +25,7 @@ KINDS = ("Diagnosis", "Contrast", "Comparison", "Cohort", pytest.param("WalkDiag
 
 
 def walking_study(walk, folder):
-    from walking_matrix.synthetic import Wrong, gait_of, make
+    from walks.synthetic import Wrong, gait_of, make
 
     make(gait_of(walk), folder, Wrong("segment_mass", "trunk", 0.15, strides=2, tissue=0.4), 2)
     return fp.read_study(folder)

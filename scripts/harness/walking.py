@@ -7,7 +7,7 @@ from itertools import count
 from pathlib import Path
 
 from walking_matrix.plan import KINDS, drawn
-from walking_matrix.synthetic import Wrong, gait_of, make
+from walks.synthetic import Wrong, gait_of, make
 
 import fes_pin as fp
 from fes_pin.body.measured_walk import data_folder

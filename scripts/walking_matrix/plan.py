@@ -1,8 +1,7 @@
 """Which cause is hidden, where, and how large."""
 
 import numpy as np
-
-from walking_matrix.synthetic import Wrong
+from walks.synthetic import Wrong
 
 KINDS = ("segment_mass", "segment_com", "external_force", "plate_gain", "plate_offset", "clock_offset", "base_tilt",
          "marker_noise", "segment_inertia")  # fmt: skip

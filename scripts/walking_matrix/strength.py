@@ -7,13 +7,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from walks.synthetic import Gait, Wrong, make
 
 from fes_pin.data.study import Study, read_study
 from fes_pin.walk.designs import Designs
 from fes_pin.walk.models import WalkModels
 from fes_pin.walk.recording import recordings_of
 from fes_pin.walk.white_noise import white_noise
-from walking_matrix.synthetic import Gait, Wrong, make
 
 
 def strength(gait: Gait, wrong: Wrong, seed: int, study: Study) -> float:

@@ -48,6 +48,6 @@ def rms(values):
 
 @pytest.fixture(scope="session")
 def gait(walk):
-    from walking_matrix.synthetic import gait_of
+    from walks.synthetic import gait_of
 
     return gait_of(walk)

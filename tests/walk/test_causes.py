@@ -25,7 +25,7 @@ HIDDEN = [  # cause, site as it is hidden, size, more of it, form that must take
 
 
 def trial(gait, folder, wrong, seed=3):
-    from walking_matrix.synthetic import make
+    from walks.synthetic import make
 
     make(gait, folder, wrong, seed)
     (recording,) = recordings_of(read_study(folder))
@@ -39,7 +39,7 @@ def size(residual):
 
 @pytest.fixture(scope="module")
 def clean(gait, tmp_path_factory):
-    from walking_matrix.synthetic import Wrong
+    from walks.synthetic import Wrong
 
     return trial(gait, tmp_path_factory.mktemp("clean"), Wrong(tissue=0.0, markers_m=0.0, placed=0.0, strides=2))
 
@@ -52,7 +52,7 @@ def test_where_nothing_is_wrong_the_two_codes_agree(clean):
 
 @pytest.mark.parametrize(("cause", "site", "amount", "extra", "form", "value"), HIDDEN)
 def test_the_columns_of_a_cause_take_it_away(gait, clean, tmp_path, cause, site, amount, extra, form, value):
-    from walking_matrix.synthetic import Wrong
+    from walks.synthetic import Wrong
 
     wrong = Wrong(cause, site, amount, tissue=0.0, markers_m=0.0, placed=0.0, strides=2, extra=extra)
     hidden = trial(gait, tmp_path, wrong)

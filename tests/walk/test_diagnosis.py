@@ -24,7 +24,7 @@ pytestmark = pytest.mark.shared
 
 
 def hidden(gait, folder, seed, *args, **more):
-    from walking_matrix.synthetic import Wrong, make
+    from walks.synthetic import Wrong, make
 
     make(gait, folder, Wrong(*args, **{"strides": 2, "tissue": 0.4, **more}), seed)
     return diagnose_walk(read_study(folder))
@@ -155,7 +155,7 @@ def test_one_who_stands_still_tells_no_gain_from_mass_and_calls_neither_untestab
 
 def test_late_plates_are_found(gait, tmp_path):
     from walking_matrix.plan import drawn
-    from walking_matrix.synthetic import make
+    from walks.synthetic import make
 
     wrong = drawn("clock_offset", 514)  # 47 ms: far beyond what is linear
     make(gait, tmp_path, wrong, 514)

@@ -17,7 +17,7 @@ pytestmark = pytest.mark.shared
 
 
 def models_of(gait, folder, seed, *args, **more):
-    from walking_matrix.synthetic import Wrong, make
+    from walks.synthetic import Wrong, make
 
     make(gait, folder, Wrong(*args, **{"strides": 2, "tissue": 0.4, **more}), seed)
     recordings = recordings_of(read_study(folder))

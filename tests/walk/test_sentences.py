@@ -19,7 +19,7 @@ pytestmark = pytest.mark.shared
 @pytest.fixture(scope="module")
 def diagnosed(gait, tmp_path_factory):
     """Return a function of the number of strides: diagnosis of a walk with a right plate that reads 8 % too much."""
-    from walking_matrix.synthetic import Wrong, make
+    from walks.synthetic import Wrong, make
 
     def found(strides):
         folder = tmp_path_factory.mktemp("walk")

@@ -15,7 +15,7 @@ from fes_pin.walk.walk_trial import LOADED_N, level_in_the_air
 @pytest.fixture
 def clean(gait, tmp_path):
     """Return a function that makes a walk in which nothing is wrong but what is in every session: its folder."""
-    from walking_matrix.synthetic import Wrong, make
+    from walks.synthetic import Wrong, make
 
     def made(seed=5, strides=3):
         make(gait, tmp_path, Wrong(strides=strides, tissue=0.44), seed)

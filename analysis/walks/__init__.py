@@ -1,0 +1,1 @@
+"""Walking that is made up, without the engine that diagnoses it."""
