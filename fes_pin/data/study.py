@@ -18,7 +18,6 @@ from fes_pin.data.as_read import AsRead, digest_of, hashing
 from fes_pin.data.checks import check_constants, check_same_inputs, checked_label, checked_labels, checked_mapping
 from fes_pin.data.errors import InputError, fault_at
 from fes_pin.data.files import as_path, hold, what_is_at, write_files
-from fes_pin.data.motion import GROUND_REACTION
 from fes_pin.data.numbers import instance
 from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.recorded.columns import Columns
@@ -27,7 +26,7 @@ from fes_pin.data.show import DataFrame, by_columns, frame, table_html
 from fes_pin.data.study_text import HORIZON, StudyTables, check_files, checked_horizon
 from fes_pin.data.table import format_csv
 from fes_pin.data.toml import Document, document_of, read_toml
-from fes_pin.data.trial import Trial, check_trial, read_body_trial, read_trial, trial_csv
+from fes_pin.data.trial import Trial, check_trial, read_body_trial, read_trial, trial_csv, walk_recordings
 
 EDITED = "edited after it was read"
 """What stands in the place of a hash of a file that is no longer what its study holds."""
@@ -453,9 +452,5 @@ def _trial_files(schema: RigSchema, trial: Trial, file: str) -> dict[str, str | 
     alone = replace(trial, as_read=None)  # which checks it by itself, as it will be read
     if len(schema.recordings) == 1:
         return {f"trials/{file}.csv": trial_csv(alone)}
-    whole = trial.as_read.recordings if trial.as_read is not None and not trial.is_edited else ()
-    moves = {name: values for name, values in trial.columns.items() if name not in GROUND_REACTION}
-    pushes = {name: trial[name] for name in GROUND_REACTION}
-    recordings = whole or ((trial.time, moves), (trial.time, pushes))
-    texts = [format_csv({"time_s": time, **columns}) for time, columns in recordings]
+    texts = [format_csv({"time_s": time, **columns}) for time, columns in walk_recordings(trial)]
     return {f"{key}/{file}.csv": text for key, text in zip(schema.recordings, texts, strict=True)}

@@ -15,7 +15,7 @@ from fes_pin.data.as_read import AsRead, digest_of, hashing
 from fes_pin.data.checks import check_columns, check_values, checked_label, checked_labels, checked_mapping
 from fes_pin.data.errors import InputError, fault_at
 from fes_pin.data.files import as_path, write_text
-from fes_pin.data.motion import coordinates_of, ground_reaction_of, on_common_time, read_motion
+from fes_pin.data.motion import GROUND_REACTION, coordinates_of, ground_reaction_of, on_common_time, read_motion
 from fes_pin.data.numbers import instance
 from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.recorded.columns import Columns
@@ -438,6 +438,17 @@ def read_body_trial(
         raise pushes.error(message, pushes.names[0], 0)
     as_read = AsRead(sha256, b"", recordings=recordings)
     return _made(columns, time, as_read, name=name, kind="motion", conditions=conditions, **labels)
+
+
+def walk_recordings(trial: Trial) -> tuple[tuple[np.ndarray, Mapping[str, np.ndarray]], ...]:
+    """Times and columns of a walk's coordinates and of its ground reaction.
+
+    Each is at its own rate where the trial is as it was read, else on the times of the trial.
+    """
+    if trial.as_read is not None and trial.as_read.recordings and not trial.is_edited:
+        return trial.as_read.recordings
+    moves = {name: values for name, values in trial.columns.items() if name not in GROUND_REACTION}
+    return (trial.time, moves), (trial.time, {name: trial[name] for name in GROUND_REACTION})
 
 
 def write_trial(trial: Trial, path: str | Path) -> None:
