@@ -18,13 +18,13 @@ import numpy as np
 import pinocchio as pin
 from yardsticks.walking import joint_torques, rooted_motion
 
-from fes_pin.body.build import Body
+from fes_pin.body.build import Body, pelvis_to_hip
 from fes_pin.body.linearize import linearize
 from fes_pin.body.measured_walk import data_folder
 from fes_pin.body.passive import PassiveLegs
 from fes_pin.data.errors import InputError
 from fes_pin.data.motion import read_coordinates, read_ground_reaction
-from fes_pin.walk.motion import Session, about, motion_of, pelvis_to_hip
+from fes_pin.walk.motion import Session, about, motion_of
 from fes_pin.walk.walk_trial import plates_of
 
 OUT = Path("out")

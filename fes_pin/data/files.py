@@ -69,7 +69,17 @@ def read_text(path: str | Path, encoding: str = "utf-8") -> str:
     InputError
         As `read_bytes`, and for bytes that are no text of this encoding, with the row.
     """
-    content = read_bytes(path)
+    return text_of(read_bytes(path), path, encoding)
+
+
+def text_of(content: bytes, path: str | Path, encoding: str = "utf-8") -> str:
+    """Text of a file's content, as `read_text`.
+
+    Raises
+    ------
+    InputError
+        For bytes that are no text of this encoding, with the row.
+    """
     try:
         text = content.decode("utf-8-sig" if encoding == "utf-8" else encoding)
     except UnicodeError as error:

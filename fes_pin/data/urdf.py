@@ -36,8 +36,13 @@ MIMIC_NUMBERS: Mapping[str, NumbersOf] = {"mimic": {"multiplier": (1, 1.0), "off
 None where it must be there."""
 
 
-def moving_joints(path: str | Path) -> list[tuple[str, str]]:
+def moving_joints(path: str | Path, content: bytes | None = None) -> list[tuple[str, str]]:
     """Joints that move by themselves, neither fixed nor mimicking another, in the file's order.
+
+    Parameters
+    ----------
+    path, content
+        The file, and its bytes where they were read before.
 
     Returns
     -------
@@ -49,7 +54,7 @@ def moving_joints(path: str | Path) -> list[tuple[str, str]]:
         Not XML, XML with a document type or entities, not a URDF, links that make no tree, a joint without a usable
         axis or limits, a mass that is not positive, an inertia that no body can have.
     """
-    moving = [j for j in _Urdf(path).joints if j.get("type") in MOVING and j.find("mimic") is None]
+    moving = [j for j in _Urdf(path, content).joints if j.get("type") in MOVING and j.find("mimic") is None]
     return [(joint.get("name", ""), joint.get("type", "")) for joint in moving]
 
 
@@ -131,9 +136,9 @@ def is_possible(principal: np.ndarray) -> bool:
 class _Urdf:
     """The parts of one URDF, checked as they are read."""
 
-    def __init__(self, path: str | Path) -> None:
+    def __init__(self, path: str | Path, content: bytes | None = None) -> None:
         self.path = path
-        content = read_bytes(path)
+        content = read_bytes(path) if content is None else content
         self.lines = content.decode("utf-8", errors="replace").split("\n")
         self.root = self._parse(content)
         if self.root.tag != "robot":

@@ -18,7 +18,6 @@ from fes_pin.body.joints import SEGMENT_NAMES
 from fes_pin.body.skeleton import TO_WORLD
 from fes_pin.data.errors import InputError
 from fes_pin.data.motion import OPTIONAL, REQUIRED
-from fes_pin.data.numbers import numbers
 from fes_pin.data.smooth import CUTOFF_HZ, low_pass, rates
 
 
@@ -123,8 +122,6 @@ def about(wrench: np.ndarray, point: np.ndarray) -> np.ndarray:
     return moved
 
 
-PELVIS_TO_HIP = np.array([-0.0402431, -0.0376247, 0.0475290])
-"""Right hip centre in OpenSim's pelvis, in standing heights: gait2354 scaled to an adult of 1.80 m."""
 _STEP = 1e-3
 """s; how far a sample's path is followed for its rates, by differences of fourth order: 1e-8 of the acceleration."""
 
@@ -152,27 +149,6 @@ class Session:
         return np.outer(self.belt_speed_mps * (time - self.start_s), [1.0, 0.0, 0.0])
 
 
-def pelvis_to_hip(body: Body, table: Mapping | None = None) -> np.ndarray:
-    """Right hip centre in OpenSim's pelvis frame and axes: (3,) m.
-
-    From the table of segments (`joints.hip_r.loc_in_parent`) if it says, else from gait2354 by the body's height.
-
-    Raises
-    ------
-    InputError
-        The table's entry is not three numbers, or neither it nor a height is known.
-    """
-    place = ((table or {}).get("joints", {}).get("hip_r", {}) or {}).get("loc_in_parent")
-    if place is not None:
-        centre = numbers(place, "joints.hip_r.loc_in_parent")
-        if centre.shape != PELVIS_TO_HIP.shape or not np.isfinite(centre).all():
-            raise InputError("must be three finite numbers in m", column="joints.hip_r.loc_in_parent")
-        return centre
-    if body.height_m is None:
-        raise InputError("the body's height must be known to place the pelvis", column="height_m")
-    return PELVIS_TO_HIP * body.height_m
-
-
 def motion_of(
     body: Body, time: np.ndarray, columns: Mapping[str, np.ndarray], hip: np.ndarray, session: Session
 ) -> Motion:
@@ -188,7 +164,7 @@ def motion_of(
     time, columns
         (n,) s; `q_<coordinate>`, and `qd_`, `qdd_` if known, (n,) in rad and m. What is optional and absent is 0.
     hip
-        Right hip centre in OpenSim's pelvis, (3,) m; see `pelvis_to_hip`.
+        Right hip centre in OpenSim's pelvis, (3,) m; see `fes_pin.body.build.pelvis_to_hip`.
     session
         Low pass and treadmill.
 

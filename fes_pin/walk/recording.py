@@ -3,21 +3,19 @@
 Plates and motion that cannot be of one walk are errors; part of a record may be used.
 """
 
-import json
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from fes_pin.body.build import Body
+from fes_pin.body.build import Body, body_of
 from fes_pin.body.joints import SIDES
 from fes_pin.data.errors import InputError, errors_of
 from fes_pin.data.smooth import CUTOFF_HZ
 from fes_pin.data.study import Study
-from fes_pin.data.trial import Trial
-from fes_pin.walk.motion import Motion, Session, has_rates, motion_of, pelvis_to_hip
+from fes_pin.data.trial import Trial, walk_recordings
+from fes_pin.walk.motion import Motion, Session, has_rates, motion_of
 from fes_pin.walk.walk_trial import LOADED_N, Plates, WalkTrial, plates_of, stretches
 
 FAR_M = 1.5
@@ -107,39 +105,8 @@ def carried_along(motion: Motion, plates: Plates) -> slice:
     return longest
 
 
-MASS_SHARE = 0.01
-"""Share by which the mass that a study states may differ from that of its segments."""
 FEWEST = 10
 """Samples of motion and reaction together, at least."""
-
-
-def body_of(study: Study) -> tuple[Body, np.ndarray]:
-    """The body that a study believes in, and its right hip centre in OpenSim's pelvis, (3,) m.
-
-    Raises
-    ------
-    InputError
-        The study is of another rig, its table of segments or URDF cannot be used, or a table's masses do not
-        sum to the study's.
-    """
-    if study.rig != "body":
-        raise InputError(f"expected a study of rig body, found {study.rig}", file=study.folder)
-    height = study.constants.get("height_m")
-    if "urdf" in study.files:
-        body = Body.from_urdf(study.files["urdf"])
-        if body.height_m is None and height is not None:
-            body = replace(body, height_m=height)
-        return body, pelvis_to_hip(body)
-    if "segments" in study.files:
-        path = study.files["segments"]
-        body = Body.from_segments(path)
-        with errors_of(path):
-            mass = study.constants.get("mass_kg", body.mass_kg)
-            if abs(mass - body.mass_kg) > MASS_SHARE * body.mass_kg:
-                raise InputError(f"its segments weigh {body.mass_kg:.2f} kg, and the study says mass_kg = {mass:g}")
-            return body, pelvis_to_hip(body, json.loads(path.read_text()))
-    body = Body.from_subject(study.constants["mass_kg"], study.constants["height_m"])
-    return body, pelvis_to_hip(body)
 
 
 def recordings_of(study: Study, *, cutoff_hz: float = CUTOFF_HZ, body: Body | None = None) -> list[WalkTrial]:
@@ -157,12 +124,7 @@ def recordings_of(study: Study, *, cutoff_hz: float = CUTOFF_HZ, body: Body | No
 def _recording(trial: Trial, body: Body, hip: np.ndarray, cutoff_hz: float) -> WalkTrial:
     paths = list(map(Path, trial.as_read.sha256)) if trial.as_read is not None else []
     source, reaction = paths[0] if paths else None, paths[-1] if paths else None
-    if trial.as_read is not None and trial.as_read.recordings and not trial.is_edited:
-        (time, columns), (raw_time, raw) = trial.as_read.recordings
-    else:
-        time, raw_time = trial.time, trial.time
-        columns = {n: v for n, v in trial.columns.items() if n.startswith(("q_", "qd_", "qdd_"))}
-        raw = {n: v for n, v in trial.columns.items() if n not in columns}
+    (time, columns), (raw_time, raw) = walk_recordings(trial)
     edge = 0.0 if has_rates(columns) else 0.5 / cutoff_hz
     inside = (time >= max(raw_time[0], time[0] + edge)) & (time <= min(raw_time[-1], time[-1] - edge))
     if inside.sum() < FEWEST:
@@ -176,5 +138,5 @@ def _recording(trial: Trial, body: Body, hip: np.ndarray, cutoff_hz: float) -> W
     with errors_of(reaction):
         check_together(motion, plates)
         rows = carried_along(motion, plates)
-    used = motion.part(rows), plates.part(rows)
-    return WalkTrial(trial.name, *used, time, dict(columns), moved, read, session)
+    parts = motion.part(rows), plates.part(rows)
+    return WalkTrial(trial.name, *parts, time, dict(columns), moved, read, session)

@@ -13,13 +13,13 @@ from itertools import product
 import numpy as np
 from scipy.ndimage import binary_dilation
 
-from fes_pin.body.build import GRAVITY
+from fes_pin.body.build import GRAVITY, MASS_SHARE
 from fes_pin.body.joints import SIDES
 from fes_pin.data.study import Study
 from fes_pin.infer.levels import POSSIBLE_SIZES, SEEN_DEVIATIONS
 from fes_pin.walk.effect import AXES
 from fes_pin.walk.likelihood import MEAN_FORCE
-from fes_pin.walk.recording import MASS_SHARE, recordings_of
+from fes_pin.walk.recording import recordings_of
 from fes_pin.walk.strides import Strides, strides_of
 from fes_pin.walk.walk_trial import ORDINARY_N, WalkTrial, stretches
 

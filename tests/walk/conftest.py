@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fes_pin.body.build import Body
+from fes_pin.body.build import Body, pelvis_to_hip
 from fes_pin.data.motion import read_coordinates, read_ground_reaction
-from fes_pin.walk.motion import Session, motion_of, pelvis_to_hip
+from fes_pin.walk.motion import Session, motion_of
 from fes_pin.walk.walk_trial import plates_of
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "scripts"))

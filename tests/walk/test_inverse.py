@@ -7,10 +7,10 @@ import pinocchio as pin
 import pytest
 from yardsticks.walking import joint_torques, pressure_and_free_moment, rooted_motion
 
-from fes_pin.body.build import Body
+from fes_pin.body.build import PELVIS_TO_HIP, Body
 from fes_pin.body.skeleton import TO_WORLD
 from fes_pin.data.errors import InputError
-from fes_pin.walk.motion import PELVIS_TO_HIP, Session, about, motion_of
+from fes_pin.walk.motion import Session, about, motion_of
 
 pytestmark = pytest.mark.shared
 CARRIERS = {"trunk": "torso", "pelvis": "pelvis", "right_thigh": "femur_r", "left_thigh": "femur_l"}

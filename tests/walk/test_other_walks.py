@@ -1,5 +1,7 @@
 """Walks of other laboratories: columns named otherwise, knees counted otherwise, one plate, and what cannot be used."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -161,3 +163,39 @@ def test_over_ground_a_late_clock_does_not_move_with_the_body(folder):
         assert np.sqrt(np.mean((change - column) ** 2)) < 0.2 * np.sqrt(np.mean(column**2))
         late = np.mean((change - column)[:, 4])
         assert abs(late) < 0.1 * 1.135 * np.mean(now.measured[:, 2])  # a centre of pressure that is carried along
+
+
+@pytest.fixture
+def by_segments(walk, folder):
+    """The folder of a study whose body is a table of segments, `body.json`, and the table."""
+    stated = "mass_kg = 72.6\nheight_m = 1.80"
+    (folder / "study.toml").write_text(TOML.replace(stated, 'segments = "body.json"'))
+    content = (walk / "reference/subject01_model.json").read_bytes()
+    (folder / "body.json").write_bytes(content)
+    return folder, json.loads(content)
+
+
+def test_a_table_of_segments_may_begin_with_a_byte_order_mark(by_segments):
+    folder, _ = by_segments
+    plain, path = read(folder), folder / "body.json"
+    path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())
+    assert np.array_equal(read(folder).residual, plain.residual)
+
+
+@pytest.mark.parametrize(
+    ("place", "stated", "says"),
+    [
+        ([0.1, 0.2], "", "body.json, joints.hip_r.loc_in_parent: must be three finite numbers in m"),
+        (None, "", "body.json, height_m: the body's height must be known to place the pelvis"),
+        ([0.0, 0.0, 0.1], "mass_kg = 80", "body.json: its segments weigh 72.60 kg, and the study says mass_kg = 80"),
+    ],
+)
+def test_what_a_table_of_segments_lacks_is_said_with_its_name(by_segments, place, stated, says):
+    folder, table = by_segments
+    table["joints"]["hip_r"]["loc_in_parent"] = place
+    (folder / "body.json").write_text(json.dumps(table))
+    text = (folder / "study.toml").read_text()
+    (folder / "study.toml").write_text(text.replace("[[trial]]", f"{stated}\n[[trial]]"))
+    with pytest.raises(InputError) as error:
+        read(folder)
+    assert str(error.value).endswith(says)
