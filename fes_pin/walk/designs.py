@@ -6,8 +6,8 @@ Noise is what errors in the coordinates change: soft tissue, white noise, mispla
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -16,10 +16,10 @@ from fes_pin.body.build import GRAVITY
 from fes_pin.data.motion import TRANSLATIONS
 from fes_pin.infer.fits import Names
 from fes_pin.walk.effects import walk_library
-from fes_pin.walk.likelihood import MEAN_ARM_M, MEAN_FORCE, MEAN_TWIST_NM, Known, WalkNoise, fit_many, rotation
+from fes_pin.walk.likelihood import MEAN_ARM_M, MEAN_FORCE, MEAN_TWIST_NM, Known, WalkNoise, fit_many
 from fes_pin.walk.motion import about
 from fes_pin.walk.stated import Stated
-from fes_pin.walk.strides import Strides, strides_of
+from fes_pin.walk.strides import Design, Strides, strides_of
 from fes_pin.walk.walk_trial import ORDINARY_N, WalkTrial
 
 TISSUE_DRAWS, WHITE_DRAWS = 40, 64
@@ -95,19 +95,6 @@ SHIFT_ROUNDS = 4
 """Most steps of the estimation of a shift of the clock."""
 
 
-@dataclass(frozen=True)
-class Design:
-    """Design matrix: residual and columns of every form by name, (1, 6, k, ...) in the mean stride.
-
-    The plates are read `later_s` later than their clock says.
-    """
-
-    trials: Sequence[WalkTrial] = field(repr=False)
-    y: np.ndarray = field(repr=False)
-    x: dict[str, np.ndarray] = field(repr=False)
-    later_s: float = 0.0
-
-
 class Designs:
     """Design matrices of one diagnosis, on the plates' clock as read and on the clock that fits best, and their noise.
 
@@ -127,8 +114,6 @@ class Designs:
         Design matrices on either clock.
     noise
         Noise of all fits, in rotated channels.
-    ordinary
-        (1, 6, k, m) rotated: residuals by ordinary errors of landmarks and plates.
     """
 
     def __init__(self, trials: Sequence[WalkTrial], seed: int = 0) -> None:
@@ -138,16 +123,35 @@ class Designs:
         self.strides = strides_of(trials, trials[0].session.cutoff_hz)
         self.stated = Stated.of(trials, self.strides)
         self._first = trials[self.strides.windows[0][0]]
-        self.as_read = self._design(trials, self.forms)
-        self._turn(self.as_read.y)
+        self.as_read = self.strides.mean_design(trials, self.forms.values())
+        self.noise = self._as_measured.uncorrelated(self.as_read.y)
         self.shifted = self._shifted()
 
-    def _design(self, trials: Sequence[WalkTrial], names: Iterable[str]) -> Design:
-        x = {n: self.strides.mean([self.forms[n].columns(s) for s in trials]) for n in names}
-        return Design(trials, self.strides.mean([s.residual for s in trials]), x)
+    @cached_property
+    def _as_measured(self) -> WalkNoise:
+        """The noise in the channels that were measured."""
+        weight = GRAVITY * self.stated.body_kg
+        means = np.r_[np.full(3, MEAN_FORCE * weight), np.full(2, MEAN_ARM_M * weight), MEAN_TWIST_NM] ** 2
+        if not self.strides.whole:  # soft tissue does not return to its initial place
+            means = means + np.mean(self.tissue[..., 0] ** 2, axis=0)
+        nuisance = np.concatenate([self._taken(), self.in_every_session], axis=3)
+        return WalkNoise(self.strides.harmonics, np.eye(6), means, nuisance)
+
+    def _taken(self) -> np.ndarray:
+        """Return nuisance columns for errors in the motion, in units of `TAKEN`: (1, 6, k, 7).
+
+        They are a share of each wave of the required reaction by channel, and one of all channels that grows with the
+        square of the frequency, as errors of accelerations do.
+        """
+        h = self.strides.harmonics
+        waves = self.strides.mean([s.needed for s in self.as_read.trials]) * (h > 0)
+        out = np.zeros((*waves.shape, 7))
+        out[:, range(6), :, range(6)] = TAKEN * np.moveaxis(waves, 1, 0)
+        out[..., 6] = TAKEN * waves * (h / 4.0) ** 2
+        return out
 
     @cached_property
-    def _in_every_session(self) -> np.ndarray:
+    def in_every_session(self) -> np.ndarray:
         """Residuals by ordinary errors of landmarks and plates of one standard deviation: (1, 6, k, m).
 
         They are fewer columns than there are errors, of nearly the same covariance.
@@ -172,19 +176,8 @@ class Designs:
     def turned(self, residual: np.ndarray) -> Designs:
         """Return the same with channels rotated for the residual of a set, (1, 6, k)."""
         other = copy.copy(self)
-        other._turn(residual)
+        other.noise = self._as_measured.uncorrelated(residual)
         return other
-
-    def _turn(self, left: np.ndarray) -> None:
-        turn = rotation(left, self.strides.harmonics)
-        weight = GRAVITY * sum(p[0] for p in self.as_read.trials[0].motion.parameters.values())
-        means = np.r_[np.full(3, MEAN_FORCE * weight), np.full(2, MEAN_ARM_M * weight), MEAN_TWIST_NM] ** 2
-        if not self.strides.whole:  # soft tissue does not return to its initial place
-            means = means + np.mean(self.tissue[..., 0] ** 2, axis=0)
-        bare = WalkNoise(self.strides.harmonics, turn, means, self._none())
-        self.ordinary = bare.rotated(self._in_every_session)
-        taken = bare.rotated(_taken(self.as_read.trials, self.strides))
-        self.noise = replace(bare, nuisance=np.concatenate([taken, self.ordinary], axis=3))
 
     def _shifted(self) -> Design:
         """Return the design matrix at the delay of the plates that fits best, by repeated linearization."""
@@ -194,10 +187,10 @@ class Designs:
             (found,) = fit_many(aim, columns, prior, self.noise)
             step = float(np.clip(found.values[0], -0.05, 0.05))
             later = float(np.clip(later + step, -0.2, 0.2))
-            design = self._design([one.read_later(later) for one in design.trials], [self.shift])
+            design = self.strides.mean_design([t.read_later(later) for t in design.trials], [self.forms[self.shift]])
             if abs(step) < SHIFT_ENDS_S:
                 break
-        return replace(self._design(design.trials, self.forms), later_s=later)
+        return replace(self.strides.mean_design(design.trials, self.forms.values()), later_s=later)
 
     def design(self, names: Names) -> Design:
         """Return the design matrix in which a set is fitted: with the clock shifted if the set has a shift."""
@@ -205,7 +198,8 @@ class Designs:
 
     def columns(self, names: Names) -> np.ndarray:
         """Return columns of a set in the mean stride, one form after the other: (1, 6, k, p)."""
-        return np.concatenate([self._none(), *(self.design(names).x[n] for n in names)], axis=3)
+        none = np.zeros((*self.as_read.y.shape, 0))
+        return np.concatenate([none, *(self.design(names).x[n] for n in names)], axis=3)
 
     def readings(self, sets: Sequence[Names]) -> Known:
         """Return what plates read while a foot is in the air, and what each of some sets of as many parameters adds."""
@@ -245,21 +239,3 @@ class Designs:
     def plausible(self, names: Names) -> np.ndarray:
         """Return the plausible size of every parameter of a set, (p,)."""
         return np.array([form.plausible for form in (self.forms[n] for n in names) for _ in form.parameters])
-
-    def _none(self) -> np.ndarray:
-        return np.zeros((*self.as_read.y.shape, 0))
-
-
-def _taken(trials: Sequence[WalkTrial], strides: Strides) -> np.ndarray:
-    """Return nuisance columns for errors in the motion, in units of `TAKEN`: (n, 6, k, 7).
-
-    They are a share of each wave of the required reaction by channel, and one of all channels that grows with the
-    square of the frequency, as errors of accelerations do.
-    """
-    h = strides.harmonics
-    needed = strides.mean([s.needed for s in trials])
-    waves = needed * (h > 0)
-    out = np.zeros((*waves.shape, 7))
-    out[:, range(6), :, range(6)] = TAKEN * np.moveaxis(waves, 1, 0)
-    out[..., 6] = TAKEN * waves * (h / 4.0) ** 2
-    return out

@@ -19,7 +19,9 @@ Every set has nuisance parameters with normal priors, which are no causes (`nuis
 the required reaction, misplaced landmarks, and plates as accurate as their calibration.
 """
 
-from dataclasses import dataclass, field
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -51,7 +53,7 @@ class WalkNoise:
     mean_variance
         (6,): variances of the means over a stride.
     nuisance
-        (n, 6, k, m): columns that every fit has, rotated, each in units of its prior's standard deviation.
+        (n, 6, k, m): columns that every fit has, in rotated channels, each in units of its prior's standard deviation.
     """
 
     harmonics: np.ndarray
@@ -65,6 +67,20 @@ class WalkNoise:
         means = self.harmonics == 0
         out[:, :, means] = values[:, :, means]
         return out
+
+    def uncorrelated(self, left: np.ndarray) -> WalkNoise:
+        """Return this noise in channels between which the waves of residuals (n, 6, k) are uncorrelated.
+
+        This noise and the residuals are in the channels that were measured.
+        """
+        waves = left[:, :, self.harmonics > 0]
+        scale = 1.0 / np.maximum(np.sqrt(np.mean(waves**2, axis=(0, 2))), FLOOR_N)
+        scaled = (scale[:, None] * waves).transpose(1, 0, 2).reshape(6, -1)
+        shared = scaled @ scaled.T / scaled.shape[1]
+        shared = 0.8 * shared + 0.2 * np.diag(np.diag(shared))  # few strides estimate a correlation badly
+        _, vectors = np.linalg.eigh(shared)
+        turned = replace(self, turn=vectors.T * scale)
+        return replace(turned, nuisance=turned.rotated(self.nuisance))
 
 
 Known = tuple[np.ndarray, np.ndarray]
@@ -93,17 +109,6 @@ class Fitted:
     believed: np.ndarray
     deviance: float
     variance: np.ndarray = field(repr=False)
-
-
-def rotation(left: np.ndarray, harmonics: np.ndarray) -> np.ndarray:
-    """Return scale and rotation that make the waves of residuals (n, 6, k) uncorrelated between channels: (6, 6)."""
-    left = left[:, :, harmonics > 0]
-    scale = 1.0 / np.maximum(np.sqrt(np.mean(left**2, axis=(0, 2))), FLOOR_N)
-    scaled = (scale[:, None] * left).transpose(1, 0, 2).reshape(6, -1)
-    shared = scaled @ scaled.T / scaled.shape[1]
-    shared = 0.8 * shared + 0.2 * np.diag(np.diag(shared))  # few strides estimate a correlation badly
-    _, vectors = np.linalg.eigh(shared)
-    return vectors.T * scale
 
 
 def fit_many(

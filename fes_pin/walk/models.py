@@ -60,7 +60,8 @@ def _without_a_cause(designs: Designs, variance: np.ndarray) -> np.ndarray:
     """
     random = np.random.default_rng(designs.seed)
     drawn = random.normal(size=(SIMULATED, *variance.shape)) * np.sqrt(variance)
-    always = random.normal(size=(SIMULATED, designs.ordinary.shape[3])) @ designs.ordinary.reshape(variance.size, -1).T
+    ordinary = designs.noise.rotated(designs.in_every_session)
+    always = random.normal(size=(SIMULATED, ordinary.shape[3])) @ ordinary.reshape(variance.size, -1).T
     mixed = random.normal(size=(SIMULATED, len(designs.tissue))) / np.sqrt(len(designs.tissue))
     shared = designs.noise.rotated(np.einsum("sd,djk->sjk", mixed, designs.tissue))
     waves = designs.noise.harmonics > 0

@@ -34,13 +34,11 @@ def extended_body(models: WalkModels, best: WalkFit) -> Body:
     InputError
         If the parameters are impossible, as a mass that is not positive.
     """
-    designs = models.designs
-    body = designs.as_read.trials[0].motion.body
-    believed = designs.as_read.trials[0].motion.parameters
+    motion = models.designs.as_read.trials[0].motion
+    body, believed = motion.body, motion.parameters
     changed: dict[str, np.ndarray] = {}
     for name, sizes in models.sizes(best).items():
-        change = designs.forms[name].segments
-        if change is not None:
+        if (change := models.designs.forms[name].segments) is not None:
             for segment, columns in change(believed).items():
                 changed[segment] = changed.get(segment, believed[segment]) + columns @ sizes
     return with_segments(body, changed) if changed else body

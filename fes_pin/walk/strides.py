@@ -1,6 +1,9 @@
-"""Signals of a walk by stride, as waves of the stride: means over strides, and differences between them."""
+"""Signals of a walk by stride, as waves of the stride: means over strides, and differences between them.
 
-from collections.abc import Mapping, Sequence
+The design matrix of a set of forms is made of means.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -8,6 +11,7 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from fes_pin.body.joints import SIDES
+from fes_pin.walk.effect import Form
 from fes_pin.walk.walk_trial import WalkTrial
 
 STILL_S = 1.2
@@ -16,6 +20,19 @@ STILL_MPS = 0.05
 """m/s; one whose centre of mass varies its speed by less stands: swaying is slower by half, walking faster by four."""
 DEBOUNCE_S = 0.15
 """Two contacts of one foot lie further apart than this."""
+
+
+@dataclass(frozen=True)
+class Design:
+    """Design matrix: residual and columns of every form by name, (1, 6, k, ...) in the mean stride.
+
+    The plates are read `later_s` later than their clock says.
+    """
+
+    trials: Sequence[WalkTrial] = field(repr=False)
+    y: np.ndarray = field(repr=False)
+    x: dict[str, np.ndarray] = field(repr=False)
+    later_s: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -64,6 +81,11 @@ class Strides:
     def mean(self, signals: Sequence[np.ndarray]) -> np.ndarray:
         """Return the mean coefficients over strides: (1, 6, k, ...)."""
         return self.coefficients(signals).mean(axis=0, keepdims=True)
+
+    def mean_design(self, trials: Sequence[WalkTrial], forms: Iterable[Form]) -> Design:
+        """Return the residual of trials and the columns of forms in the mean stride."""
+        x = {form.label: self.mean([form.columns(s) for s in trials]) for form in forms}
+        return Design(trials, self.mean([s.residual for s in trials]), x)
 
 
 def _waves(phase: np.ndarray, harmonics: np.ndarray) -> np.ndarray:
