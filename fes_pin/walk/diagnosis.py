@@ -21,7 +21,7 @@ from fes_pin.infer.verdict import word_of
 from fes_pin.infer.why import why_of
 from fes_pin.walk.designs import Designs
 from fes_pin.walk.judge import not_testable
-from fes_pin.walk.models import POLICY, WalkFit, WalkModels, WalkSearch
+from fes_pin.walk.models import WalkFit, WalkModels, WalkSearch, searched
 from fes_pin.walk.motion import about
 from fes_pin.walk.recording import recordings_of
 from fes_pin.walk.result import WalkDiagnosis
@@ -136,23 +136,11 @@ def diagnose_walk(
         recordings = recordings_of(replace(study, trials=trials), cutoff_hz=cutoff_hz)
         models = WalkModels(Designs(recordings, seed))
         with time_limit(math.inf if limit is None else limit - (time.perf_counter() - began)):
-            search, found = _searched(models, tell)
+            search, found = searched(models, tell)
         tell(0.85, "strides held out")
         out = _judged(study, search, found)
     tell(1.0, "done")
     return out.ended(began, made, limit if stops else None)
-
-
-def _searched(models: WalkModels, tell: Progress) -> tuple[WalkSearch, SearchResult[WalkFit]]:
-    """Search by evidence alone, and again with the noise estimated from the residual of the best set."""
-    first = WalkSearch(models, lambda share, words: tell(0.3 + 0.2 * share, words), POLICY).run()
-    tell(0.5, "critical values")
-    models = models.with_noise_of(first.best)
-    search = WalkSearch(models, lambda share, words: tell(0.55 + 0.3 * share, words), POLICY)
-    found = search.run()
-    if search.was_stopped and not found.best.names:
-        found = search.result(first.best.names)
-    return search, found
 
 
 def _judged(study: Study, search: WalkSearch, found: SearchResult[WalkFit]) -> WalkDiagnosis:

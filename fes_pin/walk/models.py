@@ -15,7 +15,7 @@ from fes_pin.infer.levels import CERTAIN_LEVEL, CONFIDENCE_95, POSSIBLE_SIZES, S
 from fes_pin.infer.search import Policy, Search, SearchResult
 from fes_pin.walk.designs import Designs
 from fes_pin.walk.likelihood import Fitted, fit_many
-from fes_pin.workers import check_limit
+from fes_pin.workers import Progress, check_limit
 
 SIMULATED = 100
 """Number of simulated residuals that give the distribution of the largest gain."""
@@ -229,6 +229,18 @@ class WalkModels(FittedSets[WalkFit, None]):
 
 WalkSearch = Search[WalkFit, WalkModels]
 """A search over sets of forms of one study."""
+
+
+def searched(models: WalkModels, tell: Progress) -> tuple[WalkSearch, SearchResult[WalkFit]]:
+    """Search by evidence alone, and again with the noise estimated from the residual of the best set."""
+    first = WalkSearch(models, lambda share, words: tell(0.3 + 0.2 * share, words), POLICY).run()
+    tell(0.5, "critical values")
+    models = models.with_noise_of(first.best)
+    search = WalkSearch(models, lambda share, words: tell(0.55 + 0.3 * share, words), POLICY)
+    found = search.run()
+    if search.was_stopped and not found.best.names:
+        found = search.result(first.best.names)
+    return search, found
 
 
 def _limits(designs: Designs) -> Iterator[tuple[str, tuple[float, float]]]:
