@@ -12,9 +12,9 @@ from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.levels import CERTAIN_LEVEL, FORM_GAIN, NOTHING_PERCENT, SEPARABLE, SMALL_PERCENT, SMALL_SHARE
 from fes_pin.infer.result import Remainder
 from fes_pin.infer.text import WHOLE
-from fes_pin.infer.verdict import Rejected
+from fes_pin.infer.verdict import CLAIMS, Rejected
 
-UNMOVED = "the motion is as likely without the recorded input, so something else moves the rig"
+UNMOVED = CLAIMS["drop_unmoved"]
 """Why no cause is named where `is_moved_by_what_is_recorded` is False."""
 
 

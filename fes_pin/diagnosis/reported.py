@@ -13,7 +13,7 @@ from fes_pin.diagnosis.decide.rivals import estimates, experiment, not_identifia
 from fes_pin.diagnosis.errors_ahead import AheadErrors, free_errors, noise_that_is_small
 from fes_pin.diagnosis.estimators import WHITE_PROCESS_NOISE, LeastSquares, WhiteProcessNoise
 from fes_pin.diagnosis.likelihood_models import Found, LikelihoodSearch
-from fes_pin.diagnosis.rejected import UNMOVED, is_moved_by_what_is_recorded
+from fes_pin.diagnosis.rejected import UNMOVED
 from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.diagnosis.verdict import RigState, RigVerdict
 from fes_pin.identify.correlation_time import words_of_reading
@@ -74,7 +74,7 @@ def diagnosis_of(
         warnings=(*said, WHITE_PROCESS_NOISE) if best.noise.timed else said,
         random=state.weighed.random,
         is_driven=search.models.judged_s is not None,
-        reason=left.reason if not left.unexplained or is_moved_by_what_is_recorded(found.best) else UNMOVED,
+        reason=left.reason if not left.unexplained or state.weighed.is_moved else UNMOVED,
         why=why_of(state),
         ahead=AheadErrors(search.models.horizon_s, *fitted, *(held or (None, None))),
     )

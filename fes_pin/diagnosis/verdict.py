@@ -84,6 +84,7 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
             evidence=evidence_of(folds, found, self._alike),
             lack_of_fit=lack_of_fit(found.best),
             is_random=are_large(random := random_parts(found.best)),
+            is_moved=is_moved_by_what_is_recorded(found.best),
             folds=folds,
             random=random,
             no_noise=no_noise(found.best),
@@ -94,11 +95,6 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
         whole = Fold(found.nominal, found.best, found.without, self.models.trials)
         gains = gains_of([whole], found.without, self.models.judged_s, self.models.seed)
         return {n: replace(one, on=FITTED) for n, one in gains.items()}
-
-    def of(self, found: Found, replaced: State[Any, Any, Any] | None = None) -> RigState:
-        """Return the state to which no claim objects; one without causes where the input does not move the rig."""
-        moved = is_moved_by_what_is_recorded(found.best)
-        return super().of(found if moved else self.search.result(()), replaced)
 
     def errors_chosen(self, state: RigState) -> tuple[float, float] | None:
         """See `Verdict.errors_chosen`; None without trials that are held out."""

@@ -20,6 +20,7 @@ from fes_pin.infer.search import M, Search, SearchResult
 from fes_pin.infer.text import WHOLE, probability
 
 CLAIMS = {
+    "drop_unmoved": "the motion is as likely without the recorded input, so something else moves the system",
     "drop_errors_of_form": "process noise is large, and it gains no more than an error of form may",
     "drop_unsupported": "held-out data do not confirm it",
     "drop_not_carried": "it gains nothing on other parts of the data, where it must act too",
@@ -114,6 +115,8 @@ class Weighed:
         Gains, percent, on other parts of the data than a candidate was fitted to, of those that must act there too.
     is_random
         Whether process noise is more than a small share of what drives the system.
+    is_moved
+        Whether what is recorded as driving the system makes its motion more likely.
     """
 
     gains: Mapping[str, Gain]
@@ -122,6 +125,7 @@ class Weighed:
     is_robust: bool = False
     carried: Mapping[str, float] = field(default_factory=dict)
     is_random: bool = False
+    is_moved: bool = True
 
 
 W = TypeVar("W", bound=Weighed)
@@ -244,6 +248,10 @@ class Verdict(ABC, Generic[F, M, W]):
                     break
             else:
                 return state
+
+    def drop_unmoved(self, state: State[F, M, W]) -> State[F, M, W] | None:
+        """Reject the weakest candidate of a set by which the recorded inputs do not move the system."""
+        return self._without_weakest(state, [] if state.weighed.is_moved else list(state.weighed.gains))
 
     def drop_insignificant(self, state: State[F, M, W]) -> State[F, M, W] | None:
         """Reject the weakest of the candidates that are not significant at the level of a claim."""

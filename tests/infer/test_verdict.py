@@ -201,3 +201,14 @@ def test_the_table_of_claims_is_whole_and_the_same_for_every_front_end():
     assert set(TABLE) == drops | {"settle"} and all(TABLE.values())
     fronts = RigVerdict, ContrastVerdict, WalkVerdict
     assert not any(set(TABLE) & set(vars(front)) or "evidence" in vars(front) for front in fronts)
+
+
+def test_nothing_is_named_of_a_system_that_the_recorded_inputs_do_not_move(two_columns):
+    """A spring or friction is then mistaken for what did move it."""
+
+    class Unmoved(RegressionVerdict):
+        def weigh(self, found):
+            return replace(super().weigh(found), is_moved=False)
+
+    state = Unmoved(two_columns).of(two_columns.run())
+    assert state.names == frozenset() and {r.claim for r in state.rejected.values()} == {"drop_unmoved"}
