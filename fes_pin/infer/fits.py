@@ -48,7 +48,9 @@ class Sets(ABC, Generic[F]):
     fits
         Fits by names in alphabetical order; `()` is the nominal model.
     most_candidates
-        Most candidates in a set; None for no bound. One candidate at several sites counts as one.
+        Most candidates in a set; None for no bound.
+    acts_at_all
+        Whether a candidate may act at all of its sites, as friction does at joints. It then counts as one.
     converged_sets
         Number of best sets of a size that are fitted until they converge.
     family
@@ -56,6 +58,7 @@ class Sets(ABC, Generic[F]):
     """
 
     most_candidates: int | None = MOST_CAUSES
+    acts_at_all = True
     converged_sets = CONVERGED
     family: Family
 
@@ -83,12 +86,12 @@ class Sets(ABC, Generic[F]):
 
     def is_within(self, names: Names) -> bool:
         """Return whether a set has no more candidates than `most_candidates`."""
-        most = self.most_candidates
-        return most is None or len({Key.of(n)._replace(site="") for n in names}) <= most
+        kinds = {Key.of(n)._replace(site="") if self.acts_at_all else Key.of(n) for n in names}
+        return self.most_candidates is None or len(kinds) <= self.most_candidates
 
     def has_room(self, names: Names) -> bool:
         """Return whether a set may be extended by a further candidate, or by one of its own at another site."""
-        return self.is_within((*names, "")) or any(Key.of(n).site for n in names)
+        return self.is_within((*names, "")) or (self.acts_at_all and any(Key.of(n).site for n in names))
 
     def first(self) -> Names:
         """Return the fitted set that a search begins with: the nominal model, or one nearer to the data."""

@@ -126,6 +126,8 @@ class WalkModels(FittedSets[WalkFit, None]):
         For each form, the limits of its parameters: sizes that are physically possible.
     """
 
+    acts_at_all = False  # an error of one plate or segment says nothing of another
+
     def __init__(self, designs: Designs) -> None:
         super().__init__()
         self.designs = designs
