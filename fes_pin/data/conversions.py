@@ -1,10 +1,11 @@
 """Public recordings as they are published, made studies: what `fes-pin datasets` does with what it fetches.
 
-Each function takes the folder that holds the upstream files, by their paths in the repository, and gives the files of a
-study. The steps are those that the data set's description names; nothing is filtered.
+Each function takes the folder that holds the upstream files and their paths in the repository, as `datasets.json` lists
+them, and gives the files of a study. The steps are those that the data set's description names; nothing is filtered.
 """
 
-from collections.abc import Callable, Mapping
+import re
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -21,20 +22,13 @@ from fes_pin.data.units import INCH, POUND
 SHORT = "{:.6g}".format
 Files = dict[str, str]
 
-SERVO_LOGS = tuple(
-    f"bam/data.bak/raw/2026-01-15_10h{time}.json"
-    for time in (
-        *("28m10", "28m17", "28m24", "28m32", "28m42", "28m49", "28m57", "29m04"),
-        *("29m14", "29m21", "29m29", "29m37", "29m47", "29m54", "30m02", "30m10"),
-    )
-)
 SERVO_PULSES, SERVO_TORQUE, SERVO_RESISTANCE = 885.0, 0.3232, 4.7637
 """Full pulse width of the servo's PWM; torque constant in N m/A and resistance in Ohm as the data's authors identified
 them (Rhoban/bam, params/xl330/m1.json)."""
 SERVO_RATE_HZ, DAMPER_RATE_HZ = 200.0, 500.0
 
 
-def servo_pendulum(folder: Path) -> Files:
+def servo_pendulum(folder: Path, places: Iterable[str]) -> Files:
     """A servo that carries a known mass: logs of 3.4 to 7 ms a row, interpolated to 200 Hz, the effort held.
 
     effort = kt/R (PWM / 885 x supply - kt w), 0 while the motor is off.
@@ -45,7 +39,7 @@ def servo_pendulum(folder: Path) -> Files:
         A log that is not as they were when this was written.
     """
     files, trials = {}, []
-    for place in SERVO_LOGS:
+    for place in places:
         log = read_json(folder / place)
         rows = [_numbers(row, folder / place) for row in log["entries"]]
         t, q, w, pwm, volts, on = np.array(rows).T
@@ -71,22 +65,11 @@ def _numbers(row: Mapping[str, Any], path: Path) -> list[float]:
         raise InputError(f"not a log as it was when this was written: {problem}", file=path) from None
 
 
-_CYCLED = "data/dataset-1/characterization datasets/{rate}{pull}lbtension.json"
-_WIDENED = "data/dataset-3/characterization tests/{rate}30lbtension{wide}amplitude.json"
-_RATES = ("0.5Hz", "1Hz")
-DAMPER_FILES = {
-    f"d1_{pull}lb_{rate.lower()}": (_CYCLED.format(rate=rate, pull=pull), f"{pull} lb")
-    for pull in (20, 35, 70)
-    for rate in _RATES
-} | {
-    f"d3_30lb_{rate.lower()}_{wide}in": (_WIDENED.format(rate=rate, wide=wide), "30 lb, 2023")
-    for wide in ("0.5", "1", "1.5")
-    for rate in _RATES
-}
-"""By the trial's name its file, and the tension that the experimenter set."""
+_DAMPER_FILE = re.compile(r".*-(\d)/.*/([\d.]+Hz)(\d+lb)tension(?:([\d.]+)amplitude)?\.json")
+"""Which data set, rate, tension that the experimenter set, and in the later one the amplitude in inches."""
 
 
-def friction_damper(folder: Path) -> Files:
+def friction_damper(folder: Path, places: Iterable[str]) -> Files:
     """A banded friction damper: inch to m, kip to N, 1024 Hz interpolated to 500 Hz; actuators' forces left out.
 
     Raises
@@ -95,7 +78,10 @@ def friction_damper(folder: Path) -> Files:
         A file that is not as they were when this was written.
     """
     files, trials = {}, []
-    for name, (place, group) in DAMPER_FILES.items():
+    for place in places:
+        number, rate_hz, tension, wide = _DAMPER_FILE.findall(place)[0]
+        name = f"d{number}_{tension}_{rate_hz.lower()}" + (f"_{wide}in" if wide else "")
+        group = tension.replace("lb", " lb, 2023" if wide else " lb")
         try:
             table = np.array(read_json(folder / place)["data"], dtype=float)
             t, inches, kips, rate = table[:, 0], table[:, 1], table[:, 2], table[:, 3]
@@ -113,10 +99,7 @@ def friction_damper(folder: Path) -> Files:
     return {**files, "study.toml": _study("friction-damper", rig, start, trials)}
 
 
-PENDULUM_FILE = "SinglePendulumDataForParameterEstimation.mat"
-
-
-def free_pendulum(folder: Path) -> Files:
+def free_pendulum(folder: Path, places: Iterable[str]) -> Files:
     """Free swings in MATLAB cells: `Y_id`, `Y_vad` with angle and rate, `Time_id`, `Time_vad` with their times.
 
     Raises
@@ -124,7 +107,7 @@ def free_pendulum(folder: Path) -> Files:
     InputError
         A file that does not hold them, or pymatreader is not installed.
     """
-    path = folder / PENDULUM_FILE
+    path = folder / next(iter(places))
     found = matlab_vectors(path)
     files, trials = {}, []
     for ours, theirs, role in (("fit", "id", "fit"), ("held", "vad", "held_out")):
@@ -146,12 +129,10 @@ def free_pendulum(folder: Path) -> Files:
     return {**files, "study.toml": _study("free-pendulum", {"urdf": "pendulum.urdf"}, start, trials)}
 
 
-CONVERTERS: Mapping[str, tuple[Callable[[Path], Files], tuple[str, ...]]] = {
-    "free_pendulum": (free_pendulum, (PENDULUM_FILE,)),
-    "friction_damper": (friction_damper, tuple(place for place, _ in DAMPER_FILES.values())),
-    "servo_pendulum": (servo_pendulum, SERVO_LOGS),
+CONVERTERS: Mapping[str, Callable[[Path, Iterable[str]], Files]] = {
+    one.__name__: one for one in (free_pendulum, friction_damper, servo_pendulum)
 }
-"""By data set what makes a study of it, and the upstream files that this needs."""
+"""By data set what makes a study of it."""
 
 
 def _study(name: str, rig: Mapping[str, Any], start: Mapping[str, float], trials: list[dict[str, str]]) -> str:

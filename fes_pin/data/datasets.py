@@ -166,13 +166,14 @@ def _fetched(name: str, target: Path, unverified: bool, outputs: Outputs) -> Fil
     outputs.check(target, ("study.toml", *dataset.converted))
     with tempfile.TemporaryDirectory(prefix="fes-pin-") as scratch:
         _retrieve(dataset, Path(scratch))
-        made = CONVERTERS[name][0](Path(scratch))
+        made = CONVERTERS[name](Path(scratch), dataset.upstream)
     trusted = all(dataset.upstream.values())
-    other = [p for p, known in dataset.converted.items() if _sha256(made.get(p, "")) != known]
+    found = {place: hashlib.sha256(text.encode()).hexdigest() for place, text in made.items()}
+    other = [place for place, known in dataset.converted.items() if found.get(place) != known]
     if not trusted and other and not unverified:
-        found = f"{len(other)} of {len(dataset.converted)} trials differ from those that the documentation was written"
+        differ = f"{len(other)} of {len(dataset.converted)} trials differ from those that the documentation was written"
         hint = "unverified=True keeps them all the same"
-        message = f"{found} with ({other[0]} is one), and no checksum of its origin is known; {hint}"
+        message = f"{differ} with ({other[0]} is one), and no checksum of its origin is known; {hint}"
         raise InputError(message, column=name)
     about = f"# From {dataset.origin}\n# {dataset.licence}; converted by fes-pin datasets. {dataset.reference}".rstrip()
     made["study.toml"] = f"{about}\n{made['study.toml']}"
@@ -198,7 +199,3 @@ def _retrieve(dataset: Dataset, scratch: Path) -> None:
 
 def _short(error: BaseException) -> str:
     return " ".join(f"{type(error).__name__}: {error}".split())[:160]
-
-
-def _sha256(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()

@@ -3,7 +3,8 @@
     scripts/generate/dataset_registry.py              repositories, commits, licences, checksums of the converted trials
     scripts/generate/dataset_registry.py --download   also checksums of the upstream files, from their repositories
 
-Checksums of upstream files that are in the registry already stay; `--download` needs the network, and pooch.
+Upstream files are those that are in the registry already, and their checksums stay; the files of a new data set are
+listed there by hand. `--download` needs the network, and pooch.
 """
 
 from __future__ import annotations
@@ -56,11 +57,10 @@ def entry(name: str, folder: Path, known: dict[str, str | None]) -> dict[str, ob
     """One data set's part of the registry."""
     title, repository, commit = described(folder)
     file, licence, reference, by_hand = WANTED[name]
-    files = CONVERTERS[name][1] if name in CONVERTERS else ()
-    trials = sorted((folder / "trials").glob("*.csv")) if files else []
+    trials = sorted((folder / "trials").glob("*.csv")) if name in CONVERTERS else []
     return {
         **{"what": title, "repository": repository, "commit": commit, "file": file, "licence": licence},
-        "upstream": {place: known.get(place) for place in files},
+        "upstream": known,
         "converted": {f"trials/{t.name}": hashlib.sha256(t.read_bytes()).hexdigest() for t in trials},
         **{"reference": reference, "by_hand": by_hand},
     }

@@ -304,7 +304,7 @@ def test_a_recording_that_the_shell_gives_is_an_input(sandbox):
 def test_data_sets_are_all_fetched_or_none(sandbox, monkeypatch, capsys):
     made = {"study.toml": "x", "a.csv": "x"}
     monkeypatch.setattr("fes_pin.data.datasets._retrieve", lambda *_: None)
-    monkeypatch.setattr("fes_pin.data.datasets.CONVERTERS", {"servo_pendulum": (lambda _: dict(made), ())})
+    monkeypatch.setattr("fes_pin.data.datasets.CONVERTERS", {"servo_pendulum": lambda *_: dict(made)})
     words = ("datasets", "servo_pendulum", "--unverified", "--out", "sets")
     fails(monkeypatch, capsys, *words, "biceps_fes")
     assert not Path("sets").exists()
