@@ -1,19 +1,14 @@
 """`fes-pin cohort`: many studies, resumable, on this machine or on a Dask cluster."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from fes_pin.cli.group import needs
 from fes_pin.cli.options import Force, Libraries, Limit, Seed, output
 from fes_pin.cli.progress import progress
-
-if TYPE_CHECKING:
-    from fes_pin.cohort.run import CohortProgress
 
 SAID_EVERY_S = 30.0
 """Seconds between lines of progress where nobody watches."""
@@ -39,10 +34,6 @@ def cohort(
     from fes_pin.data.provenance import this_command
 
     with progress(SAID_EVERY_S) as tell:
-
-        def report(p: CohortProgress) -> None:
-            tell(p.done / p.total, f"{p.done} of {p.total}, {p.failed} failed, {_left(p.left_s)}, {p.name}")
-
         made = run_cohort(
             studies,
             out,
@@ -53,7 +44,7 @@ def cohort(
             library=tuple(library or ()),
             command=this_command(),
             force=force,
-            progress=report,
+            progress=tell,
         )
     good = len(made.studies) - len(made.failed)
     typer.echo(f"{good} of {len(made.studies)} studies diagnosed")
@@ -62,12 +53,3 @@ def cohort(
     for row in made.failed:
         typer.echo(f"failed: {row['study']}: {row['error']}", err=True)
     typer.echo(f"page: {out / 'cohort.html'}")
-
-
-def _left(seconds: float | None) -> str:
-    """Time left in words."""
-    if seconds is None:
-        return "time left not known yet"
-    if seconds < 90.0:
-        return f"{seconds:.0f} s left"
-    return f"{seconds / 60.0:.0f} min left" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h left"

@@ -21,6 +21,7 @@ from fes_pin.data.table import SUFFIXES, table_bytes
 from fes_pin.infer.result import shown
 from fes_pin.models.catalogue import load_library
 from fes_pin.verdict.ask import OF_ALL, OF_WALKS
+from fes_pin.workers import Progress
 
 STUDY = "study.toml"
 
@@ -60,27 +61,6 @@ def _named(folders: Sequence[Path]) -> dict[str, Path]:
 def _unique(name: str, number: int, count: Counter[str]) -> str:
     safe = "".join(c if c.isalnum() or c in "-_.+" else "_" for c in name).lstrip(".")
     return safe if safe and count[name] == 1 else f"{safe}-{number + 1}"
-
-
-@dataclass(frozen=True)
-class CohortProgress:
-    """Progress of a cohort.
-
-    Attributes
-    ----------
-    done, total, failed
-        Studies; those of an earlier run are done.
-    left_s
-        Seconds that the others will take, about; None before the first is there.
-    name
-        Of the study that came last.
-    """
-
-    done: int
-    total: int
-    failed: int
-    left_s: float | None
-    name: str
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -128,7 +108,7 @@ def run_cohort(
     limit: float | None = None,
     library: Sequence[str] = (),
     command: str = "",
-    progress: Callable[[CohortProgress], None] | None = None,
+    progress: Progress | None = None,
     run: Callable[[Work, str], Answer] = diagnose_one,
     force: bool = False,
 ) -> Cohort:
@@ -149,7 +129,7 @@ def run_cohort(
     command
         The command line that this is run by, for reports and page; "" for a call from Python.
     progress
-        Called after each study.
+        Called after each study with the share that is done and a few words; studies of an earlier run are done.
     run
         What diagnoses one study.
     force
@@ -169,7 +149,7 @@ def run_cohort(
     every = [Work(n, str(f), seed, limit, library, command) for n, f in found.items()]
     todo: list[Task] = [(work, key) for work in every if not store.has(work, key := work.key())]
     _check_outputs(outputs, out, [store.place(work.name) for work, _ in todo])
-    tell, began = progress or (lambda _progress: None), time.monotonic()
+    tell, began = progress or (lambda _share, _words: None), time.monotonic()
     waiting: list[Answer] = []  # failures, until there is a study that did not fail: else nothing is written
     undone = {work.name for work, _ in todo}
     errors = {name: one.error for name in found if name not in undone and (one := store.get(name)) is not None}
@@ -180,14 +160,22 @@ def run_cohort(
         errors[answer.name] = answer.error
         while waiting and not all(errors.values()):
             store.put(waiting.pop(0))
-        left = (time.monotonic() - began) / (len(errors) - before) * (len(every) - len(errors))
-        tell(CohortProgress(len(errors), len(every), sum(map(bool, errors.values())), left, answer.name))
+        done, total = len(errors), len(every)
+        left = _left((time.monotonic() - began) / (done - before) * (total - done))
+        tell(done / total, f"{done} of {total}, {sum(map(bool, errors.values()))} failed, {left}, {answer.name}")
     if all(errors.values()):
         raise InputError(f"none of {len(found)} studies could be diagnosed; the first: {min(errors.items())[1]}")
 
     made = Cohort(**tables_of(map(store.get, found), len(catalogue.effects)))  # one is held at a time
     outputs.write(out, _files(made, seed, command))
     return made
+
+
+def _left(seconds: float) -> str:
+    """Time left in words."""
+    if seconds < 90.0:
+        return f"{seconds:.0f} s left"
+    return f"{seconds / 60.0:.0f} min left" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h left"
 
 
 def _check_outputs(outputs: Outputs, out: Path, folders: Sequence[Path]) -> None:

@@ -5,7 +5,7 @@ The page says which causes are in which studies, what is common to them, and lin
 
 import math
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from fes_pin.cohort.one import Kept
@@ -58,9 +58,25 @@ def _number(value: Any) -> float:
     return math.nan if value is None else float(value)
 
 
-def cause_rows(one: Kept) -> list[Row]:
-    """Return every parameter of every cause of a study."""
-    return [row for cause in one.record.get("causes", ()) for row in _cause(one.name, cause)]
+def cause_rows(one: Kept) -> Iterator[Row]:
+    """Yield every parameter of every cause of a study."""
+    for cause in one.record.get("causes", ()):
+        gain = cause.get("gain_percent") or {}
+        low, high = gain.get("ci95") or (None, None)
+        for name, size in cause["parameters"].items():
+            yield {
+                "study": one.name,
+                "cause": cause["name"],
+                "stage": cause.get("stage", ""),
+                "parameter": name,
+                "value": _number(size["value"]),
+                "std": _number(size["std"]),
+                "p_value": _number(cause.get("p_value")),
+                "gain_percent": _number(gain.get("held_out")),
+                "gain_low": _number(low),
+                "gain_high": _number(high),
+                "equivalents": " ".join(cause.get("equivalents", ())),
+            }
 
 
 def with_rates(rows: Sequence[Row], tests: int) -> list[Row]:
@@ -68,27 +84,6 @@ def with_rates(rows: Sequence[Row], tests: int) -> list[Row]:
     named = {(r["study"], r["cause"]): r["p_value"] for r in rows}
     rates = dict(zip(named, discovery_rates(list(named.values()), tests).tolist(), strict=True))
     return [{**r, "false_discovery_rate": rates[r["study"], r["cause"]]} for r in rows]
-
-
-def _cause(study: str, cause: Mapping[str, Any]) -> list[Row]:
-    gain = cause.get("gain_percent") or {}
-    low, high = gain.get("ci95") or (None, None)
-    return [
-        {
-            "study": study,
-            "cause": cause["name"],
-            "stage": cause.get("stage", ""),
-            "parameter": name,
-            "value": _number(one["value"]),
-            "std": _number(one["std"]),
-            "p_value": _number(cause.get("p_value")),
-            "gain_percent": _number(gain.get("held_out")),
-            "gain_low": _number(low),
-            "gain_high": _number(high),
-            "equivalents": " ".join(cause.get("equivalents", ())),
-        }
-        for name, one in cause["parameters"].items()
-    ]
 
 
 def nominal_rows(one: Kept) -> list[Row]:

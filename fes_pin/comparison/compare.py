@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from fes_pin.comparison.held_out import Parting, left_out_errors, partings, spread_noise
-from fes_pin.comparison.literature import RIGS, possible, published_model
+from fes_pin.comparison.literature import NOMINAL, RIGS, Published, possible, published_model
 from fes_pin.comparison.result import Apart, Compared, Comparison, apart_from
 from fes_pin.data.asked import asked
 from fes_pin.data.errors import InputError
@@ -92,9 +92,9 @@ def compare(
     white, floor = spread_noise(nominal, every), rough_noise(nominal, every)
     compared = []
     with one_thread_each():
-        for k, one in enumerate(chosen):
-            tell(k / len(chosen), one.name)
-            compared.append(_compared(one, parts, fitted, white, floor, horizon, given_s))
+        for k, (about, model) in enumerate(chosen):
+            tell(k / len(chosen), about.name)
+            compared.append(_compared(about, model, parts, fitted, white, floor, horizon, given_s))
     tell(1.0, "done")
     ranked = sorted(compared, key=lambda m: m.percent["free"])
     return Comparison(
@@ -109,41 +109,36 @@ def compare(
     )
 
 
-class _Chosen:
-    """A model that is compared, before it is fitted."""
-
-    def __init__(self, name: str, model: Model, words: str = "", source: str = "", unfelt: tuple[str, ...] = ()):
-        self.name, self.model, self.words, self.source, self.unfelt = name, model, words, source, unfelt
-
-
 def _chosen(
     models: Sequence[str] | None,
     extended: Mapping[str, Model | str | Path] | None,
     nominal: Model,
     trials: Sequence[Trial],
     library: Source | Sequence[Source] | None,
-) -> list[_Chosen]:
+) -> list[tuple[Published, Model]]:
+    """The models that are compared, before they are fitted, and what is said of each."""
     out = []
     names = possible(trials) if models is None else instance(models, Iterable, "models")
     for name in dict.fromkeys(str(name) for name in ([names] if isinstance(names, str) else names)):
         one = published_model(name)
-        model = one.model(nominal, trials)
-        out.append(_Chosen(name, model, one.words, one.source, one.unfelt(model, trials)))
+        out.append((one, one.model(nominal, trials)))
     for name, given in instance({} if extended is None else extended, Mapping, "extended").items():
         own = given if isinstance(given, Model) else load_model(given, library=library)
         if own.rig.name != nominal.rig.name:
             raise InputError(f"expected a model of the rig {nominal.rig.name}, found one of {own.rig.name}: {name}")
-        if any(name == c.name for c in out):
+        if any(name == c.name for c, _ in out):
             raise InputError(f"expected one model of the name {name}, found two")
         rig = replace(own.rig, constants=nominal.rig.constants)
-        out.append(_Chosen(name, Model(rig, own.effects)))
+        unpublished = replace(published_model(NOMINAL), name=name)
+        out.append((unpublished, Model(rig, own.effects)))
     if not out:
         raise InputError("expected at least one model to compare", column="models")
     return out
 
 
 def _compared(
-    one: _Chosen,
+    about: Published,
+    model: Model,
     parts: Sequence[Parting],
     fitted: Sequence[Trial],
     white: Mapping[str, Noise],
@@ -152,22 +147,22 @@ def _compared(
     given_s: float | None,
 ) -> Compared:
     """A model with its errors; `white` weighs the columns in its fits, `floor` in E."""
-    fits = in_parallel(lambda p: fit_multistart(Problem(one.model, p.fitted, white)), parts)
+    fits = in_parallel(lambda p: fit_multistart(Problem(model, p.fitted, white)), parts)
     kinds = left_out_errors(fits, parts, horizon_s, given_s)
-    whole = fits[0] if len(parts) == 1 else fit_multistart(Problem(one.model, fitted, white))
+    whole = fits[0] if len(parts) == 1 else fit_multistart(Problem(model, fitted, white))
     trials = [t for p in parts for t in p.held]
-    columns = np.array([one.model.rig.output(t.kind) for t in trials])
+    columns = np.array([model.rig.output(t.kind) for t in trials])
     weight = np.array([np.isfinite(t[c]).sum() / floor[c].std ** 2 for t, c in zip(trials, columns, strict=True)])
     around = weight * kinds.pop("around")
     squares = {n: len(trials) * 100.0 * weight * e / around.sum() for n, e in kinds.items()}
     rows = {str(c): columns == c for c in dict.fromkeys(columns)}
     rmse = {c: {n: math.sqrt(float(e[k].mean())) for n, e in kinds.items()} for c, k in rows.items()}
     return Compared(
-        name=one.name,
-        words=one.words,
-        source=one.source,
+        name=about.name,
+        words=about.words,
+        source=about.source,
         parameters=len(whole.free),
-        unfelt=one.unfelt,
+        unfelt=about.unfelt(model, trials),
         rmse=rmse,
         percent={n: percent_of_spread(weight * e, around) for n, e in kinds.items()},
         squares=squares,

@@ -26,13 +26,19 @@ def rows(path):
 def test_one_bad_study_and_one_that_kills_its_process_stop_no_other(tmp_path):
     names = ["a0", "bad", "f1", "f2", "killer", "z9"]
     places, told = studies(tmp_path / "in", names), []
-    made = run_cohort([places], tmp_path / "out", workers=2, progress=told.append, run=quick)
+
+    def tell(share, words):
+        told.append((share, words.split(", ")))
+
+    made = run_cohort([places], tmp_path / "out", workers=2, progress=tell, run=quick)
     assert [r["study"] for r in made.studies] == names
     assert {r["study"]: r["error"] for r in made.failed} == {
         "bad": "study.toml, rig: expected a rig",
         "killer": "the process that diagnosed it died: out of memory, or killed",
     }
-    assert [p.done for p in told] == [1, 2, 3, 4, 5, 6] and told[-1].failed == 2 and told[-1].left_s == 0.0
+    assert [share for share, _ in told] == [k / 6 for k in range(1, 7)]
+    assert [words[0] for _, words in told] == [f"{k} of 6" for k in range(1, 7)]
+    assert told[-1][1][1:3] == ["2 failed", "0 s left"] and sorted(words[3] for _, words in told) == names
     assert [(r["cause"], r["studies"], r["alone"]) for r in made.prevalence] == [("coulomb_friction", 2, 2)]
     by_parameter = {r["parameter"]: r for r in made.pooled}
     assert by_parameter["torque_nm"]["studies"] == 2 and by_parameter["gain"]["studies"] == 4

@@ -6,13 +6,13 @@ numbers.
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import as_path, read_bytes, read_text
 from fes_pin.data.recorded.formats import check_suffix, is_text, read_recording
-from fes_pin.data.recorded.text import DELIMITERS, MISSING, TextForm, cells_of, read_text_recording
+from fes_pin.data.recorded.text import DECIMALS, DELIMITERS, MISSING, TextForm, cells_of, read_text_recording
 from fes_pin.data.schema import MEANT, RigSchema, without_unit
 from fes_pin.data.table import Table
 from fes_pin.data.units import UNITS, known_unit, quantities_of, split_header
@@ -27,18 +27,6 @@ _NUMBER = {
 }
 
 
-@dataclass(frozen=True)
-class _Guess:
-    """One way to read the lines: how much of them is numbers then."""
-
-    share: float
-    columns: int
-    rows: int
-    first: int
-    delimiter: str
-    decimal: str
-
-
 def sniff(path: Path) -> tuple[TextForm, dict[int, str]]:
     """The form that a text file seems to have, and the units that a row of it names, by place of the column.
 
@@ -49,14 +37,14 @@ def sniff(path: Path) -> tuple[TextForm, dict[int, str]]:
     """
     encoding = _encoding(path)
     lines = read_text(path, encoding).split("\n")[:LOOKED_AT]
-    guesses = [g for d in DELIMITERS for c in (".", ",") if (g := _guess(lines, d, c)) is not None]
-    if not guesses:
+    forms = [TextForm(delimiter, decimal, encoding=encoding) for delimiter in DELIMITERS for decimal in DECIMALS]
+    rows, form = max(((_rows(lines, form), form) for form in forms), key=lambda pair: _likely(*pair))
+    if not rows:
         raise InputError("expected rows of numbers, found none", file=path)
-    best = max(guesses, key=lambda g: (round(g.share, 3), g.rows > 1, g.columns, g.decimal == "."))
+    first, kinds = rows[-1]
     comment = next((c for line in lines for c in COMMENTS if line.lstrip().startswith(c)), "")
-    header, units = _header(lines, best, comment)
-    form = TextForm(best.delimiter, best.decimal, header, best.first + 1, comment, encoding)
-    return form, units
+    header, units = _header(lines[:first], replace(form, comment=comment), len(kinds))
+    return replace(form, header_row=header, first_row=first + 1, comment=comment), units
 
 
 def _encoding(path: Path) -> str:
@@ -72,38 +60,38 @@ def _encoding(path: Path) -> str:
     return "utf-8"
 
 
-def _guess(lines: list[str], delimiter: str, decimal: str) -> _Guess | None:
-    """The rows at the end of the lines that are numbers read this way; None if there are none."""
-    number = _NUMBER[decimal]
+def _rows(lines: list[str], form: TextForm) -> list[tuple[int, list[bool]]]:
+    """The rows at the end of the lines that are numbers read this way, last first; of each cell whether it is one."""
+    number = _NUMBER[form.decimal]
     rows: list[tuple[int, list[bool]]] = []
     for place in range(len(lines) - 1, -1, -1):
         line = lines[place]
         if not line.strip() or line.lstrip().startswith(COMMENTS):
             continue
-        cells = cells_of(line, TextForm(delimiter))
+        cells = cells_of(line, form)
         kinds = [bool(number.match(cell)) or cell.lower() in MISSING for cell in cells]
-        numbers = sum(bool(number.match(cell)) for cell in cells)
-        if rows and len(kinds) != len(rows[0][1]):
-            break
-        if not numbers:
+        if (rows and len(kinds) != len(rows[0][1])) or not any(map(number.match, cells)):
             break
         rows.append((place, kinds))
-    if not rows:
-        return None
-    cells_in_all = sum(len(kinds) for _, kinds in rows)
-    share = sum(sum(kinds) for _, kinds in rows) / cells_in_all
-    return _Guess(share, len(rows[0][1]), len(rows), rows[-1][0], delimiter, decimal)
+    return rows
 
 
-def _header(lines: list[str], best: _Guess, comment: str) -> tuple[int, dict[int, str]]:
-    """Row of the names above the numbers, 0 if there is none; and the units of a row between, by place."""
+def _likely(rows: list[tuple[int, list[bool]]], form: TextForm) -> tuple[float, bool, int, bool]:
+    """What the likeliest way to read the lines has most of: numbers among its cells first."""
+    cells = [kind for _, kinds in rows for kind in kinds]
+    share = sum(cells) / max(len(cells), 1)
+    return round(share, 3), len(rows) > 1, len(cells) // max(len(rows), 1), form.decimal == "."
+
+
+def _header(lines: list[str], form: TextForm, columns: int) -> tuple[int, dict[int, str]]:
+    """Row of the names in the lines above the numbers, 0 if there is none; and the units of a row between, by place."""
     units: dict[int, str] = {}
     nearest = 0
-    for place in range(best.first - 1, -1, -1):
+    for place in range(len(lines) - 1, -1, -1):
         line = lines[place].lstrip()
-        cells = cells_of(line.removeprefix(comment), TextForm(best.delimiter))
-        cells += [""] * (len(cells) == best.columns - 1)  # a last one that is empty, as of a unit of words
-        if not line or len(cells) != best.columns or not any(re.search(r"[^\W\d_]", c) for c in cells):
+        cells = cells_of(line.removeprefix(form.comment), form)
+        cells += [""] * (len(cells) == columns - 1)  # a last one that is empty, as of a unit of words
+        if not line or len(cells) != columns or not any(re.search(r"[^\W\d_]", c) for c in cells):
             continue
         if not units and place and _are_units(cells):
             units, nearest = {k: cell.strip("[](){} ") for k, cell in enumerate(cells)}, place + 1
