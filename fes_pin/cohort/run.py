@@ -171,11 +171,15 @@ def run_cohort(
     return made
 
 
+IN_MINUTES_S, IN_HOURS_S = 90.0, 5400.0
+"""Times from which on they are told in minutes, and in hours."""
+
+
 def _left(seconds: float) -> str:
     """Time left in words."""
-    if seconds < 90.0:
+    if seconds < IN_MINUTES_S:
         return f"{seconds:.0f} s left"
-    return f"{seconds / 60.0:.0f} min left" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h left"
+    return f"{seconds / 60.0:.0f} min left" if seconds < IN_HOURS_S else f"{seconds / 3600.0:.1f} h left"
 
 
 def _check_outputs(outputs: Outputs, out: Path, folders: Sequence[Path]) -> None:

@@ -25,6 +25,7 @@ Files = dict[str, str]
 SERVO_PULSES, SERVO_TORQUE, SERVO_RESISTANCE = 885.0, 0.3232, 4.7637
 """Full pulse width of the servo's PWM; torque constant in N m/A and resistance in Ohm as the data's authors identified
 them (Rhoban/bam, params/xl330/m1.json)."""
+SERVO_COLUMNS = ("timestamp", "position", "speed", "load", "input_volts", "torque_enable")
 SERVO_RATE_HZ, DAMPER_RATE_HZ = 200.0, 500.0
 
 
@@ -41,7 +42,10 @@ def servo_pendulum(folder: Path, places: Iterable[str]) -> Files:
     files, trials = {}, []
     for place in places:
         log = read_json(folder / place)
-        rows = [_numbers(row, folder / place) for row in log["entries"]]
+        try:
+            rows = [[float(row[key]) for key in SERVO_COLUMNS] for row in log["entries"]]
+        except (KeyError, TypeError, ValueError) as problem:
+            raise InputError(f"not a log as it was when this was written: {problem}", file=folder / place) from None
         t, q, w, pwm, volts, on = np.array(rows).T
         current = (pwm / SERVO_PULSES * volts - SERVO_TORQUE * w) / SERVO_RESISTANCE
         effort = np.where(on > 0.5, SERVO_TORQUE * current, 0.0)
@@ -56,13 +60,6 @@ def servo_pendulum(folder: Path, places: Iterable[str]) -> Files:
     files["pendulum.urdf"] = arm_urdf("servo_pendulum", what, 0.49, -0.1, 1e-6, 1e-6)
     rig, start = {"urdf": "pendulum.urdf", "gravity_scale": 1.0}, {"inertia_scale": 1.2, "damping": 0.01}
     return {**files, "study.toml": _study("servo-pendulum", rig, start, sorted(trials, key=lambda t: t["file"]))}
-
-
-def _numbers(row: Mapping[str, Any], path: Path) -> list[float]:
-    try:
-        return [float(row[k]) for k in ("timestamp", "position", "speed", "load", "input_volts", "torque_enable")]
-    except (KeyError, TypeError, ValueError) as problem:
-        raise InputError(f"not a log as it was when this was written: {problem}", file=path) from None
 
 
 _DAMPER_FILE = re.compile(r".*-(\d)/.*/([\d.]+Hz)(\d+lb)tension(?:([\d.]+)amplitude)?\.json")

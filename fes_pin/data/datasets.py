@@ -193,9 +193,6 @@ def _retrieve(dataset: Dataset, scratch: Path) -> None:
             expected = None if known is None else f"sha256:{known}"
             pooch.retrieve(address, expected, fname=target.name, path=target.parent, downloader=fetcher)
         except Exception as error:
-            reason = "its checksum is another" if "does not match the known hash" in str(error) else _short(error)
+            what = " ".join(f"{type(error).__name__}: {error}".split())
+            reason = "its checksum is another" if "does not match the known hash" in what else what[:160]
             raise InputError(f"cannot be fetched: {reason}", file=address) from None
-
-
-def _short(error: BaseException) -> str:
-    return " ".join(f"{type(error).__name__}: {error}".split())[:160]

@@ -75,9 +75,9 @@ def errors_of(file: str | Path | None) -> Iterator[None]:
         raise InputError(error.message, file=file, column=error.column) from None
 
 
-def _short(name: str, most: int = 500) -> str:
+def _short(name: str) -> str:
     """A name without its middle, if it is longer than a line can hold."""
-    return name if len(name) <= most else f"{name[: most // 2]}...{name[-most // 2 :]}"
+    return name if len(name) <= 500 else f"{name[:250]}...{name[-250:]}"
 
 
 def optional_library(

@@ -5,6 +5,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy as np
 from fes_pin.data.errors import KeyFault
 from fes_pin.data.numbers import as_number, instance
 from fes_pin.data.read_only import ReadOnly
+from fes_pin.data.table import own_table
 
 ROLES = ("fit", "held_out")
 ALSO_OF_A_TRIAL = ("file", "kind", "role", "group", "name", "remarks", "low_pass_hz")
@@ -26,23 +28,9 @@ UNITS = (
 
 
 MEANT: Mapping[str, frozenset[str]] = {
-    column: frozenset(words.split())
-    for column, words in {
-        "time_s": "t time times timestamp clock seconds zeit temps tempo tiempo",
-        "effort": "effort torque force moment tau motor motortorque command commanded drive actuation current u "
-        "drehmoment couple kraft",
-        "position": "position angle theta q phi displacement encoder x pos winkel weg angolo angulo deplacement",
-        "velocity": "velocity speed rate omega qd dq v vel angvel gyro geschwindigkeit vitesse",
-        "pulse_width_us": "pulse width pw pulsewidth stim stimulus stimulation duration charge current pulsbreite",
-        "stim": "pulse pulses trigger stimulus stimulation sync",
-        "angle_rad": "angle theta q position goniometer ankle winkel",
-        "force_n": "force load tension cell f kraft",
-        "length_m": "length l lmtu lmtc mtu stretch displacement laenge longueur",
-        "torque_nm": "torque moment tau drehmoment couple",
-    }.items()
+    row["column"]: frozenset(row["words"].split()) for row in own_table(Path(__file__).with_name("column_words.csv"))
 }
-"""Words for what a column holds, as measuring systems name it; some are German, French, Italian or Spanish, without
-accents."""
+"""Words for what a column holds, as measuring systems name it."""
 
 
 @dataclass(frozen=True)

@@ -1,54 +1,28 @@
 """Units that recordings come in, and what they are in the study format's own.
 
-A table and no units library: a study holds eight quantities, every factor below is exact by definition (BIPM, The
-International System of Units, 9th edition; inch, pound-force and kilogram-force: NIST SP 811, appendix B), and headers
-write units as no library reads them: `Torque_Nm` is a newton metre, which a units library takes for a nanometre.
+A table and no units library: a study holds eight quantities, every factor of `units.csv` is exact by definition, and
+headers write units as no library reads them: `Torque_Nm` is a newton metre, which a units library takes for a
+nanometre.
 """
 
-import math
 import re
 from collections.abc import Callable, Mapping
+from itertools import groupby
+from operator import itemgetter
+from pathlib import Path
 
 from fes_pin.data.schema import without_unit
+from fes_pin.data.table import own_table
 
-DEG = math.pi / 180.0
-TURN = 2.0 * math.pi
-INCH, POUND, KILOGRAM = 0.0254, 4.4482216152605, 9.80665
-"""Inch in m, pound-force in N, kilogram-force in N."""
-
+_TABLE = own_table(Path(__file__).with_name("units.csv"))
 UNITS: Mapping[str, Mapping[str, float]] = {
-    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0},
-    "pulse width": {"us": 1.0, "ms": 1e3, "s": 1e6},
-    "angle": {"rad": 1.0, "mrad": 1e-3, "deg": DEG, "rev": TURN},
-    "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": INCH, "ft": 12.0 * INCH},
-    "angular rate": {"rad/s": 1.0, "mrad/s": 1e-3, "deg/s": DEG, "rev/s": TURN, "rpm": TURN / 60.0},
-    "speed": {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3, "in/s": INCH, "km/h": 1.0 / 3.6},
-    "force": {
-        "N": 1.0,
-        "mN": 1e-3,
-        "kN": 1e3,
-        "kgf": KILOGRAM,
-        "gf": 1e-3 * KILOGRAM,
-        "lbf": POUND,
-        "kip": 1e3 * POUND,
-    },
-    "torque": {
-        **{"N m": 1.0, "mN m": 1e-3, "kN m": 1e3, "N cm": 1e-2, "N mm": 1e-3},
-        **{"lbf in": POUND * INCH, "lbf ft": 12.0 * POUND * INCH, "kgf cm": 1e-2 * KILOGRAM, "kgf m": KILOGRAM},
-    },
-    "pulses": {"1": 1.0},
+    quantity: {row["unit"]: float(row["factor"]) for row in rows}
+    for quantity, rows in groupby(_TABLE, itemgetter("quantity"))
 }
 """Factor to the study format's own unit (SI; microseconds for pulse widths), by quantity and unit."""
-
-_SPELLINGS = {
-    **{"sec": "s", "secs": "s", "second": "s", "seconds": "s", "msec": "ms", "millisecond": "ms", "milliseconds": "ms"},
-    **{"usec": "us", "microseconds": "us", "minutes": "min", "hours": "h", "radian": "rad", "radians": "rad"},
-    **{"degree": "deg", "degrees": "deg", "turn": "rev", "turns": "rev", "dps": "deg/s", "degps": "deg/s"},
-    **{"radps": "rad/s", "rads": "rad/s", "degs": "deg/s", "revps": "rev/s", "mps": "m/s", "mmps": "mm/s"},
-    **{"mms": "mm/s", "ips": "in/s", "kmh": "km/h", "inch": "in", "inches": "in", "meter": "m", "metre": "m"},
-    **{"newton": "n", "newtons": "n", "lb": "lbf", "lbs": "lbf", "kg": "kgf", "kips": "kip", "inlb": "lbfin"},
-    **{"lbin": "lbfin", "inlbf": "lbfin", "ftlb": "lbfft", "lbft": "lbfft", "ftlbf": "lbfft", "kgcm": "kgfcm"},
-}
+INCH, POUND = UNITS["length"]["in"], UNITS["force"]["lbf"]
+"""Inch in m, pound-force in N."""
+_SPELLINGS: dict[str, str] = {}
 """Other spellings, as measuring systems write them, in the form that `_plain` leaves."""
 
 _BY_SUFFIX = {"s": "time", "us": "pulse width", "rad": "angle", "m": "length", "n": "force", "nm": "torque"}
@@ -62,6 +36,7 @@ def _plain(unit: str) -> str:
     return _SPELLINGS.get(text, text)
 
 
+_SPELLINGS.update((other, _plain(row["unit"])) for row in _TABLE for other in row["also"].split())
 _KNOWN = {quantity: {_plain(unit): unit for unit in units} for quantity, units in UNITS.items()}
 
 

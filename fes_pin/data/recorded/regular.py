@@ -1,6 +1,5 @@
 """Missing samples, and times that are not equally spaced: filled in only where a study says so, and reported."""
 
-import itertools
 from collections.abc import Collection
 from dataclasses import replace
 
@@ -97,11 +96,11 @@ def _check_gaps(table: Table, there: np.ndarray, name: str) -> None:
     if not there[0] or not there[-1]:
         sample = 0 if not there[0] else int(np.flatnonzero(there)[-1]) + 1 if there.any() else 0
         raise table.error("a sample is missing at an end of the recording; cut it there", name, sample)
-    steps = int(np.max(np.diff(np.flatnonzero(there))))
-    if steps > LONGEST_GAP:
-        first = next(a for a, b in itertools.pairwise(np.flatnonzero(there)) if b - a > LONGEST_GAP)
-        found = f"{steps - 1} samples in a row are missing; expected at most {LONGEST_GAP - 1}"
-        raise table.error(f"{found}; make two trials of it", name, int(first) + 1)
+    known = np.flatnonzero(there)
+    steps = np.diff(known)
+    if (most := int(steps.max())) > LONGEST_GAP:
+        found = f"{most - 1} samples in a row are missing; expected at most {LONGEST_GAP - 1}"
+        raise table.error(f"{found}; make two trials of it", name, int(known[np.argmax(steps > LONGEST_GAP)]) + 1)
 
 
 def _at(times: np.ndarray, known: np.ndarray, values: np.ndarray, held: bool) -> np.ndarray:
