@@ -64,7 +64,6 @@ def _of_a_body(command: Callable) -> Callable:
         return command(_body_options(**{name: given.pop(name) for name in common}), **given)
 
     vars(run)["__signature__"] = Signature([*own, *common.values()])
-    run.__annotations__ = {p.name: p.annotation for p in (*own, *common.values())}
     return run
 
 

@@ -140,9 +140,6 @@ class RigSchema(ReadOnly):
     name: str = ""
     owner: Any = None
 
-    def __post_init__(self) -> None:
-        self._freeze()
-
     def stimuli(self, kind: str) -> tuple[str, ...]:
         """The input columns of a kind of trial, of which it holds one, without a motion that it may impose."""
         return tuple(n for n in self.inputs if n != self.outputs[kind])

@@ -95,11 +95,6 @@ class Trial(ReadOnly):
         vars(self).update(labels, time=time, columns=columns, conditions=conditions)
         self._freeze()
 
-    def _freeze(self) -> None:
-        super()._freeze()
-        for values in self.columns.values():
-            values.setflags(write=False)
-
     def error(self, message: str, column: str, sample: int | None = None) -> InputError:
         """The error that names a column, this trial and a sample."""
         place = f"trial {self.name}" + ("" if sample is None else f", sample {sample}")
