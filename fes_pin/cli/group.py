@@ -219,10 +219,8 @@ class Commands(TyperGroup):
             held.release()
             return code if isinstance(code, int) else 0
         except InputError as error:
-            if not is_done:
-                return _refuse(f"fes-pin: {error}")
-            _refuse(f"fes-pin: {error}")
-            return _give_up(held.stream)
+            code = _refuse(f"fes-pin: {error}")
+            return _give_up(held.stream) if is_done else code
         except USAGE_ERROR as error:
             return _refuse(_in_one_line(error))
         except typer.Abort:

@@ -142,9 +142,7 @@ class Store:
         old = {p.name for p in place.iterdir() if p.is_file()} if place.is_dir() else set()
         self.outputs.write(place, files, without=old - set(files))
 
-    def get(self, name: str) -> Kept | None:
-        """One answer; None if there is none."""
+    def get(self, name: str) -> Kept:
+        """One answer that is there."""
         state = own_json(self.place(name) / STATE)
-        if not state:
-            return None
         return Kept(name, own_json(self.place(name) / "diagnosis.json"), str(state.get("error", "")))

@@ -148,11 +148,13 @@ def run_cohort(
     store = Store(out, outputs)
     every = [Work(n, str(f), seed, limit, library, command) for n, f in found.items()]
     todo: list[Task] = [(work, key) for work in every if not store.has(work, key := work.key())]
-    _check_outputs(outputs, out, [store.place(work.name) for work, _ in todo])
+    outputs.check(out, ("cohort.html", *(name + suffix for name in HEADS for suffix in SUFFIXES)))
+    for work, _ in todo:
+        outputs.check(store.place(work.name), (*OF_ALL, *OF_WALKS, STATE))
     tell, began = progress or (lambda _share, _words: None), time.monotonic()
     waiting: list[Answer] = []  # failures, until there is a study that did not fail: else nothing is written
     undone = {work.name for work, _ in todo}
-    errors = {name: one.error for name in found if name not in undone and (one := store.get(name)) is not None}
+    errors = {name: store.get(name).error for name in found if name not in undone}
     before = len(errors)
     on_it = scheduler if todo else None
     for answer in in_processes(todo, workers, run) if on_it is None else on_cluster(todo, on_it, run):
@@ -180,12 +182,6 @@ def _left(seconds: float) -> str:
     if seconds < IN_MINUTES_S:
         return f"{seconds:.0f} s left"
     return f"{seconds / 60.0:.0f} min left" if seconds < IN_HOURS_S else f"{seconds / 3600.0:.1f} h left"
-
-
-def _check_outputs(outputs: Outputs, out: Path, folders: Sequence[Path]) -> None:
-    outputs.check(out, ("cohort.html", *(f"{name}.{kind}" for name in HEADS for kind in ("csv", "parquet"))))
-    for folder in folders:
-        outputs.check(folder, (*OF_ALL, *OF_WALKS, STATE))
 
 
 def _files(made: Cohort, seed: int, command: str) -> dict[str, str | bytes]:

@@ -25,10 +25,10 @@ ERRORS = {f"{model}_{n}_percent": (model, n) for model in ("nominal", "extended"
 """Columns of errors E, by model and name in `diagnosis.json`: see `identify.error_measures`."""
 
 
-def tables_of(kept: Iterable[Kept | None], candidates: int) -> dict[str, Sequence[Row]]:
+def tables_of(kept: Iterable[Kept], candidates: int) -> dict[str, Sequence[Row]]:
     """Return the tables of a cohort, whose studies were each searched for so many candidates."""
     studies, causes, nominal = list[Row](), list[Row](), list[Row]()
-    for one in filter(None, kept):
+    for one in kept:
         studies.append(study_row(one))
         causes += cause_rows(one)
         nominal += nominal_rows(one)

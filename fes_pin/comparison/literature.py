@@ -104,8 +104,6 @@ DELAY_S = 0.025
 RECOVERY_S = 30.0
 """Time constants of fatigue, s: Riener and Fuhr 1998."""
 
-Made = Callable[[Sequence[Trial]], tuple[Effect, ...]]
-
 
 @dataclass(frozen=True)
 class Published:
@@ -130,7 +128,7 @@ class Published:
     name: str
     words: str
     source: str
-    effects: Made
+    effects: Callable[[Sequence[Trial]], tuple[Effect, ...]]
     pulses: bool = False
     fixed: tuple[tuple[str, float], ...] = ()
 

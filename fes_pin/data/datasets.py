@@ -68,11 +68,6 @@ class Dataset:
         """Where a person finds the upstream file."""
         return f"https://github.com/{self.repository}/blob/{self.commit}/{quote(self.file)}"
 
-    @property
-    def url(self) -> str:
-        """Below which its files are fetched."""
-        return f"{SOURCE_URL}/{self.repository}/{self.commit}/"
-
 
 DATASETS: Mapping[str, Dataset] = {
     name: Dataset(name=name, **known) for name, known in json.loads(REGISTRY.read_text(encoding="utf-8")).items()
@@ -188,7 +183,7 @@ def _retrieve(dataset: Dataset, scratch: Path) -> None:
     for place, known in dataset.upstream.items():
         target = scratch / place
         target.parent.mkdir(parents=True, exist_ok=True)
-        address = dataset.url + quote(place)
+        address = f"{SOURCE_URL}/{dataset.repository}/{dataset.commit}/{quote(place)}"
         try:
             expected = None if known is None else f"sha256:{known}"
             pooch.retrieve(address, expected, fname=target.name, path=target.parent, downloader=fetcher)

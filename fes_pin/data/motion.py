@@ -71,11 +71,9 @@ def _read_storage(path: Path) -> tuple[Table, bool | None]:
     end = next((i for i, line in enumerate(lines) if line.strip().lower() == "endheader"), None)
     if end is None:
         raise InputError("expected a line endheader, as OpenSim writes it", file=path, row=len(lines))
-    header = end + 1
-    while header < len(lines) and not lines[header].strip():
-        header += 1
-    if header == len(lines):
-        raise InputError("expected column labels after endheader", file=path, row=header)
+    header = next((i for i in range(end + 1, len(lines)) if lines[i].strip()), None)
+    if header is None:
+        raise InputError("expected column labels after endheader", file=path, row=len(lines))
     table = read_text_recording(path, TextForm(" ", header_row=header + 1, first_row=header + 2, strict=True))
     keys = {}
     for line in lines[:end]:
