@@ -61,17 +61,15 @@ def resampled(table: Table, held: Collection[str], rate_hz: float) -> Table:
     grid = time[0] + np.arange(int(count) + 1) / rate_hz
     out = {"time_s": grid}
     for name, values in table.columns.items():
-        if name == "time_s":
-            continue
-        if name != "stim":
+        if name == "stim":
+            places = np.rint((time[values > 0.5] - grid[0]) * rate_hz).astype(int)
+            places = np.minimum(places, len(grid) - 1)
+            if len(np.unique(places)) < len(places):
+                raise table.error(f"two pulses come within one sample of {rate_hz:g} Hz; expected more", name)
+            out[name] = np.zeros(len(grid))
+            out[name][places] = 1.0
+        elif name != "time_s":
             out[name] = _at(grid, time, values, name in held)
-            continue
-        places = np.rint((time[values > 0.5] - grid[0]) * rate_hz).astype(int)
-        places = np.minimum(places, len(grid) - 1)
-        if len(np.unique(places)) < len(places):
-            raise table.error(f"two pulses come within one sample of {rate_hz:g} Hz; expected more", name)
-        out[name] = np.zeros(len(grid))
-        out[name][places] = 1.0
     return replace(table, columns=out, rows=table.rows[np.searchsorted(time, grid + 1e-9, side="right") - 1])
 
 

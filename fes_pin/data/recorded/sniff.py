@@ -186,14 +186,13 @@ def propose(path: Path, schema: RigSchema, revolute: bool | None) -> Proposal:
 def _numbers(path: Path, form: TextForm) -> Table:
     """A text file's columns of numbers; columns of words or of dates are among its names only."""
     names = read_text_recording(path, form, ()).names
-    for _ in names:
+    while True:
         try:
             return read_text_recording(path, form, names)
         except InputError as error:
             if error.column not in names:
                 raise
             names = tuple(n for n in names if n != error.column)
-    return read_text_recording(path, form, names)
 
 
 def _candidates(
