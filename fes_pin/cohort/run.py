@@ -174,7 +174,7 @@ def run_cohort(
 
 
 IN_MINUTES_S, IN_HOURS_S = 90.0, 5400.0
-"""Times from which on they are told in minutes, and in hours."""
+"""Time left from which on it is printed in minutes, and in hours."""
 
 
 def _left(seconds: float) -> str:
