@@ -206,15 +206,8 @@ class Effect:
         refined = self.refined()
         return {n: float(getattr(self, n)) for n, i in self.parameters().items() if i.optional and n not in refined}
 
-    def kept_states(self) -> tuple[str, ...]:
-        """Return its states without those of refinements that are switched off."""
-        return self._kept(self.states)
-
-    def kept_memories(self) -> tuple[str, ...]:
-        """Return its memories without those of refinements that are switched off."""
-        return self._kept(self.memories)
-
-    def _kept(self, names: tuple[str, ...]) -> tuple[str, ...]:
+    def kept_of(self, names: tuple[str, ...]) -> tuple[str, ...]:
+        """Return its states, or its memories, without those of refinements that are switched off."""
         refined = self.refined() if self.of_form else ()
         return tuple(n for n in names if self.of_form.get(n, n) in (n, *refined))
 

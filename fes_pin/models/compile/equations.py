@@ -56,8 +56,9 @@ class Symbols:
     def __init__(self, model: Model, layout: Layout, estimated: bool) -> None:
         self.model, self.layout = model, layout
         rig, kind = model.rig, layout.kind
-        self.states = list(rig.states(kind)) + [f"{e.name}.{n}" for e in model.effects for n in e.kept_states()]
-        self.memories = list(rig.memories(kind)) + [f"{e.name}.{n}" for e in model.effects for n in e.kept_memories()]
+        self.states = [*rig.states(kind), *(f"{e.name}.{n}" for e in model.effects for n in e.kept_of(e.states))]
+        kept = (f"{e.name}.{n}" for e in model.effects for n in e.kept_of(e.memories))
+        self.memories = [*rig.memories(kind), *kept]
         self.x, self.m = _symbols("x", self.states), _symbols("m", self.memories)
         self.p, self.c = _symbols("p", layout.values), _symbols("c", layout.constants)
         self.u, self.t, self.z = _symbols("u", layout.inputs), ca.SX.sym("t"), ca.SX.sym("z")
@@ -90,11 +91,9 @@ class Symbols:
             pace=1.0,
             delayed=lambda now, before: now,
         )
-        s.owned = {
-            e.name: {n: states[f"{e.name}.{n}"] for n in e.kept_states()}
-            | {n: memories[f"{e.name}.{n}"] for n in e.kept_memories()}
-            for e in self.model.effects
-        }
+        known = states | memories
+        for e in self.model.effects:
+            s.owned[e.name] = {n: known[f"{e.name}.{n}"] for n in e.kept_of((*e.states, *e.memories))}
         if self.is_late:
             s.step = s.c.dt / (s.c.dt / s.c.step - 1.0)
         return s

@@ -53,8 +53,8 @@ class LaneFunctions:
         y = polynomial(b, r, [1 / math.factorial(k) for k in range(14)])
         bits = b.operation("shl", b.operation("add", self._to_int(b, n), b.splat_int(1023)), b.splat_int(52))
         y = b.fmul(y, b.bits_as(bits, b.vector))
-        y = b.select(b.ordered("<", x, b.splat(-708.0)), b.splat(0.0), y)
-        return b.select(b.ordered(">", x, b.splat(709.4)), b.splat(math.inf), y)
+        y = b.select(b.compare("fcmp olt", x, b.splat(-708.0)), b.splat(0.0), y)
+        return b.select(b.compare("fcmp ogt", x, b.splat(709.4)), b.splat(math.inf), y)
 
     def _to_int(self, b: Lines, n: Value) -> Value:
         """A whole number |n| < 2^51 as an integer: adding MAGIC leaves it in the low bits of the mantissa."""
@@ -72,9 +72,9 @@ class LaneFunctions:
         f = b.fdiv(b.fsub(m, b.splat(1.0)), b.fadd(m, b.splat(1.0)))
         series = polynomial(b, b.fmul(f, f), [2 / (2 * k + 1) for k in range(12)])
         value = b.fadd(b.fmul(e, b.splat(LN2_HIGH)), b.fadd(b.fmul(f, series), b.fmul(e, b.splat(LN2_LOW))))
-        value = b.select(b.unordered("<", x, b.splat(sys.float_info.min)), b.splat(-math.inf), value)
-        value = b.select(b.ordered("<=", x, b.splat(sys.float_info.max)), value, x)
-        return b.select(b.ordered("<", x, b.splat(0.0)), b.splat(math.nan), value)
+        value = b.select(b.compare("fcmp ult", x, b.splat(sys.float_info.min)), b.splat(-math.inf), value)
+        value = b.select(b.compare("fcmp ole", x, b.splat(sys.float_info.max)), value, x)
+        return b.select(b.compare("fcmp olt", x, b.splat(0.0)), b.splat(math.nan), value)
 
     def _sine(self, b: Lines, x: Value, quarter: int) -> Value:
         """Sine of x plus `quarter` quarter turns."""
@@ -82,7 +82,7 @@ class LaneFunctions:
             self._turns[x] = self._turn(b, x)
         quarters, sine, cosine = self._turns[x]
         turn = b.operation("add", quarters, b.splat_int(quarter))
-        odd = b.differs(b.operation("and", turn, b.splat_int(1)), b.splat_int(0))
+        odd = b.compare("icmp ne", b.operation("and", turn, b.splat_int(1)), b.splat_int(0))
         value = b.select(odd, cosine, sine)
         sign = b.operation("shl", b.operation("and", turn, b.splat_int(2)), b.splat_int(62))
         return b.bits_as(b.operation("xor", b.bits_as(value, b.integers), sign), b.vector)
@@ -93,7 +93,7 @@ class LaneFunctions:
         r = b.fsub(x, b.fmul(n, b.splat(HALF_PI_HIGH)))
         r = b.fsub(b.fsub(r, b.fmul(n, b.splat(HALF_PI_MIDDLE))), b.fmul(n, b.splat(HALF_PI_LOW)))
         size = self.call("fabs", x)
-        r = b.select(b.ordered("<", size, b.splat(1e9)), r, b.splat(math.nan))
+        r = b.select(b.compare("fcmp olt", size, b.splat(1e9)), r, b.splat(math.nan))
         square = b.fmul(r, r)
         sine = b.fmul(r, polynomial(b, square, [(-1) ** k / math.factorial(2 * k + 1) for k in range(9)]))
         cosine = polynomial(b, square, [(-1) ** k / math.factorial(2 * k) for k in range(10)])
@@ -105,7 +105,7 @@ class LaneFunctions:
         e = self.call("exp", b.fmul(size, b.splat(-2.0)))
         value = b.fdiv(b.fsub(b.splat(1.0), e), b.fadd(b.splat(1.0), e))
         small = b.fmul(size, polynomial(b, b.fmul(x, x), [1.0, -1 / 3, 2 / 15, -17 / 315, 62 / 2835, -1382 / 155925]))
-        value = b.select(b.ordered("<", size, b.splat(0.03)), small, value)
+        value = b.select(b.compare("fcmp olt", size, b.splat(0.03)), small, value)
         return self.call("copysign", value, x)
 
 

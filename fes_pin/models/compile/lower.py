@@ -19,7 +19,7 @@ ROUNDED = (*CONTRACT, "arcp")
 KEPT = "%kept"
 """Name of the pointer to what earlier parts of a function leave to later ones."""
 _BINARY = {ca.OP_ADD: "fadd", ca.OP_SUB: "fsub", ca.OP_MUL: "fmul", ca.OP_DIV: "fdiv"}
-_COMPARE = {ca.OP_LT: "<", ca.OP_LE: "<=", ca.OP_EQ: "==", ca.OP_NE: "!="}
+_COMPARE = {ca.OP_LT: "olt", ca.OP_LE: "ole", ca.OP_EQ: "oeq", ca.OP_NE: "une"}
 _NAMED = (
     *("exp", "log", "sin", "cos", "tanh", "sqrt", "fabs", "floor", "ceil", "copysign", "tan", "asin", "acos", "atan"),
     *("atan2", "sinh", "cosh", "erf", "pow", "fmod", "remainder", "hypot", "log1p", "expm1", "asinh", "acosh", "atanh"),
@@ -175,20 +175,19 @@ class _Lowering:
         if op in _BINARY:
             return b.operation(_BINARY[op], a[0], a[1], ROUNDED)
         if op in _COMPARE:
-            compare = b.unordered if op == ca.OP_NE else b.ordered
-            return _number(b, compare(_COMPARE[op], a[0], a[1]))
+            return _number(b, b.compare(f"fcmp {_COMPARE[op]}", a[0], a[1]))
         simple = {
             ca.OP_NEG: lambda: b.fneg(a[0]),
             ca.OP_SQ: lambda: b.fmul(a[0], a[0]),
             ca.OP_TWICE: lambda: b.fadd(a[0], a[0]),
             ca.OP_INV: lambda: b.fdiv(one, a[0]),
             ca.OP_ASSIGN: lambda: a[0],
-            ca.OP_NOT: lambda: _number(b, b.ordered("==", a[0], zero)),
+            ca.OP_NOT: lambda: _number(b, b.compare("fcmp oeq", a[0], zero)),
             ca.OP_AND: lambda: _number(b, b.operation("and", _truth(b, a[0]), _truth(b, a[1]))),
             ca.OP_OR: lambda: _number(b, b.operation("or", _truth(b, a[0]), _truth(b, a[1]))),
             ca.OP_IF_ELSE_ZERO: lambda: b.select(_truth(b, a[0]), a[1], zero),
-            ca.OP_FMIN: lambda: _extreme(b, "<", a[0], a[1]),
-            ca.OP_FMAX: lambda: _extreme(b, ">", a[0], a[1]),
+            ca.OP_FMIN: lambda: _extreme(b, "ult", a[0], a[1]),
+            ca.OP_FMAX: lambda: _extreme(b, "ugt", a[0], a[1]),
             ca.OP_SIGN: lambda: _sign(b, a[0]),
         }
         if op in simple:
@@ -205,17 +204,17 @@ def _number(b: Lines, mask: Value) -> Value:
 
 def _extreme(b: Lines, relation: str, one: Value, other: Value) -> Value:
     """The smaller or larger number; NaN if either is (CasADi's own would hide it)."""
-    chosen = b.select(b.unordered(relation, one, other), one, other)
-    return b.select(b.unordered("uno", other, other), other, chosen)
+    chosen = b.select(b.compare(f"fcmp {relation}", one, other), one, other)
+    return b.select(b.compare("fcmp uno", other, other), other, chosen)
 
 
 def _sign(b: Lines, value: Value) -> Value:
     """-1, 0 or 1; NaN for NaN."""
     zero = b.splat(0.0)
-    sign = b.fsub(_number(b, b.ordered(">", value, zero)), _number(b, b.ordered("<", value, zero)))
-    return b.select(b.unordered("uno", value, value), value, sign)
+    sign = b.fsub(_number(b, b.compare("fcmp ogt", value, zero)), _number(b, b.compare("fcmp olt", value, zero)))
+    return b.select(b.compare("fcmp uno", value, value), value, sign)
 
 
 def _truth(b: Lines, value: Value) -> Value:
     """A number as a mask: true where it is not zero."""
-    return b.unordered("!=", value, b.splat(0.0))
+    return b.compare("fcmp une", value, b.splat(0.0))

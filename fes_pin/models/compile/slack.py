@@ -110,9 +110,11 @@ def read_across(
     known
         The states before the memory is updated.
     """
+    measured, noise, seen = given
     position, along = (ca.substitute(e, x, known.mean) for e in (slack.position, ca.jacobian(slack.position, x)))
     across, away = along - ca.SX.eye(x.numel())[slack.place, :], position - known.mean[slack.place]
-    pieces = []
+    shares, weights = list[Any](), list[Any]()
+    predicted, posterior = list[Gaussian](), list[Gaussian]()
     for low, high, behind in (
         (-slack.half, slack.half, None),
         (slack.half, None, slack.half),
@@ -122,51 +124,20 @@ def read_across(
         if behind is not None:
             turned[slack.place, :] = along
             moved[slack.place] = position - ca.mtimes(along, known.mean) - behind
-        pieces.append(_Piece(across, away, low, high, turned, moved).read(x, reading, given, known))
-    predicted = mixed(normalized([one.share for one in pieces]), [one.predicted for one in pieces])
-    return predicted, mixed(normalized([one.weight for one in pieces]), [one.left for one in pieces])
-
-
-@dataclass(frozen=True)
-class _Read:
-    """A piece given a reading: logarithms of its prior share and of its weight, prediction, and posterior states."""
-
-    share: Any
-    weight: Any
-    predicted: Gaussian
-    left: Gaussian
-
-
-@dataclass(frozen=True)
-class _Piece:
-    """The piece in which a linear slack is between two ends, with the update of the memory there."""
-
-    across: Any
-    away: Any
-    low: Any
-    high: Any
-    turned: Any
-    moved: Any
-
-    def _followed(self, one: Gaussian) -> Gaussian:
-        mean = ca.mtimes(self.turned, one.mean) + self.moved
-        return Gaussian(mean, ca.mtimes([self.turned, one.covariance, self.turned.T]))
-
-    def read(self, x: Any, reading: Any, given: tuple[Any, Any, Any], known: Gaussian) -> _Read:
-        """Return the piece after a reading, which is linear about the piece's middle."""
-        measured, noise, seen = given
-        share, part = known.cut(self.across, self.away, self.low, self.high)
-        middle = self._followed(part).mean
-        value, row = (ca.substitute(e, x, middle) for e in (reading, ca.jacobian(reading, x)))
-        row = ca.mtimes(row, self.turned)
-        uncut = value + ca.mtimes(row, known.mean - part.mean)
-        missed = measured - uncut
+        share, part = known.cut(across, away, low, high)
+        middle = ca.mtimes(turned, part.mean) + moved
+        value, row = (ca.substitute(e, x, middle) for e in (reading, ca.jacobian(reading, x)))  # linear about it
+        row = ca.mtimes(row, turned)
+        missed = measured - (value + ca.mtimes(row, known.mean - part.mean))
         updated, _, variance = known.seen(row, missed, noise, seen)
         density = -0.5 * seen * (missed * missed / variance + ca.log(variance))
-        away = self.away + ca.mtimes(self.across, updated.mean - known.mean)
-        left, cut = updated.cut(self.across, away, self.low, self.high)
-        predicted = Gaussian(value, ca.mtimes([row, part.covariance, row.T]))
-        return _Read(share, left + density, predicted, self._followed(cut))
+        left, cut = updated.cut(across, away + ca.mtimes(across, updated.mean - known.mean), low, high)
+        shares.append(share)
+        weights.append(left + density)
+        predicted.append(Gaussian(value, ca.mtimes([row, part.covariance, row.T])))
+        after = ca.mtimes([turned, cut.covariance, turned.T])
+        posterior.append(Gaussian(ca.mtimes(turned, cut.mean) + moved, after))
+    return mixed(normalized(shares), predicted), mixed(normalized(weights), posterior)
 
 
 class _End:

@@ -11,9 +11,6 @@ from typing import NamedTuple
 
 from fes_pin.models.compile.layout import WIDTH
 
-ORDERED = {"<": "olt", "<=": "ole", "==": "oeq", ">": "ogt"}
-UNORDERED = {"<": "ult", ">": "ugt", "!=": "une", "uno": "uno"}
-
 
 class Value(NamedTuple):
     """A value: its type, and its name or what it is."""
@@ -58,17 +55,9 @@ class Lines:
         """The number with its sign turned round."""
         return self._made(one.type, f"fneg {one.type} {one.text}")
 
-    def ordered(self, relation: str, one: Value, other: Value) -> Value:
-        """Mask: true where a relation holds, false where either is NaN."""
-        return self._made(self._mask, f"fcmp {ORDERED[relation]} {one.type} {one.text}, {other.text}")
-
-    def unordered(self, relation: str, one: Value, other: Value) -> Value:
-        """Mask: true where a relation holds or either is NaN; `uno` for the latter alone."""
-        return self._made(self._mask, f"fcmp {UNORDERED[relation]} {one.type} {one.text}, {other.text}")
-
-    def differs(self, one: Value, other: Value) -> Value:
-        """Mask: true where two integers differ."""
-        return self._made(self._mask, f"icmp ne {one.type} {one.text}, {other.text}")
+    def compare(self, relation: str, one: Value, other: Value) -> Value:
+        """Mask: true where a relation holds, in LLVM's words; `fcmp olt` is false of NaN, `fcmp ult` true."""
+        return self._made(self._mask, f"{relation} {one.type} {one.text}, {other.text}")
 
     def select(self, mask: Value, yes: Value, no: Value) -> Value:
         """`yes` where the mask holds, else `no`, lane by lane."""

@@ -3,25 +3,11 @@
 An effect is in the tests, the report, the documentation and the diagnosis by its file in this folder.
 """
 
-from typing import Any
-
 from fes_pin.models.stage import Effect, by_name, classes_in, in_order
 
 EFFECTS = in_order(classes_in(__path__, __name__, Effect))
 """The effects of this folder's files, in the order of the signal path, by name at each stage."""
-
-
-def __getattr__(name: str) -> Any:  # each has parameters of its own, which no type of all effects names
-    """An effect by the name of its class: `effects.CoulombFriction`."""
-    for one in EFFECTS:
-        if one.__name__ == name:
-            return one
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-
-
-def __dir__() -> list[str]:
-    """Return the public names of this module and the classes of the effects."""
-    return sorted((*globals(), *(one.__name__ for one in EFFECTS)))
+globals().update({one.__name__: one for one in EFFECTS})  # `effects.CoulombFriction`; their types: `__init__.pyi`
 
 
 def effect_named(name: str) -> type[Effect]:
