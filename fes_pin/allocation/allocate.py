@@ -9,8 +9,6 @@ from fes_pin.allocation.allocation import Allocation
 from fes_pin.allocation.allocator import Allocator
 from fes_pin.data.read_only import key_of
 
-__all__ = ["Allocator", "allocate"]
-
 
 def allocate(
     torque: Any, nerves: Any, q: Any = None, previous: Any = None, *, solver: str = "daqp", **options: Any

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -10,14 +10,12 @@ import numpy as np
 
 from fes_pin.allocation.allocation import Allocation, AllocationSequence
 from fes_pin.allocation.bounded import PRECISE, BoundedProgram, known_solver, solve_by, solve_once
-from fes_pin.allocation.certificate import Certifier
+from fes_pin.allocation.certificate import Certifier, Solve
 from fes_pin.allocation.efforts import error_then_effort, least_cubes
 from fes_pin.allocation.inputs import fractions, wanted_torque, wanted_torques
 from fes_pin.allocation.off_or_enough import best_choice, rounded_to_least
-from fes_pin.allocation.problem import AllocationProblem, OfProblem, Options, problem_of
+from fes_pin.allocation.problem import AllocationProblem, Limits, OfProblem, Options, problem_of
 from fes_pin.data.errors import InputError
-
-__all__ = ["Allocator"]
 
 PREVIOUS = "previous recruitment"
 SAME = 1e-8
@@ -133,56 +131,47 @@ class Allocator(OfProblem):
             total, root = p.prices + p.change, np.sqrt(p.weights / p.scale)
             target = p.change * before / total
             r, note = error_then_effort(root[:, None] * p.matrix, root * wanted, total, target, limits)
-            return self.result(r, wanted, lower, upper, before, note)
+            return replace(self.result(r, wanted, limits, before), note=note)
         if p.change:
             f -= p.change * before
         if p.least is not None:
-            return self._choose(f, wanted, lower, upper, before)
+            return self._choose(f, wanted, limits, before)
         if p.cubes:
             r, note = least_cubes(self.squares, f, p.prices, p.change, limits, self.certify.unseen(wanted))
-            return self.result(r, wanted, lower, upper, before, note)
+            return replace(self.result(r, wanted, limits, before), note=note)
         if solver == "daqp":
             r = self.program.solve(f[None], lower, upper)[0][0]
         else:
             r = np.clip(solve_by(solver, self.H, f, lower, upper)[0], lower, upper)
         solve = partial(solve_once, self.H, f)
-        found = self.result(r, wanted, lower, upper, before, solve=solve)
+        found = self.result(r, wanted, limits, before, solve)
         if found.certificate.residual <= self.precise:
             return found
-        return self.result(solve(lower, upper), wanted, lower, upper, before, solve=solve)
+        return self.result(solve(lower, upper), wanted, limits, before, solve)
 
     def result(
-        self,
-        r: np.ndarray,
-        wanted: np.ndarray,
-        lower: np.ndarray,
-        upper: np.ndarray,
-        before: np.ndarray,
-        note: str = "",
-        solve: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None,
+        self, r: np.ndarray, wanted: np.ndarray, limits: Limits, before: np.ndarray, solve: Solve | None = None
     ) -> Allocation:
         """The allocation with its certificate, recomputed from the moment arms."""
-        r = self.certify.at_limits(before, wanted, r, lower, upper, solve)
-        proof, achieved, gradient = self.certify(before, wanted, r, lower, upper)
+        r = self.certify.at_limits(before, wanted, r, limits, solve)
+        proof, achieved, gradient = self.certify(before, wanted, r, limits)
         width, p = self.problem.curves.pulse_width_us(r), self.problem
-        return Allocation(r, width, wanted, achieved, gradient, lower, upper, before, proof, proof.gap, p, note)
+        return Allocation(r, width, wanted, achieved, gradient, *limits, before, proof, proof.gap, p)
 
-    def _choose(
-        self, f: np.ndarray, wanted: np.ndarray, lower: np.ndarray, upper: np.ndarray, before: np.ndarray
-    ) -> Allocation:
+    def _choose(self, f: np.ndarray, wanted: np.ndarray, limits: Limits, before: np.ndarray) -> Allocation:
         """Solve with channels that are off or at least at their least; the certificate is of the choice made."""
         p = self.problem
         assert p.least is not None
+        lower, upper = limits
         if p.rounding:
             choice = rounded_to_least(self.H, f, lower, upper, p.least)
         else:
             choice = best_choice(self.H, f, lower, upper, p.least, seconds=p.seconds)
         on = choice.r > 0.0
         low, high = np.where(on, np.maximum(lower, p.least), 0.0), np.where(on, upper, 0.0)
-        proof, achieved, gradient = self.certify(before, wanted, choice.r, low, high)
+        proof, achieved, gradient = self.certify(before, wanted, choice.r, (low, high))
         width, note = p.curves.pulse_width_us(choice.r), f"{choice.nodes} choices compared"
-        held = lower, upper, before
-        return Allocation(choice.r, width, wanted, achieved, gradient, *held, proof, choice.gap, p, note)
+        return Allocation(choice.r, width, wanted, achieved, gradient, *limits, before, proof, choice.gap, p, note)
 
     def sequence(self, torques: Any, previous: Any = None) -> AllocationSequence:
         """Allocate a torque over time, samples in order, each starting from the last.
@@ -210,10 +199,10 @@ class Allocator(OfProblem):
         if not follows:  # all at once, and one by one those that are not exact
             r = self.program.solve(wanted @ self.pull, p.lower, p.upper)[0]
             near = self.certify.close(np.minimum(r - p.lower, p.upper - r), wanted).any(axis=1)
-            near |= ~(self.certify.residual(start, wanted, r, p.lower, p.upper) <= self.precise)
+            near |= ~(self.certify.residual(start, wanted, r, (p.lower, p.upper)) <= self.precise)
             each = np.flatnonzero(near)
         for k in each.tolist():
             r[k] = self._solve(wanted[k], r[k - 1] if follows and k else start, "daqp").recruitment
         before: Any = np.vstack([start, r[:-1]]) if follows else start
-        residual = self.certify.residual(before, wanted, r, *p.limits(before))
+        residual = self.certify.residual(before, wanted, r, p.limits(before))
         return AllocationSequence(r, p.curves.pulse_width_us(r), wanted, r @ p.matrix.T, residual, p)

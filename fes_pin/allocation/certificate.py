@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from fes_pin.allocation.inputs import LARGEST_NM
-from fes_pin.allocation.problem import EPSILON, AllocationProblem
+from fes_pin.allocation.problem import EPSILON, AllocationProblem, Limits
 
+Solve = Callable[[np.ndarray, np.ndarray], np.ndarray]
 NOTHING = 1e-12
 """A recruitment nearer to a limit than this is at the limit; a pulse that recruits so little is none."""
 
@@ -134,23 +135,21 @@ class Certifier:
         return cost
 
     def __call__(
-        self, previous: np.ndarray, wanted: np.ndarray, r: np.ndarray, lower: np.ndarray, upper: np.ndarray
+        self, previous: np.ndarray, wanted: np.ndarray, r: np.ndarray, limits: Limits
     ) -> tuple[Certificate, np.ndarray, np.ndarray]:
         """Certificate, achieved torque and gradient of one sample."""
         achieved = r @ self.turned
         gradient = self.gradient(achieved, wanted, r, previous)
-        primal, dual, complementarity, gap = residuals(gradient, r, lower, upper, self.curvature)
+        primal, dual, complementarity, gap = residuals(gradient, r, *limits, self.curvature)
         cost = self.cost(achieved, wanted, r, previous)
         parts = float(primal), float(dual), float(complementarity), float(gap)
         proof = Certificate(*parts, cost, self.problem.scale, self.flattest, self.unseen(wanted))
         return proof, achieved, gradient
 
-    def residual(
-        self, previous: np.ndarray, wanted: np.ndarray, r: np.ndarray, lower: np.ndarray, upper: np.ndarray
-    ) -> np.ndarray:
+    def residual(self, previous: np.ndarray, wanted: np.ndarray, r: np.ndarray, limits: Limits) -> np.ndarray:
         """Greatest residual per sample of arrays (..., n)."""
         gradient = self.gradient(r @ self.turned, wanted, r, previous)
-        return np.maximum.reduce(residuals(gradient, r, lower, upper, self.curvature)[:3])
+        return np.maximum.reduce(residuals(gradient, r, *limits, self.curvature)[:3])
 
     def close(self, slack: np.ndarray, wanted: np.ndarray) -> np.ndarray:
         """Which recruitments (..., n) are so near to a limit that the certificate cannot see it, or nothing."""
@@ -163,13 +162,7 @@ class Certifier:
         return near & (slack <= np.maximum(room, NOTHING))
 
     def at_limits(
-        self,
-        previous: np.ndarray,
-        wanted: np.ndarray,
-        r: np.ndarray,
-        lower: np.ndarray,
-        upper: np.ndarray,
-        solve: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None,
+        self, previous: np.ndarray, wanted: np.ndarray, r: np.ndarray, limits: Limits, solve: Solve | None = None
     ) -> np.ndarray:
         """The same recruitments (n,), at their limits where the certificate cannot tell them from these.
 
@@ -177,13 +170,14 @@ class Certifier:
         what is within `NOTHING` is in any case: off is off, not a pulse at threshold. What that does to the others is
         settled by `solve`, which gives the optimum between limits.
         """
+        lower, upper = limits
         slack = np.minimum(r - lower, upper - r)
         near = self.close(slack, wanted)
         if not near.any():
             return r
         limit = np.where(r - lower <= upper - r, lower, upper)
         moved = np.where(near, limit, r)
-        before, after = (float(self.residual(previous, wanted, x, lower, upper)) for x in (r, moved))
+        before, after = (float(self.residual(previous, wanted, x, limits)) for x in (r, moved))
         if after <= max(before, self.unseen(wanted)):
             return moved
         nothing = near & (slack <= NOTHING)

@@ -20,7 +20,8 @@ if __name__ == "__main__":
 
 import numpy as np
 
-from fes_pin.allocation.allocate import Allocator, allocate
+from fes_pin.allocation.allocate import allocate
+from fes_pin.allocation.allocator import Allocator
 from fes_pin.allocation.horizon import Horizon, StrengthFatigue
 from fes_pin.allocation.walk import allocate_walk
 from fes_pin.body.joints import JOINT_NAMES

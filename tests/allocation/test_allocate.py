@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from fes_pin.allocation import certificate
-from fes_pin.allocation.allocate import Allocator, allocate
+from fes_pin.allocation.allocate import allocate
+from fes_pin.allocation.allocator import Allocator
 from fes_pin.allocation.bounded import solve_once
 from fes_pin.allocation.certificate import Certificate
 from fes_pin.body.joints import JOINT_NAMES
@@ -127,13 +128,13 @@ def test_gradient_is_the_slope_of_the_cost_and_a_wrong_answer_is_rejected(kind):
     certify, step = program.certify, 1e-5
     for _ in range(50):
         before, r, wanted = rng.uniform(0, 1, 5), rng.uniform(0.1, 0.9, 5), rng.normal(size=6) * 40
-        proof, achieved, gradient = certify(before, wanted, r, np.zeros(5), np.ones(5))
+        proof, achieved, gradient = certify(before, wanted, r, (np.zeros(5), np.ones(5)))
         np.testing.assert_allclose(achieved, matrix @ r, atol=1e-11)
         error = matrix @ r - wanted
         effort = (prices * (r**3 / 3 if kind == "cubes" else r**2 / 2)).sum() + 0.15 * ((r - before) ** 2).sum()
         assert proof.cost == pytest.approx(0.5 * (weights * error**2).sum() / proof.scale + effort)
         costs = [
-            [certify(before, wanted, r + s * step * e, np.zeros(5), np.ones(5))[0].cost for s in (1, -1)]
+            [certify(before, wanted, r + s * step * e, (np.zeros(5), np.ones(5)))[0].cost for s in (1, -1)]
             for e in np.eye(5)
         ]
         np.testing.assert_allclose(gradient, [(up - down) / (2 * step) for up, down in costs], atol=1e-6)
@@ -147,7 +148,7 @@ def test_certified_gap_bounds_what_any_other_choice_could_save():
         program = Allocator(matrix, **options)
         best = program(torque).certificate.cost
         r = rng.uniform(program.problem.lower, program.problem.upper)
-        other = program.result(r, torque, program.problem.lower, program.problem.upper, r)
+        other = program.result(r, torque, (program.problem.lower, program.problem.upper), r)
         assert other.certificate.cost - other.certificate.gap <= best + 1e-12
         assert other.certificate.cost >= best - 1e-12
 
@@ -393,10 +394,10 @@ def test_dust_beside_an_optimum_is_swept_off_and_work_is_not():
     wanted, before = np.array([20.0, 0.0, 0.0]), np.zeros(3)
     best = program(wanted).recruitment
     assert best[1] == best[2] == 0.0
-    dusty = program.certify.at_limits(before, wanted, best + np.array([0.0, 1e-17, 1e-15]), *limits)
+    dusty = program.certify.at_limits(before, wanted, best + np.array([0.0, 1e-17, 1e-15]), limits)
     np.testing.assert_array_equal(dusty, best)
     working = best + np.array([0.0, 1e-6, 0.0])
-    np.testing.assert_array_equal(program.certify.at_limits(before, wanted, working, *limits), working)
+    np.testing.assert_array_equal(program.certify.at_limits(before, wanted, working, limits), working)
 
 
 @pytest.mark.parametrize("shared", [True, False])

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from fes_pin.allocation.allocate import Allocator, allocate
+from fes_pin.allocation.allocate import allocate
+from fes_pin.allocation.allocator import Allocator
 from fes_pin.allocation.bounded import solve_once
 from fes_pin.allocation.certificate import Certifier
 from fes_pin.allocation.horizon import Horizon
@@ -52,7 +53,7 @@ def test_a_certificate_rejects_a_wrong_limit_at_the_smallest_price(matrix, effor
     wrong[2] = 0.999  # what the third channel takes off, the strongest of the other two makes
     helper = int(np.argmax(best))
     wrong[helper] += 0.999 / p.matrix[0, helper]
-    found, *_ = program.certify(np.zeros(3), np.array([0.22]), wrong, p.lower, p.upper)
+    found, *_ = program.certify(np.zeros(3), np.array([0.22]), wrong, (p.lower, p.upper))
     assert not found.is_optimal()
 
 

@@ -6,7 +6,7 @@ import daqp
 import numpy as np
 import pytest
 
-from fes_pin.allocation.allocate import Allocator
+from fes_pin.allocation.allocator import Allocator
 from fes_pin.allocation.horizon import Horizon, StrengthFatigue, invert_lag
 from fes_pin.data.errors import InputError
 from fes_pin.muscles.nerves import Nerves

@@ -5,7 +5,8 @@ import itertools
 import numpy as np
 import pytest
 
-from fes_pin.allocation.allocate import Allocator, allocate
+from fes_pin.allocation.allocate import allocate
+from fes_pin.allocation.allocator import Allocator
 from fes_pin.allocation.bounded import solve_once
 from fes_pin.allocation.off_or_enough import best_choice, cost_of, rounded_to_least
 from fes_pin.muscles.nerves import Nerves

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from yardsticks.rules_of_thumb import clipped, direction_error, rescaled
 
-from fes_pin.allocation.allocate import Allocator
+from fes_pin.allocation.allocator import Allocator
 from fes_pin.allocation.walk import allocate_walk
 from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.body.measured_walk import data_folder, read_walk
