@@ -17,17 +17,15 @@ from typing import Any
 
 import numpy as np
 
-from fes_pin.control.angles import LARGEST_RAD, hint
-from fes_pin.control.angles import reading as read
 from fes_pin.control.dynamics import PULSE_S, AnkleDynamics, JointObserver
 from fes_pin.control.endurance import EnduranceWatch, fatigue_of
 from fes_pin.control.faults import FaultMonitor, Status
 from fes_pin.control.given import GivenAnkle, RunningAnkle
 from fes_pin.control.oscillation import OscillationWatch
 from fes_pin.control.pulse import PulseWidth, StimulationLimits
-from fes_pin.control.reference import LOOKAHEAD, ReferenceWindow, coming, trajectory
+from fes_pin.control.reference import LARGEST_RAD, LOOKAHEAD, ReferenceWindow, coming, hint, read, trajectory
 from fes_pin.control.timing import PulseClock
-from fes_pin.control.tuning import Gains, tune
+from fes_pin.control.tuning import tune
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import between, shortened
 from fes_pin.models.effects.recruitment_hysteresis import RecruitmentHysteresis
@@ -404,6 +402,3 @@ class PositionController:
         k = self.gains.at(angle)
         feedback = self.calm * (k[0] * (now - share * act) + k[1] * (q - angle) + k[2] * (v - rate))
         return (feedforward + feedback) / share
-
-
-__all__ = ["LOOKAHEAD", "Gains", "PositionController", "tune"]

@@ -7,8 +7,6 @@ more slowly (it takes up fatigue). What is fed in is the recruitment that the ne
 limit that holds the stimulus back leaves nothing to wind up.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -71,7 +69,7 @@ class AnkleDynamics(Tabulated):
             between(getattr(self, name), 0.0, math.inf, name)
 
     @classmethod
-    def of(cls, model: Model, load_kg: float) -> AnkleDynamics:
+    def of(cls, model: Model, load_kg: float) -> "AnkleDynamics":
         """From an ankle's model; of its effects the frame is used.
 
         Raises

@@ -3,8 +3,6 @@
 Limits are those of the pulse width and its rate, of charge, and of the angles of the joint.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
@@ -73,7 +71,7 @@ class StimulationLimits:
             raise InputError(f"range_of_motion_rad: expected two angles within {low:g} to {high:g} rad, found {ends!r}")
 
     @classmethod
-    def given(cls, limits: StimulationLimits | Mapping[str, Any] | None) -> StimulationLimits:
+    def given(cls, limits: "StimulationLimits | Mapping[str, Any] | None") -> "StimulationLimits":
         """Limits from limits, or from a mapping of their names; without any the muscle's own.
 
         Raises

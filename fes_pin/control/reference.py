@@ -1,14 +1,17 @@
-"""A wanted angle as a stream of numbers, made smooth enough to be followed."""
+"""Angles from a caller, checked; and a wanted angle as a stream of numbers, made smooth enough to be followed."""
 
+import math
 from collections.abc import Sequence
 from operator import mul
 
 import numpy as np
 
-from fes_pin.control.angles import reference as checked
 from fes_pin.control.dynamics import PULSE_S
 from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import as_number, shortened
 
+LARGEST_RAD = 2.0 * math.pi
+"""An angle in rad is within a turn to either side; beyond that it is probably in degrees."""
 HALF_WINDOW = 4
 """Pulses that a step is spread over, to each side: 89 ms, about two time constants of the muscle."""
 LOOKAHEAD = HALF_WINDOW + 2
@@ -17,6 +20,40 @@ _LENGTH = 2 * LOOKAHEAD
 _BELL = np.hanning(2 * HALF_WINDOW + 3)[1:-1]
 BELL: list[float] = (_BELL / _BELL.sum()).tolist()
 """Weights of the smoothing, by pulse; they add up to 1."""
+
+
+def read(value: object) -> float:
+    """A sensor's reading as a float; NaN where there is none.
+
+    Raises
+    ------
+    InputError
+        For what is neither a number nor None.
+    """
+    found = math.nan if value is None else as_number(value)
+    if found is None:
+        raise InputError(f"angle_rad: expected one number in rad, or None for no reading, found {shortened(value)}")
+    return found
+
+
+def checked(value: object, ends: tuple[float, float], place: str = "") -> float:
+    """A wanted angle as a float.
+
+    Raises
+    ------
+    InputError
+        For what is no number, not finite, or outside of two angles in rad.
+    """
+    found = value if type(value) is float else as_number(value)
+    if found is None or not ends[0] <= found <= ends[1]:
+        expected = f"reference_rad{place}: expected {ends[0]:g} to {ends[1]:g} rad"
+        raise InputError(f"{expected}, found {shortened(value)}{hint(found)}")
+    return found
+
+
+def hint(angle: float | None) -> str:
+    """A few words where a number can hardly be rad."""
+    return " (degrees?)" if angle is not None and LARGEST_RAD < abs(angle) <= 360.0 else ""
 
 
 def trajectory(reference_rad: object, ends: tuple[float, float]) -> list[float]:

@@ -9,8 +9,6 @@ answers it a little late and so feeds it, is made slower as far as that helps. W
 tuning.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from dataclasses import dataclass, replace
@@ -150,7 +148,7 @@ class Loop(Tabulated):
     @classmethod
     def of(
         cls, truth: Sampled, believed: tuple[np.ndarray, np.ndarray, float], k: np.ndarray, observer: np.ndarray
-    ) -> Loop:
+    ) -> "Loop":
         """From what moves (`moved`), what is believed (`plant`), feedback k (3,) and steady observer gain (4,)."""
         model_a, model_b, pull = believed
         # r = -k (x - x*) + x*_act, with x*_act = -torque / pull

@@ -23,12 +23,6 @@ and dorsiflexion, by sex and years: D. E. Anderson, M. L. Madigan, M. A. Nussbau
 3 (as the muscle add-on of RBDL has it; the article was not at hand)."""
 
 
-def share_of_a_young_mans(who: str, years: str) -> float:
-    """Strength of a group over that of men of 18 to 25, of the same weight and height: mean of six actions."""
-    young = np.array(PEAKS_2007["man", "18 to 25"])
-    return float(np.mean(np.array(PEAKS_2007[who, years]) / young))
-
-
 YEARS = ("18 to 25", "55 to 65", "over 65")
 """Groups of years whose strength has been measured (`PEAKS_2007`)."""
 
@@ -81,7 +75,8 @@ def subject_nerves(
         wanted += both if set(known).issuperset(both) else [name]
     height = instance(body, Body, "body").height_m or SUBJECT_HEIGHT
     nerves = Nerves.of_subject(body.mass_kg, height, tuple(dict.fromkeys(wanted)), strength, **options)
-    return replace(nerves, size=nerves.size * share_of_a_young_mans(_who(body), years))
+    own, of_young_men = np.array(PEAKS_2007[_who(body), years]), np.array(PEAKS_2007["man", YEARS[0]])
+    return replace(nerves, size=nerves.size * float(np.mean(own / of_young_men)))  # mean of six actions
 
 
 def controllability(linear: LinearBody, inputs, horizon: float = 0.3) -> ModalControllability:
