@@ -97,7 +97,7 @@ _CHAPTERS = {name: f"{module}.{name}" for name, module in _written_above().items
 _WHERE = {name: module for name, module in _written_above().items() if name not in _CHAPTERS}
 
 # whoever reads a study asks for the rigs that the models bring; `data` itself imports no models
-rigs_from(lambda: import_module("fes_pin.models.catalogue").known_schemas())
+rigs_from(lambda: import_module("fes_pin.models.catalogue").installed().schemas())
 
 __all__ = ["__version__", *_WHERE, *_CHAPTERS]  # noqa: PLE0604
 

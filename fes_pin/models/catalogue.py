@@ -1,8 +1,6 @@
 """The causes and rigs that there are: those written here, those of installed packages, and anybody's own."""
 
-from __future__ import annotations
-
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
@@ -64,7 +62,7 @@ class Catalogue:
                 found.setdefault(where, []).append(one.name)
         return found
 
-    def with_classes(self, classes: Iterable[type[Effect] | type[Rig]]) -> Catalogue:
+    def with_classes(self, classes: Iterable[type[Effect] | type[Rig]]) -> "Catalogue":
         """The same with other classes as well.
 
         Raises
@@ -151,11 +149,6 @@ def installed() -> Catalogue:
         for point in sorted(entry_points(group=group), key=lambda p: p.name):
             catalogue = catalogue.with_classes(_registered(point))
     return catalogue
-
-
-def known_schemas() -> Mapping[str, RigSchema]:
-    """What a study of each rig that is written here or installed must and may hold."""
-    return installed().schemas()
 
 
 def _registered(point: EntryPoint) -> Iterator[type[Effect] | type[Rig]]:

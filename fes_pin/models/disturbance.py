@@ -21,16 +21,13 @@ class RandomProcess(Effect):
         return value + getattr(s.own, self.states[0])
 
     def rate(self, s: Any) -> Mapping[str, Any]:
-        (e,) = self.states
-        return {e: -getattr(s.own, e) / getattr(s.c, f"time.{e}")}
+        return {e: -getattr(s.own, e) / getattr(s.c, f"time.{e}") for e in self.states}
 
     def intensities(self, c: Any) -> Mapping[str, Any]:
-        (e,) = self.states
-        return {e: 2.0 * c[f"std.{e}"] ** 2 / c[f"time.{e}"]}
+        return {e: 2.0 * c[f"std.{e}"] ** 2 / c[f"time.{e}"] for e in self.states}
 
     def stationary_variances(self, c: Any) -> Mapping[str, Any]:
-        (e,) = self.states
-        return {e: c[f"std.{e}"] ** 2}
+        return {e: c[f"std.{e}"] ** 2 for e in self.states}
 
 
 @dataclass(frozen=True)

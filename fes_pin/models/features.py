@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 
 from fes_pin.data.trial import Trial
-from fes_pin.models.maths import cos, sin, sqrt
-from fes_pin.models.maths import tanh as smooth_sign
+from fes_pin.models.maths import cos, sin, sqrt, tanh
 from fes_pin.models.parameters import parameter
 from fes_pin.models.rigs.base import Rig
 from fes_pin.models.stage import Effect, Stage
@@ -33,16 +32,16 @@ MOTION: Mapping[str, FeatureFunction] = {
     "angle: q2": lambda f: f.q * f.q,
     "angle: q3": lambda f: f.q * f.q * f.q,
     "rate: v": lambda f: f.v,
-    "rate: sign v": lambda f: smooth_sign(SHARP * f.v),
+    "rate: sign v": lambda f: tanh(SHARP * f.v),
     "rate: v|v|": lambda f: f.v * sqrt(f.v * f.v + 1e-6),
     "rate: v3": lambda f: f.v * f.v * f.v,
     "rate: v2": lambda f: f.v * f.v,
     "angle: q v": lambda f: f.q * f.v,
     "angle: q2 v": lambda f: f.q * f.q * f.v,
-    "angle: q sign v": lambda f: f.q * smooth_sign(SHARP * f.v),
+    "angle: q sign v": lambda f: f.q * tanh(SHARP * f.v),
     "time: q t": lambda f: f.q * f.t,
     "time: v t": lambda f: f.v * f.t,
-    "time: sign v t": lambda f: smooth_sign(SHARP * f.v) * f.t,
+    "time: sign v t": lambda f: tanh(SHARP * f.v) * f.t,
     "stimulus: u": lambda f: f.u,
     "stimulus: u|u|": lambda f: f.u * sqrt(f.u * f.u + 1e-6),
     "stimulus: u q": lambda f: f.u * f.q,

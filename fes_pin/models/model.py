@@ -1,7 +1,5 @@
 """A model: a rig with its nominal parameters, and the effects added to it."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -48,12 +46,12 @@ class Model:
                 raise InputError(f"{effect.name} is not for the rig {self.rig.name}")
         object.__setattr__(self, "effects", in_order(self.effects))
 
-    def __add__(self, effect: Effect) -> Model:
+    def __add__(self, effect: Effect) -> "Model":
         if not isinstance(effect, Effect):
             raise InputError(f"expected an effect, as in CoulombFriction(torque_nm=0.04); found {effect!r}")
         return Model(self.rig, (*self.effects, effect))
 
-    def __sub__(self, effect: str | Effect | type[Effect]) -> Model:
+    def __sub__(self, effect: str | Effect | type[Effect]) -> "Model":
         name = getattr(effect, "name", effect)
         if not isinstance(name, str):
             raise InputError(f"expected an effect of the model or its name, found {shortened(effect)}")
@@ -95,7 +93,7 @@ class Model:
         """Return the values, by name, of parameters of effects' forms that are switched off."""
         return {f"{e.name}.{n}": value for e in self.effects for n, value in e.unused().items()}
 
-    def with_parameters(self, values: Mapping[str, float]) -> Model:
+    def with_parameters(self, values: Mapping[str, float]) -> "Model":
         """Return the same model with other values.
 
         Raises
@@ -113,7 +111,7 @@ class Model:
             effects.append(dataclasses.replace(effect, **own))
         return Model(rig, tuple(effects))
 
-    def acting(self, kind: str, inputs: tuple[str, ...] | None = None) -> Model:
+    def acting(self, kind: str, inputs: tuple[str, ...] | None = None) -> "Model":
         """Return the same model without the effects that do not act in a kind of trial with these input columns."""
         signals = self.rig.signals(kind) if inputs is None else self.rig.changeable(kind, inputs)
         return Model(self.rig, tuple(e for e in self.effects if e.signal in signals))

@@ -1,7 +1,5 @@
 """Parameters: fields of dataclasses with unit, null, bounds and scale in their metadata."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Callable, Mapping
@@ -79,7 +77,7 @@ class ParameterInfo:
         """The value within the bounds that is nearest to one."""
         return min(max(value, self.lower), self.upper)
 
-    def in_units(self, units: Mapping[str, str]) -> ParameterInfo:
+    def in_units(self, units: Mapping[str, str]) -> "ParameterInfo":
         """The same with the unit that it has on a rig.
 
         Parameters

@@ -1,7 +1,5 @@
 """One-step predictions of measured trials with sensitivities: innovations and their variances."""
 
-from __future__ import annotations
-
 import math
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
@@ -68,7 +66,7 @@ class StateSpaceNoise(ReadOnly, Mapping[str, Noise]):
         """Names of the random processes that have an effect: all but `still`."""
         return tuple(n for n in self.std if n not in self.still)
 
-    def with_values(self, values: Mapping[str, float]) -> StateSpaceNoise:
+    def with_values(self, values: Mapping[str, float]) -> "StateSpaceNoise":
         """Return the same noise with other values, by name as in `parameters`."""
         parts = {part: dict(getattr(self, part)) for part in ("white", "std", "time")}
         for name, value in values.items():

@@ -170,7 +170,8 @@ class Simulator(OnTrials):
         samples: int | None = None,
     ) -> list[dict[str, float]]:
         """Return unknowns that fit the first samples of a column of some trials: Gauss-Newton on finite differences."""
-        short, guess = [_first_samples(self.trials[i]) for i in places], [dict(unknowns[i]) for i in places]
+        begun, guess = [self.trials[i] for i in places], [dict(unknowns[i]) for i in places]
+        short = [t.first(max(FEWEST, math.ceil(FIRST_S / t.dt))) for t in begun]
         simulator = Simulator(self.model, short)
         for _ in range(NEWTON_STEPS):
             base = simulator.run(values, guess)
@@ -182,10 +183,6 @@ class Simulator(OnTrials):
                 for name, step in zip(names, least_squares(slopes, trial[column][:samples] - reading), strict=True):
                     guess[i][name] += float(step)
         return guess
-
-
-def _first_samples(trial: Trial) -> Trial:
-    return trial.first(max(FEWEST, math.ceil(FIRST_S / trial.dt)))
 
 
 class Block:

@@ -1,7 +1,5 @@
 """The signal path and the effects that act on it: stages, signals, effects."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 import warnings
@@ -225,7 +223,7 @@ class Effect:
         return tuple(n for n in self.common() if info[n].fitted and n not in unused)
 
     @classmethod
-    def of_each_trial(cls, **shapes: Any) -> Effect:
+    def of_each_trial(cls, **shapes: Any) -> "Effect":
         """Return the effect with amplitudes of each trial's own."""
         return dataclasses.replace(cls.absent(), each_trial=True, **shapes)
 
@@ -277,7 +275,7 @@ class Effect:
         return {n: float(info.null) for n, info in cls.parameters().items() if info.null is not None}
 
     @classmethod
-    def absent(cls) -> Effect:
+    def absent(cls) -> "Effect":
         """Return the effect at its null."""
         nulls: dict[str, Any] = cls.nulls()
         return cls(**nulls)
@@ -330,7 +328,7 @@ class Signals(SimpleNamespace):
     def __init__(self, effects: Sequence[Effect], **signals: Any) -> None:
         super().__init__(effects=tuple(effects), own=SimpleNamespace(), owned={}, **signals)
 
-    def of(self, effect: Effect) -> Signals:
+    def of(self, effect: Effect) -> "Signals":
         """Return the same signals, with the effect's own states and memories as `own`."""
         self.own = SimpleNamespace(**self.owned.get(effect.name, {}))
         return self

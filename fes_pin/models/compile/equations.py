@@ -67,9 +67,6 @@ class Symbols:
         self.is_late = any(e.signal == "delay" for e in model.effects)
         self.slacks: dict[str, tuple[Any, Any]] = {}
 
-    def vector(self, which: dict[str, Any]) -> ca.SX:
-        return ca.vertcat(*which.values()) if which else ca.SX(0, 1)
-
     def signals(self, states: dict[str, Any], memories: dict[str, Any]) -> Signals:
         """Return signals and effects with symbols in place of numbers."""
         layout, p = self.layout, {**self.p, **dict(self.layout.fixed)}
@@ -175,7 +172,7 @@ class Tangents:
 
     def __init__(self, model: Model, layout: Layout, estimated: bool = False) -> None:
         self.layout, self.sym = layout, (sym := Symbols(model, layout, estimated))
-        self.x, self.m, self.p, self.c, self.u = (sym.vector(v) for v in (sym.x, sym.m, sym.p, sym.c, sym.u))
+        self.x, self.m, self.p, self.c, self.u = (column([*v.values()]) for v in (sym.x, sym.m, sym.p, sym.c, sym.u))
         self.t, self.since, self.into, self.z = sym.t, sym.since, sym.into, sym.z
         states, memories, residual = sym.at_rest()
         self.x0, self.m0 = column(list(states.values())), column(list(memories.values()))

@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from fes_pin.models.model import Model
 from fes_pin.models.session import PAST
 
@@ -39,15 +41,15 @@ class Layout:
     width: int = WIDTH
     """Lanes that run side by side."""
 
-    @property
-    def reported(self) -> int:
-        """Leading entries of what a program gives of each sample: readings, or innovations and their variances."""
-        return 2 * len(self.measured) if self.measured else len(self.outputs)
+    def parted(self, written: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """What a program writes of each sample, as `Program.run` gives it: the readings, and their sensitivities.
 
-    @property
-    def channels(self) -> int:
-        """Outputs that have sensitivities."""
-        return len(self.measured) if self.measured else len(self.outputs)
+        The readings of a predictor are innovations and their variances.
+        """
+        n, _, width = written.shape
+        channels = len(self.measured or self.outputs)
+        lead = 2 * channels if self.measured else channels
+        return written[:, :lead], written[:, lead:].reshape(n, channels, len(self.columns), width)
 
     @property
     def values(self) -> tuple[str, ...]:
@@ -82,11 +84,6 @@ class Sizes:
         return 5 * (self.state + 1) + 2 * (self.memory + 1) + self.kept
 
 
-def reading_inputs(measured: tuple[str, ...]) -> tuple[str, ...]:
-    """Names of the inputs that carry what was measured, whether it was, and how often the same was read in a row."""
-    return tuple(f"{what}.{n}" for what in ("measured", "seen", "repeated") for n in measured)
-
-
 def make_layout(
     model: Model,
     kind: str,
@@ -115,11 +112,13 @@ def make_layout(
     if measured:
         noise = (*(f"white.{n}" for n in measured), *(f"prior.{n}" for n in rig.unknowns(kind)))
         noise = (*noise, *(n for e in model.effects for n in e.random))
+    # what was measured, whether it was, and how often the same was read in a row
+    readings = (f"{what}.{n}" for what in ("measured", "seen", "repeated") for n in measured)
     past = PAST if any(e.remembers for e in model.effects) else ()
     fixed = {n: value for n, value in model.unused_parameters().items() if n not in columns}
     return Layout(
         kind=kind,
-        inputs=(*inputs, *reading_inputs(measured)),
+        inputs=(*inputs, *readings),
         parameters=tuple(n for n in model.parameters() if n not in fixed),
         unknowns=model.unknowns(kind),
         constants=(*rig.constant_names(kind), *rig.motion_names(kind), *past, *TIMING, *noise),

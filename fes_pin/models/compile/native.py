@@ -34,13 +34,13 @@ class NativeProgram:
         self, inputs: np.ndarray, values: np.ndarray, constants: np.ndarray, guess: np.ndarray, substeps: int
     ) -> tuple[np.ndarray, np.ndarray]:
         """Simulate all lanes; see `Program`."""
-        width, n, lead, channels = self.layout.width, inputs.shape[0], self.layout.reported, self.layout.channels
+        width, n = self.layout.width, inputs.shape[0]
         out = np.empty((n, self.sizes.reading, width))
         given = [np.ascontiguousarray(a, dtype=float) for a in (inputs, values, constants)]
         rest, scratch = np.array(guess, dtype=float), np.zeros((self.sizes.scratch, width))
         memory = (*given, rest, out, scratch)  # a name for each: they must live until the machine code returns
         self._run(n, substeps, *[a.ctypes.data for a in memory])
-        return out[:, :lead], out[:, lead:].reshape(n, channels, len(self.layout.columns), width)
+        return self.layout.parted(out)
 
 
 def compile_equations(equations: Equations) -> bytes:
@@ -84,7 +84,8 @@ class _Loop:
         self.n, self.substeps, self.u, self.p, self.c, self.z, self.y, scratch = function.args
         self.b = ir.IRBuilder(function.append_basic_block())
         self._carve(scratch)
-        self._constants()
+        names = equations.layout.constants
+        self.t0, self.dt, self.step = (self._load(self.c, names.index(n)) for n in ("t0", "dt", "step"))
         self._rest()
         self._samples()
         self.b.ret_void()
@@ -135,10 +136,6 @@ class _Loop:
         if part != name:
             self.b.call(self.parts[part], [*given, self.kept[name]])
 
-    def _constants(self) -> None:
-        names = self.equations.layout.constants
-        self.t0, self.dt, self.step = (self._load(self.c, names.index(n)) for n in ("t0", "dt", "step"))
-
     def _count(self, end: ir.Value, body: Callable[[ir.Value], None]) -> None:
         """for k in range(end): body(k)."""
         b = self.b
@@ -186,7 +183,8 @@ class _Loop:
             u = self._at(self.u, b.mul(n, ir.Constant(INT64, inputs)))
             y = self._at(self.y, b.mul(n, ir.Constant(INT64, self.sizes.reading)))
             self._call("sample", [self.state, self.memory, u, self.t, self.p, self.c], [self.after])
-            self._copy(self.after, self.memory, self.sizes.memory)
+            size = ir.Constant(INT64, self.sizes.memory)
+            self._count(size, lambda i: self._store(self._load(self.after, i), self.memory, i))
             given = [self.memory, u, self.t, self.p, self.c]
             if "correct" in self.made:
                 self._next_state("correct", given, y)
@@ -207,9 +205,6 @@ class _Loop:
         b.store(b.fmul(self.step, self._splat(0.5)), self.into, align=8)
         times = [self.t, self.since, self.into]
         self._next_state("follow", [self.total, self.memory, u, *times, self.p, self.c])
-
-    def _copy(self, source: ir.Value, target: ir.Value, size: int) -> None:
-        self._count(ir.Constant(INT64, size), lambda i: self._store(self._load(source, i), target, i))
 
     def _runge_kutta(self, u: ir.Value, end: ir.Value) -> None:
         """One step of the classical Runge-Kutta method of order four, from the state to `end`."""

@@ -34,8 +34,6 @@ Source: Jazwinski, Stochastic Processes and Filtering Theory, 1970, section 8.3;
 Parameter estimation in stochastic grey-box models, Automatica 40 (2004).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 
@@ -53,19 +51,18 @@ REACH = 3.0**0.5
 class _Uncertainty:
     """Covariance of the states as symbols, and the process noise that adds to it."""
 
-    def __init__(self, d: Carried, model: Model) -> None:
+    def __init__(self, d: "Carried", model: Model) -> None:
         self.d, self.count = d, d.x.numel()
-        self.spread = self._intensities(model)
+        self.spread = self._diagonal(model, "intensities")
         self.lower = ca.SX.sym("P", ca.Sparsity.lower(self.count))
         self.covariance = ca.tril2symm(self.lower)
 
-    def _intensities(self, model: Model) -> Any:
-        """G, which is diagonal."""
-        at = {n: k for k, n in enumerate(self.d.sym.states)}
-        out, c = ca.SX(self.count, 1), self.d.sym.c
+    def _diagonal(self, model: Model, method: str) -> Any:
+        """What a method of effects gives for their states, as a diagonal matrix: of intensities, G."""
+        out = ca.SX(self.count, 1)
         for e in model.effects:
-            for state, intensity in e.intensities(c).items():
-                out[at[f"{e.name}.{state}"]] = intensity
+            for state, value in getattr(e, method)(self.d.sym.c).items():
+                out[self.d.sym.states.index(f"{e.name}.{state}")] = value
         return ca.diag(out)
 
     def widened(self, f: Any) -> Any:
@@ -90,11 +87,7 @@ class _Uncertainty:
         slopes = self._read_slopes(moved)
         priors = [(c[f"prior.{n}"] / g) ** 2 for n, g in zip(unknowns, slopes, strict=False)]
         out = ca.mtimes([moved, ca.diag(ca.vertcat(*priors)), moved.T]) if unknowns else ca.SX(self.count, self.count)
-        at = {n: k for k, n in enumerate(d.sym.states)}
-        for e in model.effects:
-            for state, variance in e.stationary_variances(c).items():
-                k = at[f"{e.name}.{state}"]
-                out[k, k] = out[k, k] + variance
+        out = out + self._diagonal(model, "stationary_variances")
         for k, variance in d.start_variances(*(self._moves(unknowns, fast) for fast in (False, True))):
             out[k, k] = out[k, k] + variance
         return out

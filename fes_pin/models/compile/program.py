@@ -118,21 +118,17 @@ class VirtualProgram:
         self, inputs: np.ndarray, values: np.ndarray, constants: np.ndarray, guess: np.ndarray, substeps: int
     ) -> tuple[np.ndarray, np.ndarray]:
         """Simulate all lanes; see `Program`."""
-        width, n, lead, channels = self.layout.width, inputs.shape[0], self.layout.reported, self.layout.channels
+        width, n = self.layout.width, inputs.shape[0]
         out = np.empty((n, self.equations.sizes.reading, width))
         for lane in range(width):
             p, c = values[:, lane], constants[:, lane]
             state, memory = self.equations.functions["start"](self._rest(float(guess[lane]), p, c), p, c)
             trajectory = self._trajectory(n, substeps)
-            times = self._times(c, n)
+            t0, dt = (c[self.layout.constants.index(name)] for name in ("t0", "dt"))
+            times = (t0 + np.arange(n) * dt)[None, :]
             ended = trajectory(state, memory, inputs[:, :, lane].T, times, ca.repmat(p, 1, n), ca.repmat(c, 1, n))
             out[:, :, lane] = np.array(ended[2]).T
-        return out[:, :lead], out[:, lead:].reshape(n, channels, len(self.layout.columns), width)
-
-    def _times(self, constants: np.ndarray, n: int) -> np.ndarray:
-        """Time of every sample, shape (1, n)."""
-        names = self.layout.constants
-        return (constants[names.index("t0")] + np.arange(n) * constants[names.index("dt")])[None, :]
+        return self.layout.parted(out)
 
     def _rest(self, z: float, p: np.ndarray, c: np.ndarray) -> float:
         for _ in range(REST_ITERATIONS):

@@ -14,8 +14,6 @@ Source: assumed-density filtering, Maybeck, Stochastic Models, Estimation and Co
 truncated Gaussians: Johnson, Kotz and Balakrishnan, Continuous Univariate Distributions 1, 2nd ed., section 13.10.1.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import cache
@@ -40,7 +38,7 @@ class Gaussian:
     mean: Any
     covariance: Any
 
-    def seen(self, row: Any, innovation: Any, noise: Any, share: Any) -> tuple[Gaussian, Any, Any]:
+    def seen(self, row: Any, innovation: Any, noise: Any, share: Any) -> "tuple[Gaussian, Any, Any]":
         """Return the Gaussian given a linear reading, the gain and its variance; a share of 0 changes nothing."""
         toward = ca.mtimes(self.covariance, row.T)
         variance = ca.mtimes(row, toward) + noise
@@ -48,7 +46,7 @@ class Gaussian:
         left = Gaussian(self.mean + gain * innovation, self.covariance - ca.mtimes(gain, toward.T))
         return left, gain, variance
 
-    def cut(self, slack: Any, mean: Any, low: Any, high: Any) -> tuple[Any, Gaussian]:
+    def cut(self, slack: Any, mean: Any, low: Any, high: Any) -> "tuple[Any, Gaussian]":
         """Return the logarithm of the share in which a linear slack is between two ends, with its mean and covariance.
 
         Parameters

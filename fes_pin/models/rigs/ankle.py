@@ -1,7 +1,5 @@
 """The paper's ankle: nerve, muscle and one joint with a load on a cable, or on a dynamometer."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -83,7 +81,7 @@ class Ankle(Rig):
         return self.inertia_kgm2 / self.damping_nms if self.damping_nms > 0.0 else math.inf
 
     @classmethod
-    def of_study(cls, study: Study) -> Ankle:
+    def of_study(cls, study: Study) -> "Ankle":
         start: dict[str, Any] = dict(study.start)
         plain = cls(constants=dict(study.constants), **start)
         measured = [t for t in study.trials if t.kind == IMPOSED and "torque_nm" in t]

@@ -1,7 +1,5 @@
 """Base of rigs: names of the signals and equations of the nominal model."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -90,7 +88,7 @@ class Rig(ReadOnly):
         return dataclasses.replace(cls.schema, name=cls.name, owner=cls)
 
     @classmethod
-    def of_study(cls, study: Study) -> Rig:
+    def of_study(cls, study: Study) -> "Rig":
         """The nominal model that a study believes, with its start values.
 
         Raises

@@ -1,7 +1,5 @@
 """Any rig with one joint, from its URDF: revolute or prismatic, driven by an effort or free."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -79,7 +77,7 @@ class Joint(Rig):
     )
 
     @classmethod
-    def of_study(cls, study: Study) -> Joint:
+    def of_study(cls, study: Study) -> "Joint":
         if study.urdf is None:
             raise InputError("missing; expected the joint's URDF", file=study.folder, column="urdf")
         driven = any("effort" in t.columns for t in study.trials)

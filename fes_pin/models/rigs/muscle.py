@@ -1,7 +1,5 @@
 """A muscle held at one length, or by a lever that imposes its length: stimulus in, force out."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -47,7 +45,7 @@ class Muscle(Rig):
     elsewhere = "record the same force with another sensor, or let the muscle move a joint"
 
     @classmethod
-    def of_study(cls, study: Study) -> Muscle:
+    def of_study(cls, study: Study) -> "Muscle":
         pulsed = [t for t in study.trials if "stim" in t.columns]
         period = {"pulse_period_s": pulse_period(pulsed)} if pulsed else {}
         ends = [f(t["length_m"]) for t in study.trials if "length_m" in t for f in (np.min, np.max)]
@@ -113,7 +111,8 @@ class Muscle(Rig):
         s.act, s.q, s.v, s.force_scale = s.x.act, 0.0, 0.0, self.gain
         if s.kind == IMPOSED:
             s.q, rate, _ = imposed_now(s)
-            s.stretching, s.bent = rate, s.q - s.c.length_m - self._elongation(s)
+            in_series = sum((e.elongation(s.of(e)) for e in s.effects if e.signal == "fibre"), start=0.0)
+            s.stretching, s.bent = rate, s.q - s.c.length_m - in_series
         s.time_constant = s.through("time_constant", self.time_constant_s)
         s.act_rate = (s.r - s.act) / s.time_constant
         s.drive = s.through("activation", s.through("sensitivity", s.act) if s.kind == IMPOSED else s.act)
@@ -125,10 +124,6 @@ class Muscle(Rig):
         else:
             s.force = s.sensed = s.through("pull", s.through("force", s.force_scale * s.drive))
         return {"act": s.act_rate}
-
-    def _elongation(self, s: Signals) -> Any:
-        """Return the length of the elements in series with the fibres, m."""
-        return sum((e.elongation(s.of(e)) for e in s.effects if e.signal == "fibre"), start=0.0)
 
     def _tendon_force(self, s: Signals) -> Any:
         """The fibres' force at the speed at which it is also that of what is in series with them.
