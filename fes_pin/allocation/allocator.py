@@ -1,7 +1,5 @@
 """The program behind an allocation: a quadratic program with limits, ready for any torque."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -51,7 +49,7 @@ class Allocator(OfProblem):
         self._set_up(problem_of(nerves, q, v, Options.of(options)))
 
     @classmethod
-    def of_problem(cls, problem: AllocationProblem) -> Allocator:
+    def of_problem(cls, problem: AllocationProblem) -> "Allocator":
         """The program of a problem that was checked before."""
         program = cls.__new__(cls)
         program._set_up(problem)

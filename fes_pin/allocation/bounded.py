@@ -6,8 +6,6 @@ A limit with a multiplier holds exactly. The limits that hold determine the answ
 (`BoundedProgram.exact`), so that it does not depend on where the solver started.
 """
 
-from __future__ import annotations
-
 import threading
 from typing import Any
 
@@ -52,7 +50,7 @@ class BoundedProgram:
         A program of the same size that was solved before, whose limits that hold are where this one begins.
     """
 
-    def __init__(self, H: np.ndarray, rows: np.ndarray | None = None, like: BoundedProgram | None = None) -> None:
+    def __init__(self, H: np.ndarray, rows: np.ndarray | None = None, like: "BoundedProgram | None" = None) -> None:
         self.given, self.root = (H, rows), np.sqrt(H.diagonal())
         self.unit = H / np.outer(self.root, self.root)
         self.rows = np.zeros((0, len(H))) if rows is None else rows / self.root

@@ -1,7 +1,5 @@
 """The problem of an allocation: channels and their moment arms, weights of torque and effort, limits."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 from typing import Any
@@ -78,7 +76,7 @@ class Options:
     dead: Any = ()
 
     @classmethod
-    def of(cls, given: Mapping[str, Any]) -> Options:
+    def of(cls, given: Mapping[str, Any]) -> "Options":
         """Options by name.
 
         Raises

@@ -53,16 +53,17 @@ def soles_of(linear: LinearBody) -> SupportPolygon:
     return _area(linear, SIDES if linear.both_feet else (linear.body.stance,))
 
 
-def _model(linear: LinearBody) -> tuple[pin.Model, np.ndarray]:
+def model_of(linear: LinearBody) -> tuple[pin.Model, np.ndarray]:
+    """The whole body's model with the gravity of its slope, and the posture with what braces hold, rad."""
     posture = linear.body.angles(linear.whole_posture, check=False)
     return model_on_slope(linear.body, linear.slope, linear.gravity), posture
 
 
 def _carried(linear: LinearBody) -> tuple[list[tuple[SupportPolygon, Wrench]], np.ndarray]:
     """Each foot's sole and wrench, by the joints that move; and how the wrenches' rows depend on what is free."""
-    model, q = _model(linear)
+    model, q = model_of(linear)
     places = [linear.body.joint_names.index(name) for name in linear.joint_names]
-    total = ground_wrench(linear.body, model, q).on(places)
+    total = ground_wrench(model, q).on(places)
     if not linear.both_feet:
         return [(soles_of(linear), total)], np.zeros((6, 0))
     first, second = sorted(SIDES, key=lambda side: side != linear.body.stance)
@@ -96,7 +97,7 @@ def place_of_weight(linear: LinearBody) -> tuple[float, str]:
 
     An instant of a walk is not a posture to stand in: there the weight may lie outside, and the next step catches it.
     """
-    area, wrench = soles_of(linear), ground_wrench(linear.body, *_model(linear))
+    area, wrench = soles_of(linear), ground_wrench(*model_of(linear))
     outside = area.outside(centre_of_pressure(wrench.at_rest))
     soles = " and ".join(name.replace("_", " ") for name in area.soles)
     if outside <= 0.0:

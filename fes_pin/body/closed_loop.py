@@ -14,14 +14,13 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from fes_pin.body.balance import soles_of
+from fes_pin.body.balance import model_of, soles_of
 from fes_pin.body.catchable import plans_of
 from fes_pin.body.ground import centre_of_pressure
 from fes_pin.body.inputs import Inputs
 from fes_pin.body.joints import JOINT_NAMES, angles_array
 from fes_pin.body.linear_body import LinearBody
-from fes_pin.body.linearize import model_on_slope
-from fes_pin.body.plans import PULSE_S, SETTLE_DEG, Plans
+from fes_pin.body.plans import PULSE_S, SETTLE_DEG
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import positive_number, truth
 from fes_pin.data.show import Tabulated
@@ -109,7 +108,7 @@ def close_the_loop(
         raise InputError("the closed loop is simulated on one foot only")
     start = np.asarray(angles_array(start, linear.joint_names))
     plans = plans_of(linear, given, settle_deg, balance)
-    plant = _Plant(linear)
+    plant, project = _Plant(linear), plans.modes.shapes.T @ linear.A
     q, v = plant.rest + start, np.zeros(linear.n)
     deviations, outside, lost = [start], -np.inf, ""
     given_inputs: list[np.ndarray] = []
@@ -123,10 +122,11 @@ def close_the_loop(
                     raise
                 lost = error.message
                 break
-        stimulation = _first_input(now, q - plant.rest, v)
-        if stimulation is None:
+        gentlest = now.gentlest(project @ (q - plant.rest), project @ v).solve().x
+        if gentlest is None:
             lost = "no input within the bounds brings it back"
             break
+        stimulation = gentlest[: given.n]
         torque = now.inputs.on(linear) @ stimulation
         q, v, far = plant.run(q, v, torque)
         outside = max(outside, far)
@@ -136,15 +136,8 @@ def close_the_loop(
             lost = f"{linear.joint_names[int(np.abs(deviations[-1]).argmax())]} is {LOST_DEG:g} degrees off"
             break
     time = PULSE_S * np.arange(len(deviations))
-    used = np.array(given_inputs).reshape(len(given_inputs), plans.inputs.n)
+    used = np.array(given_inputs).reshape(len(given_inputs), given.n)
     return Caught(linear.joint_names, time, np.array(deviations), used, outside, lost)
-
-
-def _first_input(plans: Plans, deviation: np.ndarray, rates: np.ndarray) -> np.ndarray | None:
-    """Input of the next pulse by the plan whose modes stray least; None if no plan ends the falls."""
-    project = plans.modes.shapes.T @ plans.linear.A
-    found = plans.gentlest(project @ deviation, project @ rates).solve()
-    return None if found.x is None else found.x[: plans.inputs.n]
 
 
 def _acting(inputs, linear: LinearBody, q: np.ndarray) -> Inputs:
@@ -159,9 +152,8 @@ class _Plant:
     """The body with its braced joints locked, on the full equations of motion."""
 
     def __init__(self, linear: LinearBody) -> None:
-        whole = model_on_slope(linear.body, linear.slope, linear.gravity)
+        whole, q = model_of(linear)
         locked = [whole.getJointId(name) for name in linear.held]
-        q = linear.body.angles(linear.whole_posture, check=False)
         self.model = pin.buildReducedModel(whole, locked, q) if locked else whole
         self.data = self.model.createData()
         self.extra = -linear.C - pin.computeGeneralizedGravity(self.model, self.data, linear.q)

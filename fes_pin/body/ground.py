@@ -7,8 +7,6 @@ ground follows from the motion alone, f = m (a_com - g) and moment n about the o
 Syst. Man Cybern. A 34:630-637, 2004). Each edge of the hull is then one linear inequality of the wrench.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 
@@ -83,23 +81,23 @@ class Wrench(ReadOnly):
     per_acceleration: np.ndarray = field(repr=False)
     per_torque: np.ndarray = field(repr=False)
 
-    def on(self, places: Sequence[int]) -> Wrench:
+    def on(self, places: Sequence[int]) -> "Wrench":
         """With these of the joints alone."""
         moving = (self.per_angle, self.per_acceleration, self.per_torque)
         return Wrench(self.at_rest, *(part[:, places] for part in moving))
 
-    def __sub__(self, other: Wrench) -> Wrench:
+    def __sub__(self, other: "Wrench") -> "Wrench":
         """Return this wrench minus another one."""
         return Wrench(*(getattr(self, each.name) - getattr(other, each.name) for each in fields(self)))
 
 
-def ground_wrench(body: Body, model: pin.Model, q: np.ndarray) -> Wrench:
+def ground_wrench(model: pin.Model, q: np.ndarray) -> Wrench:
     """The wrench that carries a body about a posture at rest.
 
     Parameters
     ----------
-    body, model
-        The body, and its model with the gravity of the slope.
+    model
+        The body's, with the gravity of the slope.
     q
         The posture, (19,) rad.
     """
@@ -121,16 +119,8 @@ def centre_of_pressure(wrench: np.ndarray) -> np.ndarray:
     return np.array([-wrench[4], wrench[3]]) / wrench[2]
 
 
-@dataclass(frozen=True)
-class _Foot:
-    """The pose of a foot: rotation from the upright, its point under the MTP joint (3,) m, its length, m."""
-
-    turn: np.ndarray
-    place: np.ndarray
-    length: float
-
-
-def _foot(body: Body, q: np.ndarray, side: str) -> _Foot:
+def _foot(body: Body, q: np.ndarray, side: str) -> tuple[np.ndarray, np.ndarray, float]:
+    """The pose of a foot: rotation from the upright, its point under the MTP joint (3,) m; and its length, m."""
     data = body.model.createData()
     mtp, ankle = (body.model.getJointId(f"{side}_{name}") for name in ("mtp_extension", "ankle_dorsiflexion"))
     pin.forwardKinematics(body.model, data, np.zeros(body.model.nq))
@@ -138,10 +128,10 @@ def _foot(body: Body, q: np.ndarray, side: str) -> _Foot:
     length = float(np.hypot(apart[0], apart[1])) / (MTP_ALONG_FOOT - ANKLE_ALONG_FOOT)
     under = before.translation * [0.0, 0.0, 1.0]
     if side == body.stance:
-        return _Foot(np.eye(3), before.translation - under, length)
+        return np.eye(3), before.translation - under, length
     pin.forwardKinematics(body.model, data, q)
     turn = data.oMi[mtp].rotation @ before.rotation.T
-    return _Foot(turn, data.oMi[mtp].translation - turn @ under, length)
+    return turn, data.oMi[mtp].translation - turn @ under, length
 
 
 def sole(body: Body, q: np.ndarray, side: str, heel: bool) -> np.ndarray:
@@ -149,10 +139,10 @@ def sole(body: Body, q: np.ndarray, side: str, heel: bool) -> np.ndarray:
 
     Length and breadth by published proportions from the distance of the ankle and the MTP joint.
     """
-    foot = _foot(body, q, side)
-    half = 0.5 * FOOT_BREADTH / FOOT_LENGTH * foot.length
-    ends = (-MTP_ALONG_FOOT * foot.length if heel else 0.0, (1.0 - MTP_ALONG_FOOT) * foot.length)
-    return np.array([[x, y, 0.0] for x in ends for y in (-half, half)]) @ foot.turn.T + foot.place
+    turn, place, length = _foot(body, q, side)
+    half = 0.5 * FOOT_BREADTH / FOOT_LENGTH * length
+    ends = (-MTP_ALONG_FOOT * length if heel else 0.0, (1.0 - MTP_ALONG_FOOT) * length)
+    return np.array([[x, y, 0.0] for x in ends for y in (-half, half)]) @ turn.T + place
 
 
 def support(body: Body, q: np.ndarray, heels: dict[str, bool], sides: Sequence[str]) -> SupportPolygon:
@@ -220,8 +210,8 @@ def second_foot(body: Body, model: pin.Model, q: np.ndarray) -> SecondFoot:
         The second foot is not flat on the ground.
     """
     side = SIDES[1 - SIDES.index(body.stance)]
-    first, second = (_foot(body, q, each) for each in (body.stance, side))
-    tilt, height = np.degrees(np.arccos(np.clip(second.turn[2, 2], -1.0, 1.0))), second.place[2]
+    (_, first, _), (turn, second, _) = (_foot(body, q, each) for each in (body.stance, side))
+    tilt, height = np.degrees(np.arccos(np.clip(turn[2, 2], -1.0, 1.0))), second[2]
     if tilt > FLAT_DEG or abs(height) > LEVEL_M:
         lies = f"it is tilted by {tilt:.1f} deg and {100 * height:+.1f} cm high"
         raise InputError(f"the {side} forefoot is not on the ground: {lies}", column="both_feet")
@@ -230,9 +220,9 @@ def second_foot(body: Body, model: pin.Model, q: np.ndarray) -> SecondFoot:
     pin.computeJointJacobians(model, data, q)
     joint = model.getJointId(f"{side}_mtp_extension")
     closure = pin.getJointJacobian(model, data, joint, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED).copy()
-    apart = second.place[1] - first.place[1]
-    share = float(np.clip((com[1] - first.place[1]) / apart, 0.0, 1.0)) if abs(apart) > LEVEL_M else 0.5
-    under = np.array([com[0], second.place[1], 0.0])
+    apart = second[1] - first[1]
+    share = float(np.clip((com[1] - first[1]) / apart, 0.0, 1.0)) if abs(apart) > LEVEL_M else 0.5
+    under = np.array([com[0], second[1], 0.0])
     lever = data.oMi[joint].actInv(under)
     loaded = pin.Model(model)
     weight = pin.Inertia(share * pin.computeTotalMass(model), lever, np.zeros((3, 3)))

@@ -1,7 +1,5 @@
 """Inputs on the joints: torques, muscles or nerves, each a column of joint torques with bounds."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
@@ -60,7 +58,7 @@ class Inputs(ReadOnly):
         self._freeze()
 
     @classmethod
-    def torques(cls, joints: Iterable[str] = JOINT_NAMES, limit_nm: float = np.inf) -> Inputs:
+    def torques(cls, joints: Iterable[str] = JOINT_NAMES, limit_nm: float = np.inf) -> "Inputs":
         """A motor at each joint: u is its torque, N m, within plus and minus the limit.
 
         Raises
@@ -76,12 +74,12 @@ class Inputs(ReadOnly):
         return cls(names, JOINT_NAMES, matrix, -bound, bound)
 
     @classmethod
-    def pulling(cls, names: Sequence[str], matrix, joint_names: Sequence[str] = JOINT_NAMES) -> Inputs:
+    def pulling(cls, names: Sequence[str], matrix, joint_names: Sequence[str] = JOINT_NAMES) -> "Inputs":
         """Muscles or nerves: u is 0 to 1, `matrix` the torque at full recruitment, N m."""
         return cls(tuple(names), tuple(joint_names), matrix, np.zeros(len(names)), np.ones(len(names)))
 
     @classmethod
-    def of(cls, thing, linear: LinearBody) -> Inputs:
+    def of(cls, thing, linear: LinearBody) -> "Inputs":
         """Inputs from whatever names them: `Inputs`, joint names, or nerves (with `names` and `torque_matrix`).
 
         Raises
@@ -125,7 +123,7 @@ class Inputs(ReadOnly):
             ends = np.nan_to_num([gains * self.lower, gains * self.upper], nan=0.0, posinf=np.inf, neginf=-np.inf)
         return ends.min(axis=0), ends.max(axis=0)
 
-    def select(self, names: Iterable[str]) -> Inputs:
+    def select(self, names: Iterable[str]) -> "Inputs":
         """Only these inputs.
 
         Raises
@@ -138,7 +136,7 @@ class Inputs(ReadOnly):
         keep = [self.names.index(name) for name in wanted]
         return Inputs(wanted, self.joint_names, self.matrix[:, keep], self.lower[keep], self.upper[keep])
 
-    def scaled(self, factor: float) -> Inputs:
+    def scaled(self, factor: float) -> "Inputs":
         """All torques times a factor (strengths are known to 1.3-1.8).
 
         Raises

@@ -5,8 +5,6 @@ Two feet on the ground close a loop: the joints' deviations g obey J g = 0, J th
 are the identity and A^-1.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -189,7 +187,7 @@ class LinearBody(Tabulated):
             values = np.linalg.eigvals(np.vstack([np.eye(r, 2 * r, r), rates]))
         return values[np.lexsort((values.imag, -values.real))]
 
-    def brace(self, joints: str | Iterable[str]) -> LinearBody:
+    def brace(self, joints: str | Iterable[str]) -> "LinearBody":
         """The same body with these joints locked at the posture: names, or one name.
 
         Raises

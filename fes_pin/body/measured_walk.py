@@ -1,7 +1,5 @@
 """Measured walking as wanted torque: angles and joint torques of a stride, in this project's joints and signs."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -24,16 +22,13 @@ SAME_TIME = 1e-6
 """Times that differ by no more are the same, s."""
 
 REFERENCE = {
-    "hip_flexion": ("hip_flexion", 1.0),
-    "hip_adduction": ("hip_adduction", 1.0),
-    "hip_rotation": ("hip_rotation", 1.0),
     "knee_flexion": ("knee_angle", -1.0),
     "ankle_dorsiflexion": ("ankle_angle", 1.0),
     "ankle_inversion": ("subtalar_angle", 1.0),
     "mtp_extension": ("mtp_angle", 1.0),
 }
-"""This project's leg joints and the reference's coordinates, which extend the knee positively; the ankle's are about
-other axes and are converted."""
+"""This project's leg joints and the reference's coordinates where these have other names. They extend the knee
+positively; the ankle's are about other axes and are converted."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,7 +59,7 @@ class MeasuredWalk:
         """Joint rates, (samples, 19) rad/s by joint name."""
         return NamedArray(np.gradient(np.asarray(self.q), self.time, axis=0), JOINT_NAMES)
 
-    def active(self, passive: Passive) -> MeasuredWalk:
+    def active(self, passive: Passive) -> "MeasuredWalk":
         """The same walk with the torque that muscles must make: what inverse dynamics gives less the passive torque.
 
         Parameters
@@ -127,8 +122,8 @@ def read_walk(folder: str | Path | None = None) -> MeasuredWalk:
         side, _, name = joint.partition("_")
         if side == "lumbar":
             sources[i] = joint, 1.0
-        elif name in REFERENCE:
-            coordinate, sign = REFERENCE[name]
+        elif name != "ankle_rotation":  # of which the reference has none
+            coordinate, sign = REFERENCE.get(name, (name, 1.0))
             sources[i] = f"{coordinate}_{side[0]}", sign
     angles = columns_of_numbers(folder / ANGLES, ["time", *(f"q_{name}" for name, _ in sources.values())])
     torques = columns_of_numbers(folder / TORQUES, ["time", *(f"ID_{name}_moment" for name, _ in sources.values())])

@@ -228,14 +228,12 @@ def _smallest(linear: LinearBody, inputs: Inputs, asked: _Question, alternatives
         # balance and leans in k modes need k inputs; inputs that only pull, around no load at all, k + 1
         alone = not plans.constant[plans.modes.kinds == "fall"].any() and not inputs.lower.any()
         rows, needs = np.vstack([rows, np.ones(inputs.n)]), np.append(needs, len(plans.leans) + alone)
-    found = smallest(inputs.n, rows, needs, _leaning(plans, asked.lean_deg) if asked.together else [], alternatives)
+    # the body is held upright, and leant in each falling mode, both ways
+    still, leans = np.zeros(len(plans.modes)), asked.lean_deg * plans.leans
+    starts = [still, *leans, *-leans] if asked.together else []
+    demands = [Demand(plans.program(start, still), plans.owner) for start in starts]
+    found = smallest(inputs.n, rows, needs, demands, alternatives)
     return [tuple(name for name, z in zip(inputs.names, chosen, strict=True) if z) for chosen in found]
-
-
-def _leaning(plans: Plans, lean_deg: float) -> list[Demand]:
-    """The posture, and a lean each way in each falling mode, held or brought to rest."""
-    still, leans = np.zeros(len(plans.modes)), lean_deg * plans.leans
-    return [Demand(plans.program(start, still), plans.owner) for start in [still, *leans, *-leans]]
 
 
 def _in_turn(plans: Plans, lean_deg: float) -> tuple[np.ndarray, np.ndarray]:

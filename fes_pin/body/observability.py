@@ -87,16 +87,11 @@ def observability(linear: LinearBody, sensors: Iterable[str]) -> ModalObservabil
     for name in names:
         if name not in linear.joint_names:
             raise InputError(f"{name!r} is braced: nothing moves there")
-    rows = _angles(linear, found, names)
+    rows = found.shapes[[linear.joint_names.index(name) for name in names]].T  # (modes, sensors), then per degree
+    rows = rows * (found.degree / np.radians(1.0))[:, None]
+    rows = np.where(np.abs(rows) > RELATIVE_TOLERANCE, rows, 0.0)
     (left,) = _posteriors(found.modes, rows[None])
     return ModalObservability(found, names, rows, independent(found.values, rows), left)
-
-
-def _angles(linear: LinearBody, found: ModeSet, names: Sequence[str]) -> np.ndarray:
-    """Angle that each sensor sees per degree of each mode's greatest joint: (modes, sensors)."""
-    rows = found.shapes[[linear.joint_names.index(name) for name in names]].T
-    rows = rows * (found.degree / np.radians(1.0))[:, None]
-    return np.where(np.abs(rows) > RELATIVE_TOLERANCE, rows, 0.0)
 
 
 def _courses(found: Sequence[Mode]) -> np.ndarray:

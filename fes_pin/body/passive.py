@@ -5,6 +5,7 @@ Every class here answers `torque(q, names)`, `stiffness(q, names)` = -d torque /
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Protocol
 
 import numpy as np
@@ -13,6 +14,7 @@ from fes_pin.body.joints import JOINT_NAMES, SIDES, angles_array
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import between
 from fes_pin.data.read_only import ReadOnly
+from fes_pin.data.table import own_table
 
 
 class Passive(Protocol):
@@ -73,17 +75,9 @@ class ElasticJoints(ReadOnly):
         return np.diag(_positive(self.damping_nms, names, "damping"))
 
 
-# exp(c + angles (hip, knee, ankle) . w), angles in degrees, hip and knee flexion and ankle plantarflexion positive:
-# (joint, sign, c, w_hip, w_knee, w_ankle). Signs: the moment that the joint's positive direction feels.
-_TERMS = (
-    ("hip_flexion", 1.0, 1.4655, -0.0750, -0.0034, 0.0),
-    ("hip_flexion", -1.0, 1.3403, 0.0305, -0.0226, 0.0),
-    ("knee_flexion", 1.0, 1.800, 0.0217, -0.0352, -0.0460),
-    ("knee_flexion", -1.0, -3.971, -0.0128, 0.0495, -0.0004),
-    ("knee_flexion", 1.0, 2.220, 0.0, -0.150, 0.0),
-    ("ankle_dorsiflexion", -1.0, 2.1016, 0.0, -0.0176, -0.0843),
-    ("ankle_dorsiflexion", 1.0, -7.9763, 0.0, 0.0008, 0.1949),
-)
+_NUMBERS = ("sign", "constant", "hip", "knee", "ankle")
+_ROWS = own_table(Path(__file__).with_name("passive_legs.csv"))
+_TERMS = [(row["joint"], [float(row[n]) for n in _NUMBERS]) for row in _ROWS]
 _OFFSETS = {"hip_flexion": 8.072, "knee_flexion": -4.820, "ankle_dorsiflexion": 1.792}
 _DEGREE = 180.0 / np.pi
 MOST_PASSIVE = 100.0
@@ -125,7 +119,7 @@ class PassiveLegs(ReadOnly):
         for side in SIDES:
             at = [places[f"{side}_{joint}"] for joint in ("hip_flexion", "knee_flexion", "ankle_dorsiflexion")]
             angles = q[at] * [_DEGREE, _DEGREE, -_DEGREE]
-            for joint, sign, constant, *weights in _TERMS:
+            for joint, (sign, constant, *weights) in _TERMS:
                 moment = self.factor * sign * np.exp(constant + np.dot(weights, angles))
                 yield places[f"{side}_{joint}"], at, moment, moment * np.array(weights) * [_DEGREE, _DEGREE, -_DEGREE]
 

@@ -6,8 +6,6 @@ are computed backwards from the end of the plan, decaying ones, y = eta - eta'/r
 Torques follow the stimulation at once.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -15,8 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from fes_pin.body.balance import GroundRows
-from fes_pin.body.balance import balance as _balance
+from fes_pin.body.balance import GroundRows, balance
 from fes_pin.body.inputs import Inputs
 from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.modes import ModeSet
@@ -70,7 +67,7 @@ class Plans:
     steady: bool = False
 
     @classmethod
-    def held(cls, linear: LinearBody, inputs: Inputs, settle_deg: float, balance: bool, gravity: bool) -> Plans:
+    def held(cls, linear: LinearBody, inputs: Inputs, settle_deg: float, balance: bool, gravity: bool) -> "Plans":
         """Plans of one input that is held for good; with an infinite `settle_deg` swings are ignored."""
         return cls(linear, inputs, settle_deg, balance, gravity=gravity, pieces=(1,), steady=True)
 
@@ -218,7 +215,7 @@ class Plans:
     @cached_property
     def ground(self) -> GroundRows:
         """The inequalities of the centre of pressure."""
-        return _balance(self.linear, self.modes)
+        return balance(self.linear, self.modes)
 
     def _on_the_soles(self) -> list[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
         """Blocks of `_limits`: each foot's centre of pressure on its sole, at every look and at rest in the end."""

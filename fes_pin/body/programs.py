@@ -12,8 +12,6 @@ hold for every answer, so the first choice that meets all demands is a smallest 
 procedures for solving mixed-variables programming problems", Numer. Math. 4:238-252, 1962).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
@@ -56,17 +54,17 @@ class LinearProgram:
     lower: np.ndarray = field(repr=False)
     upper: np.ndarray = field(repr=False)
 
-    def widened(self, cost: Sequence[float] | np.ndarray, A_ub: np.ndarray, A_eq: np.ndarray) -> LinearProgram:
+    def widened(self, cost: Sequence[float] | np.ndarray, A_ub: np.ndarray, A_eq: np.ndarray) -> "LinearProgram":
         """The same with further variables, each 0 or more: their costs (v,), and their columns, (rows, v) each."""
         lower, upper = np.append(self.lower, np.zeros(len(cost))), np.append(self.upper, np.full(len(cost), np.inf))
         A_ub, A_eq = np.column_stack([self.A_ub, A_ub]), np.column_stack([self.A_eq, A_eq])
         return replace(self, cost=np.append(self.cost, cost), A_ub=A_ub, A_eq=A_eq, lower=lower, upper=upper)
 
-    def towards(self, other: LinearProgram) -> LinearProgram:
+    def towards(self, other: "LinearProgram") -> "LinearProgram":
         """The program whose last variable says how far from these limits to those of another, 1 there, an answer is."""
         return self.widened([-1.0], self.b_ub - other.b_ub, self.b_eq - other.b_eq)
 
-    def solve(self) -> ProgramAnswer:
+    def solve(self) -> "ProgramAnswer":
         """The answer by HiGHS."""
         if not len(self.cost):
             kept = np.all(self.b_ub >= -FEASIBLE) and np.all(np.abs(self.b_eq) <= FEASIBLE)

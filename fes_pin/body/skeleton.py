@@ -1,7 +1,5 @@
 """The body in its neutral posture: ten segments with mass, and the centres of the nine joints that hold them."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -34,7 +32,7 @@ class Segment(ReadOnly):
     com: np.ndarray
     inertia: np.ndarray
 
-    def checked(self, name: str) -> Segment:
+    def checked(self, name: str) -> "Segment":
         """Itself, if a real body can have these figures.
 
         Raises
@@ -87,11 +85,6 @@ class Skeleton(ReadOnly):
             if joint.name not in self.centres:
                 raise InputError(f"the centre of joint {joint.name!r} is missing")
         self._freeze()
-
-    @property
-    def mass(self) -> float:
-        """Total mass, kg."""
-        return float(sum(segment.mass for segment in self.segments.values()))
 
 
 TO_WORLD = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])

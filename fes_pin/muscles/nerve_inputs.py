@@ -6,8 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from fes_pin.body.build import Body
-from fes_pin.body.controllability import ModalControllability
-from fes_pin.body.controllability import modal_controllability as _controllability
+from fes_pin.body.controllability import ModalControllability, modal_controllability
 from fes_pin.body.inputs import Inputs
 from fes_pin.body.joints import JOINT_NAMES, SIDES
 from fes_pin.body.linearize import LinearBody
@@ -97,7 +96,7 @@ def controllability(linear: LinearBody, inputs, horizon: float = 0.3) -> ModalCo
     InputError
         Unknown nerve or joint.
     """
-    return _controllability(linear, inputs_by_name(linear, inputs), horizon)
+    return modal_controllability(linear, inputs_by_name(linear, inputs), horizon)
 
 
 def inputs_by_name(linear: LinearBody, inputs) -> Inputs:

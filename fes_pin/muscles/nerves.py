@@ -1,7 +1,5 @@
 """Nerves: which joints a stimulated nerve turns, and how strongly, at a posture."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -117,7 +115,7 @@ class Nerves(ReadOnly):
         names: Iterable[str] | None = None,
         strength: float | None = None,
         **options,
-    ) -> Nerves:
+    ) -> "Nerves":
         """Nerves of an adult of other size: strength as mass, arms as height.
 
         Parameters
@@ -139,7 +137,7 @@ class Nerves(ReadOnly):
         return cls(names, strength=strength, length=length, size=size, **options)
 
     @classmethod
-    def muscles(cls, *nerves: str, **options) -> Nerves:
+    def muscles(cls, *nerves: str, **options) -> "Nerves":
         """Every single muscle of the given nerves (all of them by default) as a channel of its own."""
         wanted = (cls(nerves) if nerves else cls()).names
         table = standard_muscles()
@@ -177,7 +175,7 @@ class Nerves(ReadOnly):
             return PARALYSED_BAND[0] / PARALYSED, PARALYSED_BAND[1] / PARALYSED
         return 1.0 / STRENGTH_FACTOR, STRENGTH_FACTOR
 
-    def select(self, names: Iterable[str]) -> Nerves:
+    def select(self, names: Iterable[str]) -> "Nerves":
         """The same subject with only these of its nerves.
 
         Raises
@@ -191,7 +189,7 @@ class Nerves(ReadOnly):
                 raise InputError(f"{name!r} is not among the nerves {', '.join(self.names)}")
         return replace(self, names=names, fatigue={k: v for k, v in self.fatigue.items() if k in names})
 
-    def tired(self, **left: float) -> Nerves:
+    def tired(self, **left: float) -> "Nerves":
         """The same nerves with this much strength left, by name."""
         return replace(self, fatigue={**self.fatigue, **left})
 

@@ -4,8 +4,6 @@ Every curve is 0 up to its threshold, 1 from its saturation on, and rises strict
 between. The inverse gives pulse width 0 for recruitment 0, else one between threshold and saturation.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any
@@ -198,7 +196,7 @@ class Hysteresis:
     """
 
     def __init__(
-        self, curve: LinearRecruitment | MeasuredRecruitment, half_width_us: float, acting_us: float = 0.0
+        self, curve: "LinearRecruitment | MeasuredRecruitment", half_width_us: float, acting_us: float = 0.0
     ) -> None:
         if not isinstance(curve, LinearRecruitment | MeasuredRecruitment) or np.ndim(curve.threshold_us):
             raise InputError(f"expected a recruitment curve of one channel, got {curve!r:.40}", column="curve")

@@ -12,8 +12,6 @@ Source: Dombre, Fournier and Coiffet, section II-3-1, figure 3; Bar-Shalom, Li a
 Applications to Tracking and Navigation, Wiley 2001, section 5.4 (NEES, NIS).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
@@ -49,7 +47,7 @@ class StraightRecruitment(LinearRecruitment):
         positive_number(self.force_scale_n, "force_scale_n")
 
     @classmethod
-    def of(cls, constants: Mapping[str, float]) -> StraightRecruitment:
+    def of(cls, constants: Mapping[str, float]) -> "StraightRecruitment":
         """From the `[rig]` numbers of a study.
 
         Raises

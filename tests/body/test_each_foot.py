@@ -194,4 +194,4 @@ def reach(constant, slope):
 
 def whole_wrench(linear):
     places = [linear.body.joint_names.index(name) for name in linear.joint_names]
-    return ground_wrench(linear.body, linear.body.model, linear.body.angles("standing")).on(places)
+    return ground_wrench(linear.body.model, linear.body.angles("standing")).on(places)

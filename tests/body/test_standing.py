@@ -48,7 +48,7 @@ def test_the_wrench_of_the_ground_is_that_of_inverse_dynamics(body):
         wrench = pin.rnea(model, model.createData(), np.r_[base, q], np.zeros(25), np.r_[np.zeros(6), a])
         return wrench[:6]
 
-    found = ground_wrench(body, body.model, q)
+    found = ground_wrench(body.model, q)
     assert found.at_rest == pytest.approx(inverse(q, np.zeros(19)), abs=1e-9)
     assert found.per_acceleration @ a == pytest.approx(inverse(q, a) - inverse(q, np.zeros(19)), abs=1e-9)
     step = 1e-5 * rng.normal(size=19)
@@ -83,7 +83,7 @@ def test_a_lean_ends_where_the_centre_of_pressure_leaves_the_foot(body, pendulum
     area = support(body, q, {"left": True, "right": True}, ("right",))
     for sign, lean in zip((1.0, -1.0), found.lean_deg[0], strict=True):
         tilted = {**pendulum.whole_posture, ANKLE: pendulum.q[0] + sign * np.radians(lean)}
-        place = centre_of_pressure(ground_wrench(body, body.model, body.angles(tilted, check=False)).at_rest)
+        place = centre_of_pressure(ground_wrench(body.model, body.angles(tilted, check=False)).at_rest)
         assert area.outside(place) == pytest.approx(0.0, abs=1e-3)
 
 
