@@ -86,6 +86,11 @@ class Skeleton(ReadOnly):
                 raise InputError(f"the centre of joint {joint.name!r} is missing")
         self._freeze()
 
+    @property
+    def mass(self) -> float:
+        """Total mass, kg."""
+        return float(sum(segment.mass for segment in self.segments.values()))
+
 
 TO_WORLD = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 """OpenSim's axes (x forward, y up, z right) to ours (x forward, y left, z up)."""

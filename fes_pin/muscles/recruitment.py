@@ -322,15 +322,9 @@ class ChannelRecruitment:
     def __hash__(self) -> int:
         return hash((self.n, *self.curves))
 
-    def recruitment(self, pulse_width_us: np.ndarray) -> np.ndarray:
-        """Recruitments (..., n) at pulse widths (..., n) in us."""
-        return self._by_channel("recruitment", np.asarray(pulse_width_us, dtype=float))
-
     def pulse_width_us(self, recruitment: np.ndarray) -> np.ndarray:
         """Pulse widths in us (..., n) for recruitments (..., n)."""
-        return self._by_channel("pulse_width_us", np.asarray(recruitment, dtype=float))
-
-    def _by_channel(self, method: str, values: np.ndarray) -> np.ndarray:
+        r = np.asarray(recruitment, dtype=float)
         if not self.each:
-            return getattr(self.curves[0], method)(values)
-        return np.stack([getattr(curve, method)(values[..., i]) for i, curve in enumerate(self.curves)], axis=-1)
+            return self.curves[0].pulse_width_us(r)
+        return np.stack([curve.pulse_width_us(r[..., i]) for i, curve in enumerate(self.curves)], axis=-1)

@@ -79,7 +79,7 @@ def test_mixed_channels_equal_each_curve_alone():
     widths = MIXED.pulse_width_us(r)
     for i, curve in enumerate(CURVES):
         np.testing.assert_array_equal(widths[:, i], curve.pulse_width_us(np.minimum(r[:, i], 1.0)))
-    np.testing.assert_allclose(MIXED.recruitment(widths), np.clip(r, 0, 1), atol=1e-12)
+        np.testing.assert_allclose(curve.recruitment(widths[:, i]), np.clip(r[:, i], 0, 1), atol=1e-12)
 
 
 def test_one_curve_with_arrays_of_thresholds():
