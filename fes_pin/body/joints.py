@@ -8,6 +8,7 @@ internal, bending right, lumbar rotation left).
 import difflib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,31 +16,13 @@ import numpy as np
 from fes_pin.data.errors import InputError
 from fes_pin.data.named import NamedArray
 from fes_pin.data.numbers import numbers, shortened
+from fes_pin.data.table import own_table
 
 SIDES = ("left", "right")
 _FORWARD, _LEFT, _UP = np.eye(3)
-
-# Degrees. Ranges of motion as clinics teach them: hip -15..125, abduction 45, adduction 45, rotations 45; ankle 50
-# plantar to 20 dorsal, inversion 35, eversion 25; MTP 30 flexion to 80 extension (table "Normal values for range of
-# motion of joints", MSD Manual; read there). Wider where people are known to go further with weight on the limb: hip
-# extension 30 and knee -10..150 (AAOS, Joint Motion 1965, and Kapandji, from memory), dorsiflexion 40 in a loaded
-# lunge (Bennell 1998, from memory). Thoracolumbar: flexion 80, extension 30, bending 35, rotation 45 (AAOS 1965, from
-# memory). Foot about the leg's axis: 20 either way (our choice: no agreed figure).
-# Axes are those of a right leg; the left leg's adduction, inversion and rotations are mirrored.
-_TURNS: dict[str, tuple[np.ndarray, tuple[float, float]]] = {
-    "hip_flexion": (-_LEFT, (-30.0, 125.0)),
-    "hip_adduction": (_FORWARD, (-45.0, 45.0)),
-    "hip_rotation": (_UP, (-45.0, 45.0)),
-    "knee_flexion": (_LEFT, (-10.0, 150.0)),
-    "ankle_dorsiflexion": (-_LEFT, (-50.0, 40.0)),
-    "ankle_inversion": (_FORWARD, (-25.0, 35.0)),
-    "ankle_rotation": (_UP, (-20.0, 20.0)),
-    "mtp_extension": (-_LEFT, (-30.0, 80.0)),
-    "lumbar_extension": (-_LEFT, (-80.0, 30.0)),
-    "lumbar_bending": (_FORWARD, (-35.0, 35.0)),
-    "lumbar_rotation": (_UP, (-45.0, 45.0)),
-}
-RANGE_DEG = {name: ends for name, (_, ends) in _TURNS.items()}
+_AXES = {"forward": _FORWARD, "left": _LEFT, "right": -_LEFT, "up": _UP}
+_TURNS = {row["joint"]: row for row in own_table(Path(__file__).with_name("joints.csv"))}
+RANGE_DEG = {name: (float(row["low_deg"]), float(row["high_deg"])) for name, row in _TURNS.items()}
 """Smallest and greatest angle, degrees, of a joint of either side."""
 
 _LEG, _LUMBAR = tuple(_TURNS)[:8], tuple(_TURNS)[8:]
@@ -80,7 +63,7 @@ def _plain(name: str) -> str:
 
 def axis_of(name: str) -> np.ndarray:
     """Axis about which the outer segment turns when the joint's angle grows: (3,) unit vector, neutral posture."""
-    axis = _TURNS[_plain(name)][0].copy()
+    axis = _AXES[_TURNS[_plain(name)]["axis"]].copy()
     return -axis if side_of(name) == "left" and abs(axis[1]) < 0.5 else axis
 
 
