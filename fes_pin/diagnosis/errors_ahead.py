@@ -16,7 +16,6 @@ from fes_pin.infer.levels import AVERAGED_S, SMALL_SHARE
 from fes_pin.infer.noise import NoiseModel
 from fes_pin.infer.problem import Unknowns
 from fes_pin.infer.result import shown
-from fes_pin.models.autoregression import weights_ahead
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import StateSpaceNoise
 from fes_pin.workers import in_parallel
@@ -200,27 +199,13 @@ def _predicted(fitted: LikelihoodFit, trial: Trial, horizon_s: float) -> _Predic
 
 def _predict(fitted: LikelihoodFit, trial: Trial, horizon_s: float) -> _Predicted:
     if is_simulated(fitted.noise, [trial]):
-        return _predict_freely(fitted, trial, horizon_s)
-    calm = noise_that_is_small(fitted)
-    predicted = forecasts(fitted.model, trial, fitted.noise, horizon_s)
-    alone = predicted if calm is fitted.noise else forecasts(fitted.model, trial, calm, horizon_s)
+        alone = predicted = free_ahead(fitted.model, trial, fitted.noise, horizon_s, fitted.unknowns_of(trial))
+    else:
+        calm = noise_that_is_small(fitted)
+        predicted = forecasts(fitted.model, trial, fitted.noise, horizon_s)
+        alone = predicted if calm is fitted.noise else forecasts(fitted.model, trial, calm, horizon_s)
     noise = {n: np.where(np.isfinite(trial[n]), np.nan_to_num(one.variances), 0.0) for n, one in alone.items()}
     return {n: one.values for n, one in predicted.items()}, noise
-
-
-def _left(fitted: LikelihoodFit, trial: Trial) -> dict[str, np.ndarray]:
-    return free_residuals(fitted.model, trial, fitted.noise, fitted.unknowns_of(trial))
-
-
-def _predict_freely(fitted: LikelihoodFit, trial: Trial, horizon_s: float) -> _Predicted:
-    """Return the same without process noise: a free simulation plus the prediction of autoregressive noise."""
-    predicted, variances = free_ahead(fitted.model, trial, fitted.noise, horizon_s, fitted.unknowns_of(trial)), {}
-    steps = max(1, round(horizon_s / trial.dt))
-    for name in predicted:
-        noise = fitted.noise[name]
-        grown = np.append(1.0, weights_ahead(noise.ar, steps - 1)[:, 0] if noise.ar else np.zeros(steps - 1))
-        variances[name] = np.where(np.isfinite(trial[name]), (noise.innovation_std**2) * float(grown @ grown), 0.0)
-    return predicted, variances
 
 
 def _first(fitted: LikelihoodFit, trial: Trial, horizon_s: float) -> int:
@@ -261,8 +246,9 @@ def _sums(fitted: LikelihoodFit, floor: LikelihoodFit, trial: Trial, horizon_s: 
     """
     name = fitted.model.rig.output(trial.kind)
     measured, (predicted, noise) = trial[name], _predicted(fitted, trial, horizon_s)
-    none = not (simulated := is_simulated(fitted.noise, [trial])) and falling
-    free = np.full(len(trial), np.nan) if none else _left(fitted, trial)[name]
+    free, simulated = np.full(len(trial), np.nan), is_simulated(fitted.noise, [trial])
+    if simulated or not falling:
+        free = free_residuals(fitted.model, trial, fitted.noise, fitted.unknowns_of(trial))[name]
     if simulated:
         next_one = free - forecast(np.nan_to_num(free), fitted.noise[name], trial.dt, 0.0)
     else:

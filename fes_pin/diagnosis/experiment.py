@@ -91,9 +91,8 @@ class Discrimination:
 
     def margin(self, repeats: int = 1) -> float:
         """Return the lead of the true model after the trial, at 95 % confidence, whichever of the two it is."""
-        leads = (self.lead, -self.lead)
-        distances = [self.distance(way, repeats) for way in (0, 1)]
-        return min(m + d - 2.0 * SURE * np.sqrt(d) for m, d in zip(leads, distances, strict=True))
+        ways = ((self.lead, self.distance(0, repeats)), (-self.lead, self.distance(1, repeats)))
+        return min(lead + d - 2.0 * SURE * np.sqrt(d) for lead, d in ways)
 
     @property
     def worth(self) -> float:

@@ -80,7 +80,7 @@ def _predicted(
         moves = [over_horizon(model, t, fitted.noise, ahead.horizon_s) for t in trials]
         return [derived_trial(t, columns={**t.columns, **m}) for t, m in zip(trials, moves, strict=True)]
     for trial in trials:
-        (readings,) = predictions(model, [trial], noise, fitted.unknowns_of(trial))
+        readings = predictions(model, trial, noise, fitted.unknowns_of(trial))
         names = model.rig.outputs(trial.kind)
         shown = {n: _shown(readings[:, k], trial, n) for k, n in enumerate(names)}
         out.append(derived_trial(trial, columns={**trial.columns, **shown}))

@@ -17,16 +17,15 @@ from fes_pin.data.counts import WHOLE as OFF_COUNT
 from fes_pin.data.counts import count_of
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
-from fes_pin.identify.fit import Fit
+from fes_pin.identify.fit import Fit, errors_of
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit, maximise
-from fes_pin.identify.problem import Problem, limits_of
+from fes_pin.identify.problem import limits_of
 from fes_pin.identify.process_noise import first_guess
 from fes_pin.infer.covariance import least_squares_step
 from fes_pin.infer.held_out import percent_of_spread
 from fes_pin.infer.levels import CONFIDENCE_95, NOTHING_PERCENT, RUNAWAY, UNFELT
-from fes_pin.infer.noise import Noise
-from fes_pin.infer.problem import completed, normal_equations
+from fes_pin.infer.problem import normal_equations
 from fes_pin.infer.text import WHOLE
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import StateSpaceNoise
@@ -37,11 +36,11 @@ FOLLOWING = 30.0
 
 def misfit_percent(fitted: Fit) -> float:
     """Return E of a fit's free simulations of its trials from their fitted initial states, percent."""
-    trials, squares = fitted.trials, []
+    trials = fitted.trials
     around = {n: [np.nansum((t[n] - np.nanmean(t[n])) ** 2) for t in trials if n in t] for n in _outputs(fitted)}
     spread = {n: max(float(np.sum(a)), 1e-300) for n, a in around.items()}
     with np.errstate(all="ignore"):
-        squares = [float(np.sum(v**2 / spread[n])) for one in _free_errors(fitted) for n, v in one.items()]
+        squares = [float(np.sum(v**2 / spread[n])) for one in errors_of(fitted) for n, v in one.items()]
     most = RUNAWAY**2 * len(spread)
     return percent_of_spread(np.clip(np.nan_to_num(squares, nan=most, posinf=most), 0.0, most), float(len(spread)))
 
@@ -54,20 +53,12 @@ def is_rounding(fitted: Fit) -> bool:
     if not all(counts.values()):
         return False
     half = {n: (0.5 + OFF_COUNT) * count for n, count in counts.items()}
-    return all(bool(np.all(np.abs(v) <= half[n])) for one in _free_errors(fitted) for n, v in one.items())
+    return all(bool(np.all(np.abs(v) <= half[n])) for one in errors_of(fitted) for n, v in one.items())
 
 
 def _outputs(fitted: Fit) -> list[str]:
     rig = fitted.model.rig
     return list(dict.fromkeys(n for t in fitted.trials for n in rig.outputs(t.kind) if n in t))
-
-
-def _free_errors(fitted: Fit) -> list[dict[str, np.ndarray]]:
-    """Return for each trial the errors of its free simulation, by output."""
-    units = {n: Noise(1.0) for n in _outputs(fitted)}
-    problem = Problem(fitted.model, fitted.trials, units, ())
-    run = problem.innovations(fitted.values, completed(problem.start_unknowns(), fitted.unknowns))
-    return [dict(zip(one.outputs, one.values.T, strict=True)) for one in run]
 
 
 def following(model: Model, trials: Sequence[Trial]) -> StateSpaceNoise | None:

@@ -86,7 +86,8 @@ def predict_ahead(model: Model, trial: Trial, random: NoiseModel, horizon_s: flo
         raise InputError(f"expected a column {expected}: a prediction over a horizon goes on from what was measured")
     if isinstance(random, StateSpaceNoise):
         return over_horizon(model, trial, random, horizon_s)
-    return free_ahead(model, trial, {n: random.get(n, Noise(1.0)) for n in outputs}, horizon_s)
+    free = free_ahead(model, trial, {n: random.get(n, Noise(1.0)) for n in outputs}, horizon_s)
+    return {n: one.values for n, one in free.items()}
 
 
 def free_residuals(
@@ -101,7 +102,7 @@ def free_residuals(
     known
         The unknowns of the trial where it was fitted; by default the simulation starts from the first readings.
     """
-    (readings,) = predictions(model, [trial], noise, known)
+    readings = predictions(model, trial, noise, known)
     out = {}
     for k, name in enumerate(model.rig.outputs(trial.kind)):
         if name in trial.columns and name in noise:
@@ -112,14 +113,19 @@ def free_residuals(
 
 def free_ahead(
     model: Model, trial: Trial, noise: NoiseModel, horizon_s: float, known: Unknowns | None = None
-) -> dict[str, np.ndarray]:
-    """Return a free simulation with the prediction of autoregressive noise over a horizon, shape (n,), by output.
+) -> dict[str, PredictedOutput]:
+    """Return a free simulation with the prediction of autoregressive noise over a horizon, by output.
 
     The parameter `known` is as of `free_residuals`.
     """
-    left = free_residuals(model, trial, noise, known)
-    ahead = {n: forecast(np.nan_to_num(missed), noise[n], trial.dt, horizon_s) for n, missed in left.items()}
-    return {n: trial[n] - missed + ahead[n] for n, missed in left.items()}
+    out, steps = {}, max(1, round(horizon_s / trial.dt))
+    for name, missed in free_residuals(model, trial, noise, known).items():
+        own = noise[name]
+        ahead = forecast(np.nan_to_num(missed), own, trial.dt, horizon_s)
+        grown = np.append(1.0, weights_ahead(own.ar, steps - 1)[:, 0] if own.ar else np.zeros(steps - 1))
+        variance = (own.innovation_std**2) * float(grown @ grown)
+        out[name] = PredictedOutput(trial[name] - missed + ahead, np.full(len(trial), variance))
+    return out
 
 
 def one_step(model: Model, trial: Trial, noise: StateSpaceNoise) -> dict[str, np.ndarray]:

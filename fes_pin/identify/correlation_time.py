@@ -72,9 +72,6 @@ def _other(fitted: LikelihoodFit, sparser: LikelihoodFit) -> float:
     return lost / max(sum(len(p.residual) for p in sparser.parts), 1)
 
 
-__all__ = ["with_new_noise"]
-
-
 def words_of_reading(noise: NoiseModel, rig: Rig, trials: Sequence[Trial]) -> tuple[str, ...]:
     """Return warnings about a reading that hunts between counts, or whose noise is correlated over samples.
 

@@ -22,7 +22,7 @@ from fes_pin.data.trial import Trial
 from fes_pin.identify.problem import Problem
 from fes_pin.infer.noise import ORDERS, Noise, NoiseModel, estimate_noise, noise_step, thin, thinning
 from fes_pin.infer.optimum import MAX_ITERATIONS, Optimum, minimise
-from fes_pin.infer.problem import Unknowns
+from fes_pin.infer.problem import Unknowns, completed
 from fes_pin.infer.profile import profile_interval
 from fes_pin.infer.result import shown
 from fes_pin.infer.scoring import LITTLE
@@ -389,15 +389,21 @@ def rough_noise(model: Model, trials: Sequence[Trial], correlation_s: float = 0.
     return out
 
 
+def errors_of(fitted: Fit) -> list[dict[str, np.ndarray]]:
+    """Return for each trial of a fit the errors of its free simulation, shape (n,), by output."""
+    units = {n: Noise(1.0) for t in fitted.trials for n in fitted.model.rig.outputs(t.kind)}
+    problem = Problem(fitted.model, fitted.trials, units, ())
+    run = problem.innovations(fitted.values, completed(problem.start_unknowns(), fitted.unknowns))
+    return [dict(zip(one.outputs, one.values.T, strict=True)) for one in run]
+
+
 def noise_of(fitted: Fit, longest: int = ORDERS[-1], least: int = 0) -> dict[str, Noise]:
     """Return the noise of a fit's residuals, by output column, with autoregressions of orders `least` to `longest`."""
-    units = {n: Noise(1.0) for t in fitted.trials for n in fitted.model.rig.outputs(t.kind)}
-    run = Problem(fitted.model, fitted.trials, units, ()).innovations(fitted.values, fitted.unknowns)
     step = noise_step([t.dt for t in fitted.trials])
     columns: dict[str, list[np.ndarray]] = {}
     squares: dict[str, list[float]] = {}
-    for trial, one in zip(fitted.trials, run, strict=True):
-        for name, residual in zip(one.outputs, one.values.T, strict=True):
+    for trial, errors in zip(fitted.trials, errors_of(fitted), strict=True):
+        for name, residual in errors.items():
             columns.setdefault(name, []).append(thin(residual, thinning(trial.dt, step)))
             squares.setdefault(name, []).append(float(np.mean(residual**2)))
     return {

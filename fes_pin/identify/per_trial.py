@@ -37,10 +37,8 @@ STEPS = 12
 """Most Gauss-Newton steps, each as long as lowers the cost most; amplitudes that are nearly linear take three."""
 
 
-def predictions(
-    model: Model, trials: Sequence[Trial], noise: NoiseModel, known: Unknowns | None = None
-) -> list[np.ndarray]:
-    """Return the readings that a model predicts of measured trials, shape (n, outputs) each; see the module.
+def predictions(model: Model, trial: Trial, noise: NoiseModel, known: Unknowns | None = None) -> np.ndarray:
+    """Return the readings that a model predicts of a measured trial, shape (n, outputs); see the module.
 
     A simulation starts from the first readings; that of a rig that falls, from an initial state that is fitted.
 
@@ -49,23 +47,20 @@ def predictions(
     noise
         Noise by output column, by which channels are weighted.
     known
-        Unknowns of each trial, of a fit to these trials; by default none is known.
+        Unknowns of the trial, of a fit to it; by default none is known.
     """
-    simulator, values = Simulator(model, trials), model.parameters()
-    outputs = {n for t in trials for n in model.rig.outputs(t.kind)}
+    simulator, values, outputs = Simulator(model, [trial]), model.parameters(), model.rig.outputs(trial.kind)
     white = StateSpaceNoise({n: max(noise[n].std, 1e-12) if n in noise else math.inf for n in outputs})
     start = simulator.start(values)
     if known:
         start = completed(start, known)
-    elif falls(model, trials):
-        problem = Problem(model, trials, white, ())
+    elif falls(model, [trial]):
+        problem = Problem(model, [trial], white, ())
         start = from_beginnings(problem, fit_problem(problem, values), partial(fit_problem, problem)).unknowns
-    if not model.own_unknowns():
-        return [s.readings for s in simulator.run(values, start)]
-    each = [cross_fitted_unknowns(model, t, white, s) for t, s in zip(trials, start, strict=True)]
-    own = [[{**s, **one[k][1]} for s, one in zip(start, each, strict=True)] for k in (0, 1)]
-    runs = [simulator.run(values, unknowns) for unknowns in own]
-    return [np.where(one[0][0][:, None], a.readings, b.readings) for one, a, b in zip(each, *runs, strict=True)]
+    (begun,) = start
+    each = cross_fitted_unknowns(model, trial, white, begun)
+    runs = [simulator.run(values, [{**begun, **own}])[0].readings for _, own in each]
+    return np.where(each[0][0][:, None], runs[0], runs[-1])
 
 
 def falls(model: Model, trials: Sequence[Trial]) -> bool:

@@ -86,6 +86,3 @@ def _cost(fitted: Fit) -> float:
     noise, trials = noise_of(fitted), fitted.trials
     counts = {n: sum(len(t) // thinning(t.dt, one.step_s) for t in trials if n in t) for n, one in noise.items()}
     return float(sum(2.0 * count * math.log(noise[n].innovation_std) for n, count in counts.items()))
-
-
-__all__ = ["low_pass_of", "words_of_low_pass"]

@@ -139,13 +139,6 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         other._converged, other._begun, other._compared = set(), set(), {}
         return other
 
-    def with_noise(self, noise: str) -> Self:
-        """Return the same trials and causes, to be fitted with another noise."""
-        other = self.begun_with(())
-        other.noise, other._calm = noise, None
-        other.calm = self.fits if (self.noise, noise) == (MEASUREMENT, PROCESS) else {}
-        return other
-
     def nominal(self) -> LikelihoodFit:
         """Fit the nominal model from several sizes of process noise; return the given fit where there is one."""
         if () in self.fits:
@@ -276,8 +269,11 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
     @property
     def least_squares(self) -> Self:
         """The same trials and causes, fitted by least squares."""
+        if self.noise == WHITE:
+            return self
         if self._rough is None:
-            self._rough = self if self.noise == WHITE else self.with_noise(WHITE)
+            self._rough = self.begun_with(())
+            self._rough.noise, self._rough.calm, self._rough._calm = WHITE, {}, None
         return self._rough
 
     def first(self) -> Names:

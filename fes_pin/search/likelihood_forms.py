@@ -9,9 +9,9 @@ from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood_fit import LikelihoodFit, maximum_from
 from fes_pin.infer.distributions import chi2_quantile, chi2_tail
 from fes_pin.infer.fits import more_degrees
-from fes_pin.infer.levels import CONFIDENCE_95
+from fes_pin.infer.levels import CONFIDENCE_95, PARAMETER_PENALTY
 from fes_pin.infer.scatter import excess_scatter
-from fes_pin.search.likelihood_maxima import better, less, look
+from fes_pin.search.likelihood_maxima import less, look
 from fes_pin.search.starts import STARTED, STARTS, number_of_forms, refinements
 from fes_pin.workers import in_parallel
 
@@ -39,10 +39,16 @@ def refined_form(base: LikelihoodFit, measured: Mapping[str, np.ndarray]) -> Lik
 def simplified_form(base: LikelihoodFit) -> LikelihoodFit | None:
     """Return the best fit of a set with one refinement fewer; None where no criterion is lower.
 
-    A refinement that was adopted with fewer causes may have been mistaken for a cause that was found later.
+    A refinement that was adopted with fewer causes may have been mistaken for a cause that was found later. The best
+    first fits are fitted further if their criterion, at the noise of the base, exceeds that of the base by less than
+    the penalty of a parameter.
     """
-    both = ((e, n) for e in base.model.effects for n, *_ in e.refinements() if n in e.refined())
-    return better(in_parallel(lambda one: less(base, one[1:], one[0]), list(both)), base)
+    both = [(e, n) for e in base.model.effects for n, *_ in e.refinements() if n in e.refined()]
+    looks = in_parallel(lambda one: look(less(base, one[1:], one[0]), base), both)
+    near = [f for f in looks if f.criterion < base.criterion + PARAMETER_PENALTY]
+    worth = sorted(near, key=lambda f: f.criterion)[:STARTS]
+    fits = in_parallel(lambda f: maximum_from(f, f.trials), worth)
+    return min((f for f in fits if f.criterion < base.criterion), key=lambda f: f.criterion, default=None)
 
 
 def demanded_form(

@@ -9,18 +9,15 @@ from fes_pin.data.trial import Trial
 from fes_pin.identify.afar import followed, following
 from fes_pin.identify.fit import GROSS, from_beginnings
 from fes_pin.identify.likelihood import LikelihoodProblem
-from fes_pin.identify.likelihood_fit import LikelihoodFit, at_noise, fit_of, maximise, maximum_from
+from fes_pin.identify.likelihood_fit import LikelihoodFit, at_noise, fit_of, maximise
 from fes_pin.identify.problem import limits_of
 from fes_pin.identify.process_noise import first_guess
 from fes_pin.infer.covariance import moved_with
-from fes_pin.infer.levels import PARAMETER_PENALTY
 from fes_pin.infer.optimum import minimise
 from fes_pin.infer.problem import Unknowns, completed
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import StateSpaceNoise
 from fes_pin.models.stage import Effect
-from fes_pin.search.starts import STARTS
-from fes_pin.workers import in_parallel
 
 SCREEN_ITERATIONS = 4
 """Steps of a first fit of a set, at the noise of a smaller one."""
@@ -81,18 +78,6 @@ def look(start: Model, base: LikelihoodFit) -> LikelihoodFit:
     problem = LikelihoodProblem(start, base.trials, base.noise)
     found = minimise(problem, start.parameters(), base.unknowns, SCREEN_ITERATIONS)
     return replace(fit_of(problem, found), together=base.together)
-
-
-def better(starts: Sequence[Model], base: LikelihoodFit) -> LikelihoodFit | None:
-    """Return the best fit from some starts; None where none has a lower criterion than the base.
-
-    The best first fits are fitted further if their criterion, at the noise of the base, exceeds that of the base by
-    less than the penalty of a parameter.
-    """
-    looks = sorted(in_parallel(lambda s: look(s, base), starts), key=lambda f: f.criterion)
-    worth = [f for f in looks[:STARTS] if f.criterion < base.criterion + PARAMETER_PENALTY]
-    best = min(in_parallel(lambda f: maximum_from(f, f.trials), worth), key=lambda f: f.criterion, default=None)
-    return best if best is not None and best.criterion < base.criterion else None
 
 
 def less(whole: LikelihoodFit, gone: Sequence[str], effect: Effect) -> Model:

@@ -133,7 +133,5 @@ def bounded_step(gram: np.ndarray, along: np.ndarray, lower: np.ndarray, upper: 
 
 def best_by_effect(scored: Sequence[Scored]) -> Mapping[str, list[Scored]]:
     """Return the scored shapes of each effect, best first."""
-    out: dict[str, list[Scored]] = {}
-    for s in scored:
-        out.setdefault(s.effect.name, []).append(s)
-    return {n: sorted(v, key=lambda s: -s.gain) for n, v in out.items()}
+    ordered = sorted(scored, key=lambda s: -s.gain)
+    return {n: [s for s in ordered if s.effect.name == n] for n in dict.fromkeys(s.effect.name for s in scored)}

@@ -94,11 +94,11 @@ def test_predictions_do_not_see_what_they_predict():
     hum = 0.5 * np.sin(2 * np.pi * 50.0 * bare.time + 1.0)
     force = quiet.readings[:, 0] + hum + 0.2 * rng.standard_normal(len(bare))
     measured = bare.with_columns(force_n=force)
-    (told,) = predictions(model, [measured], noise)
+    told = predictions(model, measured, noise)
     assert np.std(told[:, 0] - quiet.readings[:, 0] - hum) < 0.05
     changed = force.copy()
     changed[: len(force) // 4] += 3.0 * np.sin(2 * np.pi * 50.0 * bare.time[: len(force) // 4])
-    (again,) = predictions(model, [bare.with_columns(force_n=changed)], noise)
+    again = predictions(model, bare.with_columns(force_n=changed), noise)
     assert np.array_equal(again[: len(force) // 4], told[: len(force) // 4])
     assert not np.array_equal(again[len(force) // 4 :], told[len(force) // 4 :])
 
@@ -114,7 +114,7 @@ def test_a_start_that_is_forgotten_does_not_run_away_with_what_is_each_trials_ow
     (answer,) = Simulator(model, [bare]).run(model.parameters(), with_own(model, [bare], [own]))
     missed = 0.05 * np.sin(0.45 * time) + 0.02 * np.sin(1.7 * time + 0.3)
     measured = bare.with_columns(position=answer.readings[:, 0] + missed)
-    (told,) = predictions(model, [measured], {"position": Noise(1e-5)})
+    told = predictions(model, measured, {"position": Noise(1e-5)})
     assert np.std(measured["position"] - told[:, 0]) < 1.1 * np.std(missed)
 
 
