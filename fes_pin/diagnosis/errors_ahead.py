@@ -14,7 +14,6 @@ from fes_pin.identify.process_noise import driving_size, first_guess
 from fes_pin.infer.held_out import FOLDS, Errors
 from fes_pin.infer.levels import AVERAGED_S, SMALL_SHARE
 from fes_pin.infer.noise import NoiseModel
-from fes_pin.infer.problem import Unknowns
 from fes_pin.infer.result import shown
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import StateSpaceNoise
@@ -143,16 +142,14 @@ def free_errors(
         The fit of the model: its own trials are simulated from their fitted initial states.
     """
     pieces = 1 if len(trials) >= FOLDS else TENTHS
-    known = [None if fitted is None else fitted.unknowns_of(t) for t in trials]
-    found = in_parallel(lambda k: _free_squares(model, trials[k], noise, pieces, known[k]), range(len(trials)))
-    return Errors(*np.concatenate(found, axis=1))
 
+    def of_trial(trial: Trial) -> np.ndarray:
+        """Return squared errors, spread and number of readings, shape (3, pieces)."""
+        missed = free_residuals(model, trial, noise, None if fitted is None else fitted.unknowns_of(trial))
+        lines = sum((_lines(trial[n], m, noise[n].std ** 2) for n, m in missed.items()), np.zeros((3, len(trial))))
+        return np.array([p.sum(axis=1) for p in np.array_split(lines, pieces, axis=1)]).T
 
-def _free_squares(model: Model, trial: Trial, noise: NoiseModel, pieces: int, known: Unknowns | None) -> np.ndarray:
-    """Return squared errors, spread and number of readings of a free simulation of a trial, shape (3, pieces)."""
-    missed = free_residuals(model, trial, noise, known)
-    lines = sum((_lines(trial[n], m, noise[n].std ** 2) for n, m in missed.items()), np.zeros((3, len(trial))))
-    return np.array([p.sum(axis=1) for p in np.array_split(lines, pieces, axis=1)]).T
+    return Errors(*np.concatenate(in_parallel(of_trial, trials), axis=1))
 
 
 def _squares(fitted: LikelihoodFit, floor: LikelihoodFit, trial: Trial, horizon_s: float) -> np.ndarray:

@@ -67,9 +67,6 @@ class Fit(Optimum, Saveable):
     noise: NoiseModel
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
-    def __post_init__(self) -> None:
-        self._freeze()
-
     def _freeze(self) -> None:
         super()._freeze()
         for part in self.parts:

@@ -40,10 +40,6 @@ class _Proposal:
     unknowns: Unknowns
     predicted: float
 
-    @property
-    def predicts_little(self) -> bool:
-        return 0.0 <= self.predicted < TOLERANCE
-
 
 class Descent:
     """The state of one search for the least sum of squares.
@@ -62,7 +58,6 @@ class Descent:
         self.problem, self.names = problem, problem.free
         self.lower = np.array([problem.limits[n][0] for n in self.names])
         self.upper = np.array([problem.limits[n][1] for n in self.names])
-        self.products = problem.products
         self.fixed = dict(start)
         self.x = np.clip([start[n] for n in self.names], self.lower, self.upper)
         self.unknowns = completed(problem.start_unknowns(), unknowns)
@@ -95,8 +90,10 @@ class Descent:
         if not np.isfinite(self.sse):
             return True
         first = self._proposed(self.damping)
-        if first.predicts_little or self._takes(first):
-            return first.predicts_little or self._gained < TOLERANCE
+        if 0.0 <= first.predicted < TOLERANCE:
+            return True
+        if self._takes(first):
+            return self._gained < TOLERANCE
         left, last = TRIES - 1, first
         while left > 0:
             shorter = self._shorter(last, min(left, self.problem.batch))
@@ -163,7 +160,7 @@ class Descent:
     def _end(self, move: np.ndarray) -> np.ndarray:
         """Return the end of a step that is straight in an amplitude k and in its product k r with a shape."""
         out = self.x + move
-        for shape, k in self.products:
+        for shape, k in self.problem.products:
             if out[k] != 0.0:
                 bent = self.x[shape] + move[shape] * self.x[k] / out[k]
                 out[shape] = np.clip(bent, self.lower[shape], self.upper[shape])

@@ -456,8 +456,8 @@ class Cause(Named):
         return self.gain_held_out.percent, self.gain_held_out.low, self.gain_held_out.high
 
     def _parameters(self) -> dict[str, Any]:
-        known = {n: {"unit": one.unit} if self.site else {} for n, one in self.parameters.items()}  # names have units
-        return {n: one.record() | known[n] for n, one in self.parameters.items()}
+        # the names of parameters without a site have units
+        return {n: one.record() | ({"unit": one.unit} if self.site else {}) for n, one in self.parameters.items()}
 
     def _gains(self) -> dict[str, Any]:
         gain, some = self.gain_held_out, self.chosen_in_some

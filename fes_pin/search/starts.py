@@ -30,9 +30,8 @@ def near_null(effect: type[Effect], name: str) -> float:
 
 def from_afar(effect: Effect, measured: Mapping[str, np.ndarray]) -> list[Effect]:
     """Return the effect at its far sizes on the measured trials; see `Effect.far_sizes`."""
-    sizes = effect.bounded(effect.far_sizes(measured))
-    chosen: list[dict[str, Any]] = [{n: v} for n, many in sizes.items() for v in many]
-    return [replace(effect, **one) for one in chosen]
+    sizes: Mapping[str, Any] = effect.bounded(effect.far_sizes(measured))
+    return [replace(effect, **{n: v}) for n, many in sizes.items() for v in many]
 
 
 def started(effect: Effect, amplitudes: Mapping[str, float]) -> Effect:
