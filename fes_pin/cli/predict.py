@@ -69,7 +69,7 @@ def predict(
     from fes_pin.identify.stored import load_log
     from fes_pin.models.predict import predicted_trial
     from fes_pin.models.store import load_model
-    from fes_pin.prepare.plausibility import check_study
+    from fes_pin.prepare.measured import check_study
 
     catalogue = catalogue_with(library)
     loaded = load_model(model, library=catalogue)

@@ -26,7 +26,6 @@ from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.store import load_model
 from fes_pin.prepare.measured import measured_study, split
-from fes_pin.prepare.plausibility import check_study
 from fes_pin.workers import Progress, in_parallel, one_thread_each
 
 FEW = "too few trials to estimate how trials differ: the first seconds of a trial do not predict its others"
@@ -87,7 +86,7 @@ def compare(
     _check_times(every, horizon_s=horizon_s, given_s=given_s)
     horizon = horizon_s or study.horizon_s or default_horizon(every)
     chosen = _chosen(models, extended, nominal, every, library)
-    noted = [*measured.warnings, *check_study(joined, nominal)]
+    noted = measured.odd()
     parts = partings(fitted, held)
     white, floor = spread_noise(nominal, every), rough_noise(nominal, every)
     compared = []

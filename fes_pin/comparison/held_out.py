@@ -24,7 +24,7 @@ from fes_pin.infer.held_out import within
 from fes_pin.infer.levels import RUNAWAY
 from fes_pin.infer.noise import Noise, noise_step, thinning
 from fes_pin.models.model import Model
-from fes_pin.prepare.folds import folds_of
+from fes_pin.prepare.measured import folds_of
 from fes_pin.workers import in_parallel
 
 WORTH = (1.0, 3.0, 10.0, 30.0, 100.0)

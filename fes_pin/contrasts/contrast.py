@@ -29,7 +29,6 @@ from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
 from fes_pin.models.nominal import nominal_model
 from fes_pin.prepare.long_records import searched_part
 from fes_pin.prepare.measured import measured_study, split
-from fes_pin.prepare.plausibility import check_study
 from fes_pin.workers import Progress, noting_stops, one_thread_each, time_limit
 
 UNCONFIRMED = "{} is significant in the fitted trials, but {}"
@@ -87,7 +86,7 @@ def contrast(
         both = zip(labels_of(study, after), (study, after), strict=True)
         files = {f"{label}/{path}": sha for label, one in both for path, sha in one.inputs().items()}
         made = replace(made, inputs=files)
-    warnings = [*measured.warnings, *check_study(measured.study, nominal_model(measured.study))]
+    warnings = measured.odd()
     with one_thread_each(), noting_stops() as stops:
         end = math.inf if limit is None else began + limit
         found = _Work(measured.study, catalogue, seed, tell, end, stops).contrast()

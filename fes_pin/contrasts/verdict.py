@@ -12,7 +12,7 @@ from fes_pin.infer.held_out import FOLDS, marginal_cost
 from fes_pin.infer.levels import CLAIM_LEVEL
 from fes_pin.infer.result import NO_GAIN, Evidence, Remainder
 from fes_pin.infer.verdict import State, Verdict, Weighed
-from fes_pin.prepare.folds import folds_of
+from fes_pin.prepare.measured import folds_of
 from fes_pin.remainder.lack_of_fit import lack_of_fit
 from fes_pin.workers import in_parallel
 

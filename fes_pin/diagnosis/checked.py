@@ -12,9 +12,7 @@ from fes_pin.diagnosis.diagnosis import few_trials
 from fes_pin.diagnosis.testable import Testable, testable_causes
 from fes_pin.infer.result import shown
 from fes_pin.models.catalogue import Source, catalogue_of
-from fes_pin.models.nominal import nominal_model
 from fes_pin.prepare.measured import measured_study, split
-from fes_pin.prepare.plausibility import check_study
 
 FAR = 0.3
 """Share of the variance that the nominal model leaves above which a warning says so."""
@@ -109,7 +107,7 @@ def odd_numbers(study: Study) -> tuple[Study, list[str]]:
     clean = measured_study(study)
     count = sum(len(k) for columns in clean.left_out.values() for k in columns.values())
     said = [f"{count} samples look like spikes, and are replaced by what their neighbours say"] if count else []
-    return clean.study, [*said, *clean.warnings, *check_study(clean.study, nominal_model(clean.study))]
+    return clean.study, [*said, *clean.odd()]
 
 
 def odd_lines(study: Study, odd: Sequence[str] | None) -> list[str]:

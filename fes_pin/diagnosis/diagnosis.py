@@ -38,7 +38,6 @@ from fes_pin.models.nominal import nominal_model
 from fes_pin.models.rigs.base import Rig
 from fes_pin.prepare.long_records import in_parts, searched_part
 from fes_pin.prepare.measured import measured_study, split
-from fes_pin.prepare.plausibility import check_study
 from fes_pin.search.likelihood_fits import MEASUREMENT, PROCESS
 from fes_pin.workers import Progress, noting_stops, one_thread_each, time_limit
 
@@ -85,13 +84,13 @@ def diagnose_joint(
     ------
     InputError
         If the study has no trial to fit, a rig without a model of trials, or numbers that no verdict could follow
-        from; see `plausibility.check_study`.
+        from; see `prepare.measured.check_study`.
     """
     began = time.perf_counter()
     tell = asked(study, seed, limit, progress)
     catalogue, made = catalogue_of(library), provenance_now(study, seed)
     measured = measured_study(study)
-    warnings = [*measured.warnings, *check_study(measured.study, nominal_model(measured.study))]
+    warnings = measured.odd()
     with time_limit(math.inf if limit is None else LOOKED * limit), noting_stops() as unchecked:
         warnings += given_away(measured.study)
     warnings += [UNCHECKED] * bool(unchecked)

@@ -17,7 +17,7 @@ from fes_pin.infer.optimum import minimise
 from fes_pin.infer.problem import Unknowns, normal_equations
 from fes_pin.infer.result import CROSS_VALIDATED, FITTED, Evidence, Gain
 from fes_pin.infer.search import SearchResult
-from fes_pin.prepare.folds import folds_of
+from fes_pin.prepare.measured import folds_of
 from fes_pin.workers import in_parallel
 
 Found = SearchResult[LikelihoodFit]

@@ -73,24 +73,20 @@ def _predicted(
 ) -> list[Trial]:
     """Return trials as predicted from their inputs; for a rig in closed loop, over the horizon.
 
-    A free simulation of such a rig integrates its errors, or falls: it says little or nothing about the model.
+    A free simulation of such a rig integrates its errors, or falls: it says little or nothing about the model. One that
+    diverges is limited; see `levels.RUNAWAY`.
     """
     model, out = fitted.model, []
     if ahead is not None:
         moves = [over_horizon(model, t, fitted.noise, ahead.horizon_s) for t in trials]
         return [derived_trial(t, columns={**t.columns, **m}) for t, m in zip(trials, moves, strict=True)]
     for trial in trials:
-        readings = predictions(model, trial, noise, fitted.unknowns_of(trial))
-        names = model.rig.outputs(trial.kind)
-        shown = {n: _shown(readings[:, k], trial, n) for k, n in enumerate(names)}
-        out.append(derived_trial(trial, columns={**trial.columns, **shown}))
+        columns, readings = dict(trial.columns), predictions(model, trial, noise, fitted.unknowns_of(trial))
+        for k, name in enumerate(model.rig.outputs(trial.kind)):
+            most = RUNAWAY * float(np.abs(trial[name]).max()) if name in trial else np.inf
+            columns[name] = within(readings[:, k], most if most > 0.0 else 1.0)
+        out.append(derived_trial(trial, columns=columns))
     return out
-
-
-def _shown(readings: np.ndarray, trial: Trial, name: str) -> np.ndarray:
-    """Return a prediction limited where it diverges; see `levels.RUNAWAY`."""
-    most = RUNAWAY * float(np.abs(trial[name]).max()) if name in trial else np.inf
-    return within(readings, most if most > 0.0 else 1.0)
 
 
 def squares_of(measured: Trial, simulated: Trial, outputs: Sequence[str], noise: NoiseModel) -> tuple[float, float]:

@@ -29,7 +29,7 @@ from fes_pin.infer.scoring import LITTLE
 from fes_pin.models.accepted import accepted_trials
 from fes_pin.models.model import Model
 from fes_pin.models.plausibility import warn_of_odd_numbers
-from fes_pin.models.predictor import StateSpaceNoise
+from fes_pin.models.predictor import StateSpaceNoise, measured_outputs
 from fes_pin.models.simulate import simulated_trial
 from fes_pin.workers import one_thread_each
 
@@ -371,14 +371,10 @@ def rough_noise(model: Model, trials: Sequence[Trial], correlation_s: float = 0.
     correlation_s
         Correlation time of the noise, s: of readings so far apart.
     """
-    columns: dict[str, list[np.ndarray]] = {}
-    for trial in trials:
-        for name in model.rig.outputs(trial.kind):
-            if name in trial.columns:
-                columns.setdefault(name, []).append(trial[name][:: max(1, round(correlation_s / trial.dt))])
-    out = {}
-    step = noise_step([t.dt for t in trials])
-    for name, pieces in columns.items():
+    step, out = noise_step([t.dt for t in trials]), {}
+    for name in dict.fromkeys(n for t in trials for n in measured_outputs(model, t)):
+        own = [t for t in trials if name in measured_outputs(model, t)]
+        pieces = [t[name][:: max(1, round(correlation_s / t.dt))] for t in own]
         bend = np.concatenate([np.diff(p, 2) for p in pieces])
         level = 1.4826 * float(np.median(np.abs(bend))) / math.sqrt(6.0)
         floor = 1e-6 * max(float(np.ptp(np.concatenate(pieces))), 1e-9)
@@ -396,14 +392,10 @@ def errors_of(fitted: Fit) -> list[dict[str, np.ndarray]]:
 
 def noise_of(fitted: Fit, longest: int = ORDERS[-1], least: int = 0) -> dict[str, Noise]:
     """Return the noise of a fit's residuals, by output column, with autoregressions of orders `least` to `longest`."""
-    step = noise_step([t.dt for t in fitted.trials])
-    columns: dict[str, list[np.ndarray]] = {}
-    squares: dict[str, list[float]] = {}
-    for trial, errors in zip(fitted.trials, errors_of(fitted), strict=True):
-        for name, residual in errors.items():
-            columns.setdefault(name, []).append(thin(residual, thinning(trial.dt, step)))
-            squares.setdefault(name, []).append(float(np.mean(residual**2)))
-    return {
-        name: estimate_noise(pieces, fitted.degrees, math.sqrt(float(np.mean(squares[name]))), step, longest, least)
-        for name, pieces in columns.items()
-    }
+    step, run, out = noise_step([t.dt for t in fitted.trials]), errors_of(fitted), {}
+    for name in dict.fromkeys(n for errors in run for n in errors):
+        own = [(t.dt, errors[name]) for t, errors in zip(fitted.trials, run, strict=True) if name in errors]
+        std = math.sqrt(float(np.mean([float(np.mean(residual**2)) for _, residual in own])))
+        pieces = [thin(residual, thinning(dt, step)) for dt, residual in own]
+        out[name] = estimate_noise(pieces, fitted.degrees, std, step, longest, least)
+    return out

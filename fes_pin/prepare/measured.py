@@ -1,6 +1,8 @@
-"""Studies without spikes and without stuck sensors, and the trials of a study that are fitted or held out."""
+"""Studies without spikes and without stuck sensors, what is odd about them, and trials that are fitted or held out."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 from fes_pin.data.derived import without_derived
 from fes_pin.data.errors import InputError
@@ -8,8 +10,14 @@ from fes_pin.data.spikes import without_spikes
 from fes_pin.data.stuck import without_stuck
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
+from fes_pin.infer.held_out import FOLDS, deal
 from fes_pin.models.nominal import nominal_model
+from fes_pin.models.plausibility import odd_numbers
+from fes_pin.models.simulate import simulated_trial
 from fes_pin.prepare.long_records import thinned
+
+check_study = partial(odd_numbers, simulated=simulated_trial)
+"""Returns warnings about a study, or about trials to predict: see `models.plausibility.odd_numbers`."""
 
 
 @dataclass(frozen=True)
@@ -29,6 +37,10 @@ class Measured:
     study: Study
     left_out: dict[str, dict[str, tuple[int, ...]]]
     warnings: list[str]
+
+    def odd(self) -> list[str]:
+        """Return all warnings about the study that need no fit, a line each; see `check_study`."""
+        return [*self.warnings, *check_study(self.study, nominal_model(self.study))]
 
 
 def measured_study(study: Study) -> Measured:
@@ -67,3 +79,9 @@ def split(study: Study) -> tuple[list[Trial], list[Trial]]:
     schema = study.schema
     train = [t if set(schema.inputs) & set(t.columns) else thinned(t, schema) for t in study.to_fit()]
     return train, [t for t in study.trials if t.role == "held_out"]
+
+
+def folds_of(trials: Sequence[Trial], groups: Sequence[str] | None = None, count: int = FOLDS) -> list[list[int]]:
+    """Return the trials of each fold, in which every kind and load is spread evenly; none where there is one trial."""
+    order = sorted(range(len(trials)), key=lambda i: (trials[i].kind, sorted(trials[i].conditions.items()), i))
+    return deal(order, groups, count)

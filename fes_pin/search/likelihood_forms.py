@@ -81,6 +81,8 @@ def demanded_form(
 def is_identified(fitted: Fit, before: Fit | None = None) -> bool:
     """Return whether every parameter of all refined effects differs significantly from its null, within its bounds.
 
+    A parameter at a bound has no standard deviation.
+
     Parameters
     ----------
     before
@@ -94,8 +96,6 @@ def is_identified(fitted: Fit, before: Fit | None = None) -> bool:
             name = f"{one.name}.{n}"
             if name not in fitted.free or name in there:
                 continue
-            if name in fitted.at_bound:
-                return False
             std, away = fitted.std(name), getattr(one, n) - info.null if info.null is not None else np.inf
             if not np.isfinite(std) or abs(away) < CONFIDENCE_95 * std:
                 return False

@@ -22,7 +22,7 @@ from confusion_matrix.generator import make
 from confusion_matrix.plan import FORMS, Item
 
 from fes_pin.diagnosis.diagnosis import diagnose_joint
-from fes_pin.prepare.folds import folds_of
+from fes_pin.prepare.measured import folds_of
 
 NOISE = "white"
 

@@ -17,7 +17,7 @@ from fes_pin.infer.problem import normal_equations
 from fes_pin.models.effects import effect_named
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.predictor import StateSpaceNoise
-from fes_pin.prepare.folds import folds_of
+from fes_pin.prepare.measured import folds_of
 
 NAMES = ("coulomb_friction", "effort_offset", "quadratic_damping")
 

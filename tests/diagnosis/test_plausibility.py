@@ -17,7 +17,7 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.diagnosis import UNCHECKED, diagnose_joint
 from fes_pin.diagnosis.testable import given_away
 from fes_pin.models.nominal import nominal_model
-from fes_pin.prepare.plausibility import check_study
+from fes_pin.prepare.measured import check_study
 from fes_pin.verdict.ask import check
 from fes_pin.view.report import report_html
 from fes_pin.workers import OutOfTime, time_limit

@@ -5,7 +5,7 @@ from diagnosis.hidden import study_of
 from identify.rigs import trials_of
 
 from fes_pin.models.predict import predict
-from fes_pin.prepare.folds import folds_of
+from fes_pin.prepare.measured import folds_of
 from fes_pin.remainder.lack_of_fit import lack_of_fit
 from fes_pin.search.likelihood_fits import LikelihoodFits
 

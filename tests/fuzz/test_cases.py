@@ -11,8 +11,7 @@ from fes_pin.data.errors import InputError
 from fes_pin.data.study import Study
 from fes_pin.models.compile.program import cache_folder
 from fes_pin.models.nominal import nominal_model
-from fes_pin.prepare.measured import measured_study
-from fes_pin.prepare.plausibility import check_study
+from fes_pin.prepare.measured import check_study, measured_study
 
 FILES = [n for n in range(14) if KINDS[n % len(KINDS)] in {"csv", "model", "trial"}]
 

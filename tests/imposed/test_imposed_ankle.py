@@ -22,7 +22,7 @@ from fes_pin.models.predict import predict
 from fes_pin.models.rigs import Ankle
 from fes_pin.models.simulate import simulated_trial
 from fes_pin.models.store import load_model, save_model
-from fes_pin.prepare.plausibility import check_study
+from fes_pin.prepare.measured import check_study
 
 RIG = Ankle(0.65, 0.05, 1.4e-3, 0.06, constants=ankle.KNOWN)
 
