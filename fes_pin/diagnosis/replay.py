@@ -111,7 +111,6 @@ def trajectories(diagnosis: Diagnosis) -> tuple[list[str], dict[str, np.ndarray]
         `<output>_residual`: the reading minus the extended model. NaN where a trial has no such column. For a rig in
         closed loop, predictions are those over the horizon of the diagnosis.
     """
-    trials: list[Trial] = []
     rows: list[dict[str, np.ndarray]] = []
     for one in replayed_trials(diagnosis):
         columns = {"time_s": one.measured.time, **one.measured.columns}
@@ -119,9 +118,8 @@ def trajectories(diagnosis: Diagnosis) -> tuple[list[str], dict[str, np.ndarray]
             columns[f"{name}_nominal"], columns[f"{name}_extended"] = one.nominal[name], one.extended[name]
             if name in one.measured:
                 columns[f"{name}_residual"] = one.measured.residual(one.extended, name)
-        trials.append(one.measured)
         rows.append(columns)
-    return trial_table(trials, rows)
+    return trial_table(diagnosis.study.trials, rows)
 
 
 def trial_table(

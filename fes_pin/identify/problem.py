@@ -157,9 +157,8 @@ def limits_of(model: Model, trials: Sequence[Trial]) -> dict[str, tuple[float, f
     for effect in model.effects:
         for n, (low, high) in effect.limits(measured).items():
             name = f"{effect.name}.{n}"
-            if name not in limits:  # of each trial's own
-                continue
-            limits[name] = (max(limits[name][0], low), min(limits[name][1], high))
+            if name in limits:  # not of each trial's own
+                limits[name] = (max(limits[name][0], low), min(limits[name][1], high))
         for n in set(effect.of_form.values()) & set(effect.refined()):
             (low, high), one = limits[f"{effect.name}.{n}"], effect.parameters()[n]
             limits[f"{effect.name}.{n}"] = (min(low + NEXT_TO * one.scale, high) if low == one.null else low, high)

@@ -1,6 +1,7 @@
 """Nonlinear least squares by Levenberg and Marquardt's method, with bounds and with unknowns of each trial."""
 
-from collections.abc import Mapping
+import itertools
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -94,18 +95,13 @@ class Descent:
             return True
         if self._takes(first):
             return self._gained < TOLERANCE
-        left, last = TRIES - 1, first
-        while left > 0:
-            shorter = self._shorter(last, min(left, self.problem.batch))
-            left, last = left - len(shorter), shorter[-1]
-            worth = [one for one in shorter if self._is_worth(one)]
-            bounds = self.problem.costs([(self.values(one.x), one.unknowns) for one in worth])
-            for one, bound in zip(worth, bounds, strict=True):
+        shorter = self._shorter(first)
+        while some := list(itertools.islice(shorter, self.problem.batch)):
+            bounds = self.problem.costs([(self.values(one.x), one.unknowns) for one in some])
+            for one, bound in zip(some, bounds, strict=True):
                 self.damping = one.damping
                 if bound <= self.sse and self._takes(one):
                     return self._gained < TOLERANCE
-            if len(worth) < len(shorter):
-                return True
         return True
 
     def _proposed(self, damping: float) -> _Proposal:
@@ -116,20 +112,17 @@ class Descent:
         predicted = system.local_gain + 2.0 * system.gradient @ move - move @ system.hessian @ move
         return _Proposal(damping, self._end(move), self._moved(system.local_steps(move)), float(predicted))
 
-    def _shorter(self, failed: _Proposal, count: int) -> list[_Proposal]:
-        """Return at most `count` proposals of growing damping, up to the first that is not worth a try."""
-        out: list[_Proposal] = []
-        last = failed
-        while len(out) < count and (not out or self._is_worth(last)):
-            most = np.inf if self.problem.is_final else SHORTER * last.predicted
+    def _shorter(self, last: _Proposal) -> Iterator[_Proposal]:
+        """Yield proposals of growing damping after one that failed, up to the first that is not worth a try."""
+        least, share = (TOLERANCE, np.inf) if self.problem.is_final else (WORTH, SHORTER)
+        for _ in range(TRIES - 1):
+            most = share * last.predicted
             last = self._proposed(max(last.damping * 10.0, 1e-4))
             while last.predicted > most > 0.0 and last.damping < LARGEST_DAMPING:
                 last = self._proposed(last.damping * 10.0)
-            out.append(last)
-        return out
-
-    def _is_worth(self, shorter: _Proposal) -> bool:
-        return not 0.0 <= shorter.predicted < (TOLERANCE if self.problem.is_final else WORTH)
+            if 0.0 <= last.predicted < least:
+                return
+            yield last
 
     def _takes(self, one: _Proposal) -> bool:
         """Take the step of a proposal if it lowers the cost; return whether it does."""

@@ -1,7 +1,6 @@
 """Fits of sets of causes by the likelihood, each with its process and measurement noise."""
 
 import copy
-import itertools
 import math
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import replace
@@ -284,10 +283,9 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         """
         if self.noise == WHITE or not self.is_far(self.fits[()]):
             return ()
-        best = self.least_squares.approach()
-        for names in itertools.chain.from_iterable(itertools.combinations(best, k) for k in range(1, len(best) + 1)):
-            if names in self.least_squares.fits:
-                self.fits[names] = self._from_least_squares(self.least_squares.fits[names])
+        best, rough = self.least_squares.approach(), self.least_squares.fits
+        for names in sorted((n for n in rough if n and set(n) <= set(best)), key=len):
+            self.fits[names] = self._from_least_squares(rough[names])
         return best
 
     def approach(self, least: float = NOTHING_PERCENT) -> Names:

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from fes_pin.models.model import Model
-from fes_pin.models.parameters import ParameterInfo
 from fes_pin.models.stage import Effect
 
 STARTS = 2
@@ -54,10 +53,8 @@ def refinements(model: Model, effect: Effect, measured: Mapping[str, np.ndarray]
 
     A value equal to the refinement's null switches nothing on and gives no start.
     """
-    out, info, refined, grids = [], effect.parameters(), effect.refined(), effect.bounded(effect.grids(measured))
-    for names in effect.refinements():
-        if names[0] in refined or not fits_rig(model, info[names[0]]):
-            continue
+    out, info, grids = [], effect.parameters(), effect.bounded(effect.grids(measured))
+    for names in _lacking(model, effect):
         paths = [f"{effect.name}.{n}" for n in names]
         for values in itertools.product(*(grids[n] for n in names)):
             if values[0] != info[names[0]].null:
@@ -67,10 +64,11 @@ def refinements(model: Model, effect: Effect, measured: Mapping[str, np.ndarray]
 
 def number_of_forms(model: Model, effects: Sequence[Effect]) -> int:
     """Return the number of refinements that a model's effects do not have, each a form that is tried; at least 1."""
-    each = ((e, n) for e in effects for n, *_ in e.refinements() if n not in e.refined())
-    return max(1, sum(fits_rig(model, e.parameters()[n]) for e, n in each))
+    return max(1, sum(len(_lacking(model, e)) for e in effects))
 
 
-def fits_rig(model: Model, refinement: ParameterInfo) -> bool:
-    """Return whether a refinement is for the model's rig."""
-    return not refinement.rigs or model.rig.is_one_of(refinement.rigs)
+def _lacking(model: Model, effect: Effect) -> list[tuple[str, ...]]:
+    """Return the refinements for the model's rig that an effect does not have."""
+    rigs, refined = {n: info.rigs for n, info in effect.parameters().items()}, effect.refined()
+    others = (names for names in effect.refinements() if names[0] not in refined)
+    return [names for names in others if not rigs[names[0]] or model.rig.is_one_of(rigs[names[0]])]
