@@ -116,7 +116,7 @@ class Diagnosis(ModelResult):
             ("falls", "by itself: free errors are meaningless" if self.is_falling else ""),
             *((f"random {r.name}", r.words(unit)) for r in self.random),
             ("lack of fit", self.reason or f"{state} ({probability(left.p_value)}{where})"),
-            ("left out as spikes", left_out_text(self.left_out, self.study.trials) if self.left_out else ""),
+            ("left out as spikes", left_out_text(self.left_out, self.study.trials)),
             *(
                 (f"{c.name} chosen again", f"in {k[0]} of {k[1]} folds, each without its trials")
                 for c in self.causes
@@ -140,14 +140,9 @@ class Diagnosis(ModelResult):
         left_out = {t: {n: len(k) for n, k in columns.items()} for t, columns in self.left_out.items()}
         noise = {n: {"std": shown(m.std), "ar": [shown(a) for a in m.ar]} for n, m in self.extended.noise.items()}
         library = {Path(where).name: names for where, names in self.catalogue.origins().items()}
-        return {
-            **self.models_record(self._model("nominal"), self._model("extended"), noise),
-            **({"left_out_samples": left_out} if left_out else {}),
-            **({"reason": self.reason} if self.reason else {}),
-            **({"log": log_table(self.log)} if self.log != Log() else {}),
-            **({"library": library} if library else {}),
-            **self._ahead_record(),
-        }
+        own = {"left_out_samples": left_out, "reason": self.reason, "log": log_table(self.log), "library": library}
+        models = self.models_record(self._model("nominal"), self._model("extended"), noise)
+        return {**models, **{n: value for n, value in own.items() if value}, **self._ahead_record()}
 
     def _ahead_record(self) -> dict[str, Any]:
         """Return the horizon, and of a driven rig its process noise; no key without errors over a horizon."""

@@ -32,25 +32,22 @@ def line_p_value(pieces: Sequence[Innovations]) -> tuple[float, str]:
     the number of trials; both are compared with the median of the latter around f, by Fisher's F. The smallest of all
     p-values is corrected for the number of frequencies and for these four tests.
     """
-    found = [
-        (p, where) for where in ("time", "stimulus") for p in _lines([(e, _amplitude(e, where)) for e in pieces]) if p
-    ]
-    if not found:
-        return 1.0, "time"
-    p, where = min(found)
-    return min(1.0, len(found) * p), where
+    long = [e for e in pieces if len(e.values) > NEIGHBOURS]
+    steady, by_stimulus = [(e, np.ones(len(e.values))) for e in long], [(e, driven(e)) for e in long]
+    found = [(p, "time") for p in _lines(steady) if p]
+    found += [(p, "stimulus") for p in _lines([(e, act) for e, act in by_stimulus if np.ptp(act) > 0]) if p]
+    p, where = min(found, default=(1.0, "time"))
+    return min(1.0, max(1, len(found)) * p), where
 
 
-def _amplitude(one: Innovations, where: str) -> np.ndarray | None:
-    if where == "time":
-        return np.ones(len(one.values))
-    act = driven(one)
-    return act if len(act) and np.ptp(act) > 0 else None
+def _lines(used: Sequence[tuple[Innovations, np.ndarray]]) -> tuple[float, ...]:
+    """Return p-values of the strongest line of one phase, and of the strongest of any phase in each trial.
 
-
-def _lines(rows: Sequence[tuple[Innovations, np.ndarray | None]]) -> tuple[float, ...]:
-    """Return p-values of the strongest line of one phase, and of the strongest of any phase in each trial."""
-    used = [(e, g) for e, g in rows if g is not None and len(e.values) > NEIGHBOURS and g @ g > 0]
+    Parameters
+    ----------
+    used
+        Innovations, each with the amplitude of a line.
+    """
     if not used:
         return ()
     dt, size = used[0][0].dt, scipy.fft.next_fast_len(2 * max(len(e.values) for e, _ in used), real=True)

@@ -61,8 +61,8 @@ def _deviations(readings: list[np.ndarray]) -> list[np.ndarray]:
 
 def _one(column: np.ndarray, projection: Projection, group: list[Innovations]) -> float:
     """Return the p-value of one width in one channel."""
-    units = []
-    for rows in _pieces(group):
+    units, count = [], -(-UNITS // len(group))
+    for rows in (piece for s in group for piece in np.array_split(s.rows, count)):
         c = column[rows]
         taken = sum(float(np.sum((b.T @ c) ** 2)) for b in projection.taken(rows))
         units.append((float(c @ projection.residual[rows]), float(c @ c), taken))
@@ -75,9 +75,3 @@ def _one(column: np.ndarray, projection: Projection, group: list[Innovations]) -
     amplitude = x.sum() / n.sum()
     spread = float(np.sum((x - amplitude * n) ** 2 / n)) / degrees
     return f_tail(float(amplitude * x.sum()) / max(spread, 1e-12), 1, degrees)
-
-
-def _pieces(group: list[Innovations]) -> list[np.ndarray]:
-    """Return the rows of each trial, cut into equal pieces."""
-    count = -(-UNITS // len(group))
-    return [rows for s in group for rows in np.array_split(s.rows, count)]
