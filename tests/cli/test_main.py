@@ -121,7 +121,7 @@ def test_every_cause_has_an_answer_to_why(made, diagnosis, tmp_path, monkeypatch
     assert unknown.startswith("nonsense: not fitted; candidates were ") and "sensor_lag" in unknown
     told = record(tmp_path / "why")["why"]
     assert (
-        set(told) == {"estimator", "level", "steps", "further_p_value", "rejected", "tried"}
+        set(told) == {"estimator", "level", "steps", "further_p_value", "rejected", "tried", "faults_of_record"}
         and "sensor_lag" in told["tried"]
     )
     searched = {*told["tried"], *told["rejected"], *diagnosis.absorbed, *(c.name for c in diagnosis.causes)}
