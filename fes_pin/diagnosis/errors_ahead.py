@@ -16,6 +16,7 @@ from fes_pin.infer.levels import AVERAGED_S, SMALL_SHARE
 from fes_pin.infer.noise import NoiseModel
 from fes_pin.infer.result import shown
 from fes_pin.models.model import Model
+from fes_pin.models.predictions import PredictedOutput
 from fes_pin.models.predictor import StateSpaceNoise
 from fes_pin.workers import in_parallel
 
@@ -24,7 +25,6 @@ TENTHS = 10
 
 Pairs = Sequence[tuple[LikelihoodFit, LikelihoodFit, Sequence[Trial]]]
 """Fits, each with the fit whose white noise is the unit of its errors so that models can be compared, and trials."""
-_Predicted = tuple[dict[str, np.ndarray], dict[str, np.ndarray]]
 
 
 @dataclass(frozen=True)
@@ -154,10 +154,9 @@ def free_errors(
 
 def _squares(fitted: LikelihoodFit, floor: LikelihoodFit, trial: Trial, horizon_s: float) -> np.ndarray:
     """Return `Errors` of a trial by its seconds, shape (4, seconds); errors within one horizon are correlated."""
-    predicted, noise = _predicted(fitted, trial, horizon_s)
     whole = np.zeros((4, len(trial)))
-    for name, values in predicted.items():
-        lines = _lines(trial[name], trial[name] - values, floor.noise.white[name] ** 2, noise[name])
+    for name, one in _predicted(fitted, trial, horizon_s).items():
+        lines = _lines(trial[name], trial[name] - one.values, floor.noise.white[name] ** 2, one.variances)
         whole += [*lines, 2.0 * lines[2] ** 2 * max(1.0, horizon_s / trial.dt)]
     whole[:, : _first(fitted, trial, horizon_s)] = 0.0
     pieces = np.array_split(whole, max(1, round(trial.duration)), axis=1)
@@ -173,16 +172,17 @@ def _lines(measured: np.ndarray, missed: np.ndarray, unit: float, noise: np.ndar
     unit
         Variance that is their unit, and by default that of the noise.
     """
-    squares = missed**2, (measured - np.nanmean(measured)) ** 2, np.full(len(missed), unit) if noise is None else noise
+    variances = np.full(len(missed), unit) if noise is None else np.nan_to_num(noise)
+    squares = missed**2, (measured - np.nanmean(measured)) ** 2, variances
     found = np.isfinite(missed), np.isfinite(measured), np.isfinite(missed)
     return np.where(found, squares, 0.0) / unit
 
 
-_PREDICTED: dict[int, dict[tuple[int, float], tuple[Trial, _Predicted]]] = {}
+_PREDICTED: dict[int, dict[tuple[int, float], tuple[Trial, dict[str, PredictedOutput]]]] = {}
 
 
-def _predicted(fitted: LikelihoodFit, trial: Trial, horizon_s: float) -> _Predicted:
-    """Return predictions over the horizon and the variance of their errors by noise alone, shape (n,) by output.
+def _predicted(fitted: LikelihoodFit, trial: Trial, horizon_s: float) -> dict[str, PredictedOutput]:
+    """Return predictions over the horizon, with the variance of their errors by noise alone, by output.
 
     Judging causes and reporting errors need the same predictions: these are cached as long as the fit exists.
     """
@@ -194,15 +194,13 @@ def _predicted(fitted: LikelihoodFit, trial: Trial, horizon_s: float) -> _Predic
     return known[key][1]
 
 
-def _predict(fitted: LikelihoodFit, trial: Trial, horizon_s: float) -> _Predicted:
+def _predict(fitted: LikelihoodFit, trial: Trial, horizon_s: float) -> dict[str, PredictedOutput]:
     if is_simulated(fitted.noise, [trial]):
-        alone = predicted = free_ahead(fitted.model, trial, fitted.noise, horizon_s, fitted.unknowns_of(trial))
-    else:
-        calm = noise_that_is_small(fitted)
-        predicted = forecasts(fitted.model, trial, fitted.noise, horizon_s)
-        alone = predicted if calm is fitted.noise else forecasts(fitted.model, trial, calm, horizon_s)
-    noise = {n: np.where(np.isfinite(trial[n]), np.nan_to_num(one.variances), 0.0) for n, one in alone.items()}
-    return {n: one.values for n, one in predicted.items()}, noise
+        return free_ahead(fitted.model, trial, fitted.noise, horizon_s, fitted.unknowns_of(trial))
+    calm = noise_that_is_small(fitted)
+    predicted = forecasts(fitted.model, trial, fitted.noise, horizon_s)
+    alone = predicted if calm is fitted.noise else forecasts(fitted.model, trial, calm, horizon_s)
+    return {n: one._replace(variances=alone[n].variances) for n, one in predicted.items()}
 
 
 def _first(fitted: LikelihoodFit, trial: Trial, horizon_s: float) -> int:
@@ -242,7 +240,7 @@ def _sums(fitted: LikelihoodFit, floor: LikelihoodFit, trial: Trial, horizon_s: 
     noise of `floor`.
     """
     name = fitted.model.rig.output(trial.kind)
-    measured, (predicted, noise) = trial[name], _predicted(fitted, trial, horizon_s)
+    measured, over_horizon = trial[name], _predicted(fitted, trial, horizon_s)[name]
     free, simulated = np.full(len(trial), np.nan), is_simulated(fitted.noise, [trial])
     if simulated or not falling:
         free = free_residuals(fitted.model, trial, fitted.noise, fitted.unknowns_of(trial))[name]
@@ -250,8 +248,8 @@ def _sums(fitted: LikelihoodFit, floor: LikelihoodFit, trial: Trial, horizon_s: 
         next_one = free - forecast(np.nan_to_num(free), fitted.noise[name], trial.dt, 0.0)
     else:
         next_one = one_step(fitted.model, trial, fitted.noise)[name]
-    missed, unit = (next_one, measured - predicted[name], free), floor.noise.white[name] ** 2
+    missed, unit = (next_one, measured - over_horizon.values, free), floor.noise.white[name] ** 2
     begun = 0, _first(fitted, trial, horizon_s), 0
     each = zip(missed, begun, strict=True)
-    one, ahead, alone = (_lines(measured, m, unit, noise[name])[:, k:].sum(axis=1) for m, k in each)
+    one, ahead, alone = (_lines(measured, m, unit, over_horizon.variances)[:, k:].sum(axis=1) for m, k in each)
     return np.array([[one[0], ahead[0], alone[0], ahead[2]], [one[1], ahead[1], alone[1], ahead[1]]])

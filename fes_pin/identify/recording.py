@@ -60,18 +60,18 @@ def low_pass_of(model: Model, trials: Sequence[Trial]) -> tuple[float, float] | 
     if any(begun.noise[n].std > SMOOTH * left.std for n, left in noise_of(begun).items()):
         return None
 
-    def fitted(log_hz: float) -> Fit:
+    def cost(log_hz: float) -> float:
         passed = [derived_trial(t, low_pass_hz=float(np.exp(log_hz))) for t in trials]
-        return fit_problem(Problem(model, passed, begun.noise), begun.values)
+        return _cost(fit_problem(Problem(model, passed, begun.noise), begun.values))
 
     grid = np.linspace(math.log(PERIODS / shortest), math.log(MOST / dt), TRIED)
-    costs = [_cost(fitted(x)) for x in grid]
+    costs = [cost(x) for x in grid]
     best = int(np.argmin(costs))
     if best in (0, TRIED - 1):  # at an end of the range
         return None
     near = (grid[best - 1], grid[best + 1])
-    found = minimize_scalar(lambda x: _cost(fitted(x)), bounds=near, method="bounded", options={"xatol": 0.01})
-    gain = _cost(begun) - _cost(fitted(found.x))
+    found = minimize_scalar(cost, bounds=near, method="bounded", options={"xatol": 0.01})
+    gain = _cost(begun) - float(found.fun)
     return (float(np.exp(found.x)), gain) if gain > SMALL_SHARE * sum(map(len, trials)) else None
 
 

@@ -79,7 +79,9 @@ def driven(one: Innovations) -> np.ndarray:
 def normal_scores(values: Sequence[np.ndarray]) -> list[np.ndarray]:
     """Quantiles of the normal distribution by the rank of each value among all."""
     together = np.concatenate(values)
-    scores = scipy.special.ndtri((_ranks(together) - 0.5) / len(together))
+    _, which, counts = np.unique(together, return_inverse=True, return_counts=True)
+    ranks = (np.cumsum(counts) - 0.5 * (counts - 1))[which]  # from 1; equal values share the mean of their ranks
+    scores = scipy.special.ndtri((ranks - 0.5) / len(together))
     return np.split(scores, np.cumsum([len(v) for v in values])[:-1])
 
 
@@ -99,9 +101,3 @@ def convolved(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     size = scipy.fft.next_fast_len(count, real=True)
     whole = np.fft.irfft(np.fft.rfft(a, size) * np.fft.rfft(b, size), size)
     return whole[len(b) // 2 :][: len(a)]
-
-
-def _ranks(values: np.ndarray) -> np.ndarray:
-    """Return ranks from 1; equal values share the mean of their ranks."""
-    _, which, counts = np.unique(values, return_inverse=True, return_counts=True)
-    return (np.cumsum(counts) - 0.5 * (counts - 1))[which]

@@ -341,16 +341,17 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
 
     def _begin_far(self, base: LikelihoodFit, starts: Mapping[Names, Starts]) -> dict[Names, LikelihoodFit]:
         """Return first fits of sets that extend one far from the data: by least squares, begun by a filter."""
-        if self.noise != WHITE:
+        if self.noise == WHITE:
+            fits = in_parallel(lambda n: self._first_far(base, n, starts[n]), list(starts))
+        else:
             rough = self.least_squares
             rough.nominal()
             if base.names not in rough.fits:
                 rough.fits[base.names] = rough._maximum(base.model, rough.fits[()].noise, base.unknowns)
             made = rough.begin(rough.fits[base.names], {k: s for k, s in starts.items() if k not in rough.fits})
-            found = {k: rough.fits[k] if k in rough.fits else made[k] for k in starts}
-            return dict(zip(found, in_parallel(self._from_least_squares, list(found.values())), strict=True))
-
-        return dict(zip(starts, in_parallel(lambda n: self._first_far(base, n, starts[n]), list(starts)), strict=True))
+            known = {**made, **rough.fits}
+            fits = in_parallel(lambda n: self._from_least_squares(known[n]), list(starts))
+        return dict(zip(starts, fits, strict=True))
 
     def _first_far(self, base: LikelihoodFit, names: Names, starts: Starts) -> LikelihoodFit:
         """Return the first fit of a set from its scores; from far sizes too where no descent from there leads on."""

@@ -80,10 +80,8 @@ def _each_trial(columns: BlockColumns[int], one: Effect, place: Mapping[int, sli
     if kept < LEAST_KEPT or not felt.any():
         return Scored(effect, 0.0, {}, 0.0)
     gram, along = gram[np.ix_(felt, felt)], along[felt]
-    gain = float(along @ least_squares_step(gram, along)) - PARAMETER_PENALTY * max(
-        len(along) - len(norms) // len(alone), 0
-    )
-    return Scored(effect, gain, {}, kept)
+    penalty = PARAMETER_PENALTY * max(len(along) - len(norms) // len(alone), 0)
+    return Scored(effect, float(along @ least_squares_step(gram, along)) - penalty, {}, kept)
 
 
 @dataclass(frozen=True)
