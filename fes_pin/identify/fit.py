@@ -12,10 +12,10 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fes_pin.data.errors import InputError
+from fes_pin.data.errors import InputError, fault_at
 from fes_pin.data.numbers import as_number, instance, number, whole
 from fes_pin.data.results import Saveable
-from fes_pin.data.schema import IMPOSED, unknown
+from fes_pin.data.schema import IMPOSED, check_known
 from fes_pin.data.show import by_columns
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
@@ -81,8 +81,7 @@ class Fit(Optimum, Saveable):
         InputError
             If the parameter was not fitted.
         """
-        if name not in self.free:
-            raise InputError(unknown(name, self.free), column=name)
+        check_known([name], self.free, fault_at())
         return super().place(name)
 
     def interval(self, name: str, method: str = "wald") -> tuple[float, float]:
@@ -135,8 +134,9 @@ class Fit(Optimum, Saveable):
         return tuple(n for n in self.free if math.isinf(self.reach(n)))
 
     def _note(self, name: str) -> str:
-        at = "at its bound" if name in self.at_bound else ""
-        return "not identified" if name in self.not_identified() else at
+        if math.isinf(self.reach(name)):
+            return "not identified"
+        return "at its bound" if name in self.at_bound else ""
 
     def _estimate(self, name: str) -> str:
         """Return a value with its standard deviation, or with its interval where it is at its bound."""
@@ -348,11 +348,9 @@ def _chosen(
     """Return the parameters that are fitted where some are fixed, and the bounds that were asked for."""
     fitted, info, narrower = model.fitted_parameters(), model.parameter_info(), dict[str, tuple[float, float]]()
     free = tuple(n for n in fitted if n not in map(str, fixed))
-    for column, names, known in (("fixed", fixed, fitted), ("bounds", bounds, free)):
-        for name in names:
-            if not isinstance(name, str) or name not in known:
-                raise InputError(unknown(str(name), known), column=column)
-    for name, ends in bounds.items():
+    check_known(map(str, fixed), fitted, fault_at("fixed"))
+    check_known(map(str, bounds), free, fault_at("bounds"))
+    for name, ends in ((str(n), ends) for n, ends in bounds.items()):
         least, most = info[name].lower, info[name].upper
         pair = [as_number(end) for end in ends] if isinstance(ends, tuple | list) else []
         low, high = [end for end in pair if end is not None] if len(pair) == 2 and None not in pair else (1.0, 0.0)

@@ -183,18 +183,17 @@ def amplitude(fitted: LikelihoodFit, effect: Effect) -> tuple[float, float]:
     The mean is over the trials of the first kind in which the effect acts, as a motion and a force have no common unit.
     The variance of the single estimates is subtracted from their squares.
     """
-    whole, squares, spread, kind = with_honest_intervals(as_parameters(fitted, effect)), [], [], None
+    whole, sizes, kind = with_honest_intervals(as_parameters(fitted, effect)), [], None
     for i, trial in enumerate(fitted.trials):
         own = [f"{effect.name}.{n}@{i}" for n in effect.unknowns()]
         at = [whole.place(n) for n in own]
         value, covariance = np.array([whole.parameters[n] for n in own]), whole.covariance[np.ix_(at, at)]
-        if not np.isfinite(covariance).all() or (kind or trial.kind) != trial.kind:
-            continue
-        kind = trial.kind
-        squares.append(float(value @ value - np.trace(covariance)))
-        spread.append(float(value @ covariance @ value))
-    if not squares:
+        if np.isfinite(covariance).all() and (kind or trial.kind) == trial.kind:
+            kind = trial.kind
+            sizes.append((float(value @ value - np.trace(covariance)), float(value @ covariance @ value)))
+    if not sizes:
         return 0.0, math.inf
+    squares, spread = zip(*sizes, strict=True)
     size = math.sqrt(max(float(np.mean(squares)), 0.0))
     deviation = math.sqrt(sum(spread)) / len(spread)
     return size, deviation / size if size > 0 else math.inf

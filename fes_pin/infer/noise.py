@@ -133,13 +133,10 @@ def likeliest_autoregression(
     white
         Share of the variance of the pieces by which white noise is assumed to add to it.
     """
-    count, least = sum(map(len, pieces)), math.inf
-    best: tuple[tuple[float, ...], float] = (), 0.0
-    for p, (ar, power) in enumerate(_burg(pieces, max(orders), white)):
-        cost = count * math.log(power) + PARAMETER_PENALTY * p
-        if p in orders and cost < least:
-            best, least = (ar, power), cost
-    return best
+    count, tried = sum(map(len, pieces)), enumerate(_burg(pieces, max(orders), white))
+    costs = ((count * math.log(power) + PARAMETER_PENALTY * p, ar, power) for p, (ar, power) in tried if p in orders)
+    _, ar, power = min(costs, key=lambda one: one[0], default=(0.0, (), 0.0))
+    return ar, power
 
 
 def _burg(pieces: Sequence[np.ndarray], most: int, white: float) -> Iterator[tuple[tuple[float, ...], float]]:

@@ -206,8 +206,8 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         if self._calm is not None:
             return self._calm
         known = self.fits[()].noise
-        guess = first_guess(self.model, self.trials, known.correlation_s if known else 0.0)
-        return without_memory(guess, self.trials) if known and known.timed else guess
+        guess = first_guess(self.model, self.trials, known.correlation_s)
+        return without_memory(guess, self.trials) if known.timed else guess
 
     def _has(self, names: Names, forms: frozenset[Hashable]) -> bool:
         """Return whether a set needs no other start; by least squares it is begun from each base, as minima differ."""
