@@ -104,15 +104,13 @@ class Fit(Optimum, Saveable):
         self.place(name)
         if method not in ("wald", "profile"):
             raise InputError(f"expected wald or profile, found {method!r}", column="method")
-        if method == "profile" and not self._has_profile():
+        has_profile = type(self) is Fit
+        if method == "profile" and not has_profile:
             raise InputError("expected wald: this fit is of random processes or of groups", column="method")
-        if self._has_profile() and (method == "profile" or name in self.at_bound):
+        if has_profile and (method == "profile" or name in self.at_bound):
             return self._one_sided[name] if name in self.at_bound else self._profile(name)
         info = self.model.parameter_info()[name]
         return self.within(name, *self.bounds.get(name, (info.lower, info.upper)))
-
-    def _has_profile(self) -> bool:
-        return type(self) is Fit
 
     @cached_property
     def _one_sided(self) -> dict[str, tuple[float, float]]:

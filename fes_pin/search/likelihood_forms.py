@@ -89,14 +89,11 @@ def is_identified(fitted: Fit, before: Fit | None = None) -> bool:
         The fit that was refined: a parameter that was at its bound there is no objection to another form.
     """
     there = before.at_bound if before is not None else ()
-    for one in fitted.model.effects:
-        if not one.refined():
-            continue
+    for one in (e for e in fitted.model.effects if e.refined()):
         for n, info in one.parameters().items():
             name = f"{one.name}.{n}"
-            if name not in fitted.free or name in there:
-                continue
-            std, away = fitted.std(name), getattr(one, n) - info.null if info.null is not None else np.inf
-            if not np.isfinite(std) or abs(away) < CONFIDENCE_95 * std:
-                return False
+            if name in fitted.free and name not in there:
+                std, away = fitted.std(name), getattr(one, n) - info.null if info.null is not None else np.inf
+                if not np.isfinite(std) or abs(away) < CONFIDENCE_95 * std:
+                    return False
     return True
