@@ -126,8 +126,3 @@ def _is_vague(fitted: LikelihoodFit, name: str, known: float) -> bool:
 def at_a_bound(fitted: Fit, believed: Model) -> set[str]:
     """Return the nominal parameters of a fit that ended at a bound other than 0."""
     return {n for n in fitted.at_bound if n in believed.parameters() and fitted.values[n] != 0.0}
-
-
-def freed(model: Model, believed: Model) -> Model:
-    """Return a model in which every nominal parameter is fitted that the believed model fits."""
-    return Model(replace(model.rig, fitted=believed.rig.fitted), model.effects)

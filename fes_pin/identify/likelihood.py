@@ -274,6 +274,7 @@ def autoregressions(run: Sequence[PredictedTrial], orders: Mapping[str, Sequence
     return out
 
 
+@np.errstate(over="ignore")  # of a model that diverges
 def residual_powers(run: Sequence[PredictedTrial]) -> dict[str, float]:
     """Return, by output, the factor on the variance of its noise that maximises the likelihood of its innovations.
 
@@ -285,8 +286,7 @@ def residual_powers(run: Sequence[PredictedTrial]) -> dict[str, float]:
         for one in run:
             if name in one.outputs:
                 own = one.of_seen(np.broadcast_to(np.array(one.outputs) == name, one.seen.shape))
-                with np.errstate(over="ignore"):  # of a model that diverges
-                    squares += float(np.sum(one.whitened[own] ** 2))
+                squares += float(np.sum(one.whitened[own] ** 2))
                 count += float(np.sum(1.0 - one.readings.again[own]))
         if 0.0 < squares < math.inf:
             out[name] = squares / count

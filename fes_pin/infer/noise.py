@@ -110,8 +110,7 @@ def thin(values: np.ndarray, count: int) -> np.ndarray:
     total = values[0:end:count].copy()
     for k in range(1, count):
         total += values[k:end:count]
-    total /= count
-    return total
+    return np.asarray(total / count)
 
 
 def likeliest_autoregression(

@@ -8,7 +8,7 @@ from typing import Self
 
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
-from fes_pin.identify.afar import at_a_bound, followed, following, freed, misfit_percent, with_beliefs
+from fes_pin.identify.afar import at_a_bound, followed, following, misfit_percent, with_beliefs
 from fes_pin.identify.ahead import default_horizon
 from fes_pin.identify.correlation_time import with_new_noise
 from fes_pin.identify.likelihood import LikelihoodProblem
@@ -220,8 +220,9 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
 
     def begin(self, base: LikelihoodFit, starts: Mapping[Names, Starts]) -> dict[Names, LikelihoodFit]:
         """Return the best first fit of each set: at the noise of the base, with little process noise, and from afar."""
-        if base.model.rig.fitted != self.model.rig.fitted:
-            base = replace(base, model=freed(base.model, self.model))
+        if base.model.rig.fitted != self.model.rig.fitted:  # what was held as believed is fitted again
+            rig = replace(base.model.rig, fitted=self.model.rig.fitted)
+            base = replace(base, model=Model(rig, base.model.effects))
         if self.is_far(base):
             return self._begin_far(base, starts)
         begun = {k: [base.model + started(s.effect, s.amplitudes) for s in many] for k, many in starts.items()}

@@ -29,9 +29,8 @@ def are_possible(effects: Sequence[Effect], at_bound: Collection[str], measured:
         info, smallest = effect.parameters(), effect.smallest(measured)
         for n in (*effect.amplitudes(), *effect.shapes()):
             size = getattr(effect, n)
-            if f"{effect.name}.{n}" in at_bound and size not in (info[n].null, 0.0):
-                return False
-            if 0.0 < abs(size) < smallest.get(n, 0.0):
+            is_stuck = f"{effect.name}.{n}" in at_bound and size not in (info[n].null, 0.0)
+            if is_stuck or 0.0 < abs(size) < smallest.get(n, 0.0):
                 return False
     return True
 
