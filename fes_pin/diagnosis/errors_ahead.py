@@ -240,7 +240,7 @@ def _sums(fitted: LikelihoodFit, floor: LikelihoodFit, trial: Trial, horizon_s: 
     noise of `floor`.
     """
     name = fitted.model.rig.output(trial.kind)
-    measured, over_horizon = trial[name], _predicted(fitted, trial, horizon_s)[name]
+    measured, later = trial[name], _predicted(fitted, trial, horizon_s)[name]
     free, simulated = np.full(len(trial), np.nan), is_simulated(fitted.noise, [trial])
     if simulated or not falling:
         free = free_residuals(fitted.model, trial, fitted.noise, fitted.unknowns_of(trial))[name]
@@ -248,8 +248,8 @@ def _sums(fitted: LikelihoodFit, floor: LikelihoodFit, trial: Trial, horizon_s: 
         next_one = free - forecast(np.nan_to_num(free), fitted.noise[name], trial.dt, 0.0)
     else:
         next_one = one_step(fitted.model, trial, fitted.noise)[name]
-    missed, unit = (next_one, measured - over_horizon.values, free), floor.noise.white[name] ** 2
+    missed, unit = (next_one, measured - later.values, free), floor.noise.white[name] ** 2
     begun = 0, _first(fitted, trial, horizon_s), 0
     each = zip(missed, begun, strict=True)
-    one, ahead, alone = (_lines(measured, m, unit, over_horizon.variances)[:, k:].sum(axis=1) for m, k in each)
+    one, ahead, alone = (_lines(measured, m, unit, later.variances)[:, k:].sum(axis=1) for m, k in each)
     return np.array([[one[0], ahead[0], alone[0], ahead[2]], [one[1], ahead[1], alone[1], ahead[1]]])

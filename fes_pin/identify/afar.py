@@ -52,8 +52,8 @@ def is_rounding(fitted: Fit) -> bool:
     counts = {n: min(count_of(t[n]) for t in fitted.trials if n in t) for n in _outputs(fitted)}
     if not all(counts.values()):
         return False
-    most, errors = 0.5 + OFF_COUNT, errors_of(fitted)
-    return all(bool(np.all(np.abs(v) <= most * counts[n])) for one in errors for n, v in one.items())
+    most = {n: (0.5 + OFF_COUNT) * count for n, count in counts.items()}
+    return all(bool(np.all(np.abs(v) <= most[n])) for one in errors_of(fitted) for n, v in one.items())
 
 
 def _outputs(fitted: Fit) -> list[str]:

@@ -390,7 +390,7 @@ def noise_of(fitted: Fit, longest: int = ORDERS[-1], least: int = 0) -> dict[str
     """Return the noise of a fit's residuals, by output column, with autoregressions of orders `least` to `longest`."""
     step, run, out = noise_step([t.dt for t in fitted.trials]), errors_of(fitted), {}
     for name in dict.fromkeys(n for errors in run for n in errors):
-        own = [(t.dt, errors[name]) for t, errors in zip(fitted.trials, run, strict=True) if name in errors]
+        own = [(t.dt, one[name]) for t, one in zip(fitted.trials, run, strict=True) if name in one]
         std = math.sqrt(float(np.mean([float(np.mean(residual**2)) for _, residual in own])))
         pieces = [thin(residual, thinning(dt, step)) for dt, residual in own]
         out[name] = estimate_noise(pieces, fitted.degrees, std, step, longest, least)

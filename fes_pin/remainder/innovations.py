@@ -80,7 +80,7 @@ def normal_scores(values: Sequence[np.ndarray]) -> list[np.ndarray]:
     """Quantiles of the normal distribution by the rank of each value among all."""
     together = np.concatenate(values)
     _, which, counts = np.unique(together, return_inverse=True, return_counts=True)
-    ranks = (np.cumsum(counts) - 0.5 * (counts - 1))[which]  # from 1; equal values share the mean of their ranks
+    ranks = (np.cumsum(counts) - 0.5 * (counts - 1))[which]  # equal values share the mean of theirs
     scores = scipy.special.ndtri((ranks - 0.5) / len(together))
     return np.split(scores, np.cumsum([len(v) for v in values])[:-1])
 

@@ -33,9 +33,9 @@ def line_p_value(pieces: Sequence[Innovations]) -> tuple[float, str]:
     p-values is corrected for the number of frequencies and for these four tests.
     """
     long = [e for e in pieces if len(e.values) > NEIGHBOURS]
-    steady, by_stimulus = [(e, np.ones(len(e.values))) for e in long], [(e, driven(e)) for e in long]
-    found = [(p, "time") for p in _lines(steady) if p]
-    found += [(p, "stimulus") for p in _lines([(e, act) for e, act in by_stimulus if np.ptp(act) > 0]) if p]
+    steady = [(e, np.ones(len(e.values))) for e in long]
+    active = [(e, act) for e in long if np.ptp(act := driven(e)) > 0]
+    found = [(p, "time") for p in _lines(steady) if p] + [(p, "stimulus") for p in _lines(active) if p]
     p, where = min(found, default=(1.0, "time"))
     return min(1.0, max(1, len(found)) * p), where
 

@@ -220,7 +220,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
 
     def begin(self, base: LikelihoodFit, starts: Mapping[Names, Starts]) -> dict[Names, LikelihoodFit]:
         """Return the best first fit of each set: at the noise of the base, with little process noise, and from afar."""
-        if base.model.rig.fitted != self.model.rig.fitted:  # what was held as believed is fitted again
+        if base.model.rig.fitted != self.model.rig.fitted:  # no parameter is held any more
             rig = replace(base.model.rig, fitted=self.model.rig.fitted)
             base = replace(base, model=Model(rig, base.model.effects))
         if self.is_far(base):

@@ -131,5 +131,5 @@ def bounded_step(gram: np.ndarray, along: np.ndarray, lower: np.ndarray, upper: 
 
 def best_by_effect(scored: Sequence[Scored]) -> Mapping[str, list[Scored]]:
     """Return the scored shapes of each effect, best first."""
-    ordered = sorted(scored, key=lambda s: -s.gain)
-    return {n: [s for s in ordered if s.effect.name == n] for n in dict.fromkeys(s.effect.name for s in scored)}
+    ordered, names = sorted(scored, key=lambda s: -s.gain), [s.effect.name for s in scored]
+    return {n: [s for s in ordered if s.effect.name == n] for n in dict.fromkeys(names)}
