@@ -35,7 +35,7 @@ def line_p_value(pieces: Sequence[Innovations]) -> tuple[float, str]:
     long = [e for e in pieces if len(e.values) > NEIGHBOURS]
     steady = [(e, np.ones(len(e.values))) for e in long]
     active = [(e, act) for e in long if np.ptp(act := driven(e)) > 0]
-    found = [(p, "time") for p in _lines(steady) if p] + [(p, "stimulus") for p in _lines(active) if p]
+    found = [(p, "time") for p in _lines(steady)] + [(p, "stimulus") for p in _lines(active)]
     p, where = min(found, default=(1.0, "time"))
     return min(1.0, max(1, len(found)) * p), where
 
