@@ -26,6 +26,7 @@ from fes_pin.infer.problem import Unknowns, completed
 from fes_pin.infer.profile import profile_interval
 from fes_pin.infer.result import shown
 from fes_pin.infer.scoring import LITTLE
+from fes_pin.infer.text import quantity
 from fes_pin.models.accepted import accepted_trials
 from fes_pin.models.model import Model
 from fes_pin.models.plausibility import warn_of_odd_numbers
@@ -137,11 +138,11 @@ class Fit(Optimum, Saveable):
         return "at its bound" if name in self.at_bound else ""
 
     def _estimate(self, name: str) -> str:
-        """Return a value with its standard deviation, or with its interval where it is at its bound."""
-        value, (low, high) = f"{self.values[name]:.4g}", self.interval(name)
+        """Return a value with its 95 % interval."""
+        value, (low, high) = self.values[name], self.interval(name)
         if name in self.at_bound:
-            return f"{value} (at its bound, 95 % in [{low:.3g}, {high:.3g}])"
-        return f"{value} +- {self.std(name):.2g}"
+            return f"{value:.4g} (at its bound, 95 % in [{low:.3g}, {high:.3g}])"
+        return quantity(value, self.std(name), (low, high), "")
 
     def __repr__(self) -> str:
         values = ", ".join(f"{n} = {self._estimate(n)}" for n in self.free)

@@ -74,7 +74,7 @@ class ParameterEstimate:
 
     def __str__(self) -> str:
         if not self.at_bound:
-            return quantity(self.value, self.std, self.unit)
+            return quantity(self.value, self.std, self.interval, self.unit)
         return f"{self.value:.4g} {self.unit} (at its bound, {self.one_sided()})".replace("  ", " ")
 
     def cells(self) -> tuple[Any, ...]:
@@ -82,10 +82,10 @@ class ParameterEstimate:
         return self.value, self.std, self.unit, *self.interval, self.at_bound
 
     def record(self) -> dict[str, Any]:
-        """Return the estimate for JSON; `at_bound` and the interval are in it only at a bound."""
-        low, high = (shown(end) for end in self.interval)
-        own = {"at_bound": True, "low": low, "high": high} if self.at_bound else {}
-        return {"value": shown(self.value), "std": shown(self.std), **own}
+        """Return the estimate for JSON, with its 95 % interval; `at_bound` is in it only at a bound."""
+        low, high = map(shown, self.interval)
+        bound = {"at_bound": True} if self.at_bound else {}
+        return {"value": shown(self.value), "std": shown(self.std), "low": low, "high": high, **bound}
 
 
 HELD_OUT, CROSS_VALIDATED, FITTED, STOPPED = "held_out", "cross_validated", "fitted", "stopped"

@@ -38,11 +38,22 @@ def rounded(value: float, std: float) -> str:
     return f"{value:.{min(max(lead + digits, 0), 8)}e}" if value else "0"
 
 
-def quantity(value: float, std: float, unit: str) -> str:
-    """Return a value with its standard deviation, both rounded to significant digits."""
-    if math.isfinite(std) and std > 0.0:
-        return f"{rounded(value, std)} +- {rounded(std, std)} {unit}".strip()
-    return f"{value:.4g} {unit} ({'held' if std <= 0.0 else 'not identified'})".replace("  ", " ")
+def estimated(value: float, std: float, interval: tuple[float, float], held: str = "held") -> tuple[str, str]:
+    """Return a value and its 95 % interval, both rounded to significant digits.
+
+    In the place of the interval stands that the value is held, or that it is not identified.
+    """
+    if std <= 0.0 or not math.isfinite(std):
+        return f"{value:.4g}", held if std <= 0.0 else "not identified"
+    low, high = (rounded(end, std) for end in interval)
+    return rounded(value, std), f"[{low}, {high}]"
+
+
+def quantity(value: float, std: float, interval: tuple[float, float], unit: str) -> str:
+    """Return a value with its 95 % interval and its unit."""
+    size, reach = estimated(value, std, interval)
+    words = f"{size} {reach} {unit}" if reach.startswith("[") else f"{size} {unit} ({reach})"
+    return " ".join(words.split())
 
 
 def listed(names: list[str], last: str = "and") -> str:

@@ -1,6 +1,5 @@
 """Parts of pages that several of them show."""
 
-import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -9,7 +8,7 @@ from typing import Any
 from fes_pin.data.provenance import Provenance
 from fes_pin.data.results import Result
 from fes_pin.infer.result import ParameterEstimate
-from fes_pin.infer.text import rounded
+from fes_pin.infer.text import estimated
 from fes_pin.models.describe import sentence
 from fes_pin.view.page import Content, Markup, element, folded, html_table, joined, section, unit_text
 
@@ -56,12 +55,11 @@ def stage_mark(stage: str) -> Markup:
 
 def value_and_interval(one: ParameterEstimate) -> tuple[str, str, str]:
     """Value, unit and interval of a parameter as printed."""
-    unit, (low, high) = unit_text(one.unit), one.interval
+    unit = unit_text(one.unit)
     if one.at_bound:
         return f"{one.value:.4g}", unit, f"{one.one_sided()}, at its bound"
-    if one.std == 0.0 or not math.isfinite(one.std):
-        return f"{one.value:.4g}", unit, "fixed" if one.std == 0.0 else "not identified"
-    return rounded(one.value, one.std), unit, f"[{rounded(low, one.std)}, {rounded(high, one.std)}]"
+    value, reach = estimated(one.value, one.std, one.interval)
+    return value, unit, reach
 
 
 def not_testable(result: Result, names: Sequence[str], why: str) -> Markup:

@@ -14,16 +14,16 @@ from fes_pin.infer.text import quantity
 @pytest.mark.parametrize(
     ("value", "std", "words"),
     [
-        (0.04123, 0.0021, "0.0412 +- 0.0021 N"),
-        (123.4, 7.0, "123.4 +- 7.0 N"),
+        (0.04123, 0.0021, "0.0412 [0.0370, 0.0454] N"),
+        (123.4, 7.0, "123.4 [109.4, 137.4] N"),
         (2.0, math.inf, "2 N (not identified)"),
         (0.25, 0.0, "0.25 N (held)"),
-        (2.5e6, 4e5, "2.50e+06 +- 4.0e+05 N"),
-        (1e-9, 2e-10, "1.00e-09 +- 2.0e-10 N"),
+        (2.5e6, 4e5, "2.50e+06 [1.70e+06, 3.30e+06] N"),
+        (1e-9, 2e-10, "1.00e-09 [6.0e-10, 1.40e-09] N"),
     ],
 )
 def test_a_quantity_is_rounded_to_what_it_means(value, std, words):
-    assert quantity(value, std, "N") == words
+    assert quantity(value, std, (value - 2.0 * std, value + 2.0 * std), "N") == words
 
 
 def test_what_acts_at_random_is_told_in_units_of_the_effort():

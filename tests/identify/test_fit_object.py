@@ -56,7 +56,7 @@ def test_friction_that_is_not_there_has_a_one_sided_interval_and_no_deviation(at
 def test_a_value_at_its_bound_says_so_wherever_it_is_shown(at_its_bound):
     high = f"{at_its_bound.interval('coulomb_friction.torque_nm')[1]:.3g}"
     assert f"(at its bound, 95 % in [0, {high}])" in repr(at_its_bound)
-    assert "0 +- 0" not in repr(at_its_bound)
+    assert "[0, 0]" not in repr(at_its_bound)
     for shown in (str(at_its_bound), at_its_bound._repr_html_()):
         assert "at its bound" in shown
     row = at_its_bound.to_frame().loc["coulomb_friction.torque_nm"]
