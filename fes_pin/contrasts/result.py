@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 from fes_pin.data.results import Result
 from fes_pin.identify.fit import Fit
 from fes_pin.infer.result import Change, Named, ParameterEstimate, shown
-from fes_pin.infer.text import listed, percent, probability
+from fes_pin.infer.text import listed, percent
 from fes_pin.models.catalogue import Catalogue, installed
 from fes_pin.models.stage import Effect
 
@@ -96,7 +96,7 @@ class Contrast(Result):
     def notes(self) -> list[tuple[str, str]]:
         """Return notes in addition to the changes, by topic."""
         left = self.remainder
-        state = f"in one group alone ({probability(left.p_value)})" if left.unexplained else "none in one group alone"
+        state = f"in one group alone ({left.tested()})" if left.unexplained else "none in one group alone"
         sizes = [f"{n} {p.value:.2g} {p.unit}".strip() for n, p in self.excluded.items()]
         rows = [
             ("in all groups alike, so no change", ", ".join(self.common)),

@@ -14,7 +14,7 @@ from fes_pin.identify.error_measures import FREE, ONE_STEP
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.stored import log_table, stored_tables
 from fes_pin.infer.result import FITTED, STOPPED, Explained, ParameterEstimate, Ranked, shown
-from fes_pin.infer.text import percent, probability
+from fes_pin.infer.text import percent
 from fes_pin.models.catalogue import Catalogue, installed
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
@@ -115,7 +115,7 @@ class Diagnosis(ModelResult):
             ("noise of the readings alone", f"E {percent(self.ceiling_percent)}"),
             ("falls", "by itself: free errors are meaningless" if self.is_falling else ""),
             *((f"random {r.name}", r.words(unit)) for r in self.random),
-            ("lack of fit", self.reason or f"{state} ({probability(left.p_value)}{where})"),
+            ("lack of fit", self.reason or f"{state} ({left.tested()}{where})"),
             ("left out as spikes", left_out_text(self.left_out, self.study.trials)),
             *(
                 (f"{c.name} chosen again", f"in {k[0]} of {k[1]} folds, each without its trials")

@@ -213,17 +213,29 @@ class Evidence:
 class Remainder:
     """Lack of fit: whether residuals of the model are more than noise, its p-value, and where they are largest.
 
-    `reason` says in words why there is one where no test finds it.
+    Attributes
+    ----------
+    level
+        Level of the test; NaN where there was none.
+    reason
+        Why there is a lack of fit where no test finds it, in words.
     """
 
     unexplained: bool
     p_value: float
     where: str | None
+    level: float = math.nan
     reason: str | None = None
+
+    def tested(self) -> str:
+        """Return its p-value and the level, in words."""
+        level = f", level {self.level:g}" if math.isfinite(self.level) else ""
+        return f"{probability(self.p_value)}{level}"
 
     def record(self) -> dict[str, Any]:
         """As JSON files have it."""
-        return {"unexplained": self.unexplained, "p_value": p_shown(self.p_value), "where": self.where}
+        test = {"p_value": p_shown(self.p_value), "level": shown(self.level)}
+        return {"unexplained": self.unexplained, **test, "where": self.where}
 
 
 @dataclass(frozen=True)

@@ -39,7 +39,7 @@ def lack_of_fit(fitted: LikelihoodFit) -> Remainder:
     tested.
     """
     if is_rounding(fitted):
-        return Remainder(False, 1.0, None)
+        return Remainder(False, 1.0, None, fitted.level)
     free = rough_fit(fitted.model, fitted.trials) if fitted.noise.ar else None
     if free is not None and math.isfinite(free.sse):
         free = under_own_noise(free, max_iterations=MAX_ITERATIONS)
@@ -48,7 +48,7 @@ def lack_of_fit(fitted: LikelihoodFit) -> Remainder:
     p_value, where = min(found, key=lambda f: f[0])
     p_value = min(1.0, len(found) * p_value)
     unexplained = p_value < fitted.level
-    return Remainder(unexplained, p_value, where if unexplained else None)
+    return Remainder(unexplained, p_value, where if unexplained else None, fitted.level)
 
 
 def _features_left(fitted: LikelihoodFit) -> tuple[float, str | None]:

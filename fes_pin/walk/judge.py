@@ -64,7 +64,7 @@ def lack_of_fit(designs: Designs, one: WalkFit) -> Remainder:
     channel, wave = np.unravel_index(int(np.argmax(by_wave)), by_wave.shape)
     word = WAVES[wave] if wave < len(WAVES) else f"{wave} times a stride"
     left = p_value < CLAIM_LEVEL
-    return Remainder(left, p_value, f"{CHANNELS[channel]}, {word}" if left else None)
+    return Remainder(left, p_value, f"{CHANNELS[channel]}, {word}" if left else None, CLAIM_LEVEL)
 
 
 def not_testable(designs: Designs, one: WalkFit) -> list[str]:

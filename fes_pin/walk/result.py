@@ -16,7 +16,7 @@ from fes_pin.data.numbers import in_full
 from fes_pin.data.results import ModelResult
 from fes_pin.data.urdf import MOMENTS
 from fes_pin.infer.result import CROSS_VALIDATED, FITTED, Explained, shown
-from fes_pin.infer.text import percent, probability
+from fes_pin.infer.text import percent
 from fes_pin.walk.effect import WalkEffect
 from fes_pin.walk.effects import EFFECTS
 from fes_pin.walk.judge import CHANNELS
@@ -150,7 +150,7 @@ class WalkDiagnosis(ModelResult):
         most = f", most in {where}" if where else ""
         rows = [("noise from stride to stride alone", f"E {percent(self.ceiling_percent)}")] * many
         rows += [("low pass", f"{self.cutoff_hz:g} Hz")]
-        rows += [("lack of fit", f"{state} ({probability(self.remainder.p_value)}{most})")]
+        rows += [("lack of fit", f"{state} ({self.remainder.tested()}{most})")]
         for cause in self.causes:
             if (gain := cause.further.get("other_leg")) is not None:
                 words = f"{gain:.0f} % of its squared error, in single supports"
