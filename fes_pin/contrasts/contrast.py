@@ -192,14 +192,14 @@ class _Work:
         smoothed = max(best.weights.noise.values(), key=lambda n: n.correlation_s)
         said += [*state.weighed.said, *words_of_reading(smoothed, best.grouped.rig, best.trials)]
         said += [UNCONFIRMED.format(n, one.reason) for n, one in state.rejected.items()]
-        if left.unexplained:
+        if left.of_some:
             said.append("with a lack of fit in one group no change can be excluded")
-        if left.unexplained or self.stops:  # excluded sizes hold for a right model and a whole search only
+        if left.of_some or self.stops:  # excluded sizes hold for a right model and a whole search only
             unchanged, excluded = {}, {}
         return Contrast(
             study=self.study,
             groups=tuple(models.trials),
-            verdict="changed" if changes else "unexplained" if left.unexplained else "nothing_changed",
+            verdict="changed" if changes else "unexplained" if left.of_some else "nothing_changed",
             causes=tuple(sorted(changes, key=lambda c: c.p_value)),
             common=best.common,
             unchanged=unchanged,

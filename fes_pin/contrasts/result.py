@@ -96,7 +96,7 @@ class Contrast(Result):
     def notes(self) -> list[tuple[str, str]]:
         """Return notes in addition to the changes, by topic."""
         left = self.remainder
-        state = f"in one group alone ({left.tested()})" if left.unexplained else "none in one group alone"
+        where = "in every group" if left.everywhere else "in one group alone" if left.unexplained else "none found"
         sizes = [f"{n} {p.value:.2g} {p.unit}".strip() for n, p in self.excluded.items()]
         rows = [
             ("in all groups alike, so no change", ", ".join(self.common)),
@@ -105,7 +105,7 @@ class Contrast(Result):
             (f"did not come ({SEEN} beyond)", ", ".join(sizes)),
             ("could have changed unseen", ", ".join(self.untestable)),
             ("fitted by", "predictions one sample ahead" if self.driven else "simulations from the inputs"),
-            ("lack of fit", state),  # a lack of fit that all groups share is an error of the model, and is a warning
+            ("lack of fit", f"{where} ({left.tested()})"),  # of every group: an error of the model, and a warning
         ]
         return [(topic, words) for topic, words in rows if words] + super().notes()
 

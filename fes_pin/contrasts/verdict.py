@@ -92,7 +92,7 @@ def left_in_groups(models: ContrastModels, best: Grouped) -> tuple[Remainder, li
     p = min(1.0, len(each) * least.p_value)
     if len(open_) == len(each):
         words = "the model leaves something unexplained in every group; `diagnose` says what"
-        return Remainder(False, p, least.where, CLAIM_LEVEL), [words]
+        return Remainder(True, p, least.where, CLAIM_LEVEL, everywhere=True), [words]
     if not open_ or not p < CLAIM_LEVEL:
         return Remainder(False, p, None, CLAIM_LEVEL), []
     return Remainder(True, p, least.where, CLAIM_LEVEL), [f"lack of fit in the group {g}" for g in open_]

@@ -219,6 +219,8 @@ class Remainder:
         Level of the test; NaN where there was none.
     reason
         Why there is a lack of fit where no test finds it, in words.
+    everywhere
+        Whether it is one of every group of the data: an error of the model that all share, and no change.
     """
 
     unexplained: bool
@@ -226,6 +228,12 @@ class Remainder:
     where: str | None
     level: float = math.nan
     reason: str | None = None
+    everywhere: bool = False
+
+    @property
+    def of_some(self) -> bool:
+        """Whether it is one of some data alone, or of data in no groups."""
+        return self.unexplained and not self.everywhere
 
     def tested(self) -> str:
         """Return its p-value and the level, in words."""
@@ -235,7 +243,8 @@ class Remainder:
     def record(self) -> dict[str, Any]:
         """As JSON files have it."""
         test = {"p_value": p_shown(self.p_value), "level": shown(self.level)}
-        return {"unexplained": self.unexplained, **test, "where": self.where}
+        shared = {"in_every_group": True} if self.everywhere else {}
+        return {"unexplained": self.unexplained, **test, "where": self.where, **shared}
 
 
 @dataclass(frozen=True)

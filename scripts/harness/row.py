@@ -112,6 +112,11 @@ def sets_of(record: Mapping[str, Any]) -> tuple[tuple[str, ...], ...]:
     return tuple((c["name"], *c["equivalents"]) for c in causes)
 
 
+def _is_left(remainder: Mapping[str, Any]) -> bool:
+    """Whether something is left; an error that all groups share is no change, and is left to a diagnosis."""
+    return bool(remainder["unexplained"] and not remainder.get("in_every_group", False))
+
+
 def judged(item: Item, truth: Truth, record: Mapping[str, Any], **known: Any) -> Row:
     """An answer, as JSON has it, beside the truth."""
     beside = set(truth.beside) - set(item.hidden)
@@ -122,7 +127,7 @@ def judged(item: Item, truth: Truth, record: Mapping[str, Any], **known: Any) ->
         item.outside,
         verdict=record["verdict"],
         sets=tuple(names for names in sets_of(record) if not beside & set(names)),
-        left=bool(record["verdict"] == "unexplained" or record["remainder"]["unexplained"]),
+        left=bool(record["verdict"] == "unexplained" or _is_left(record["remainder"])),
         estimates=tuple(_estimates(truth.parameters, record)),
         errors=dict(_errors(record)),
         **known,
