@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shutil
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -56,17 +57,21 @@ def progress(every_s: float = math.inf) -> Iterator[Callable[[float, str], None]
 
 
 def print_result(found: Saveable, notes: Sequence[str] = ()) -> None:
-    """Print a result as a table, as wide as the terminal, and further notes."""
+    """Print a result as a table, and further notes: as wide as the terminal, in a pipe as `COLUMNS`, or 80, says.
+
+    No cell is cut, and names of causes stay whole.
+    """
     from rich import box
     from rich.console import Console
-    from rich.table import Table
+    from rich.table import Column, Table
     from rich.text import Text
 
     title, head, rows, own = found.as_table()
-    console = Console(width=None if sys.stdout.isatty() else 120, soft_wrap=not sys.stdout.isatty(), highlight=False)
+    console = Console(width=shutil.get_terminal_size().columns, highlight=False)
     console.print(Text(title, style="bold"))
     if rows:
-        table = Table(*head, box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False)
+        columns = [Column(name, overflow="fold", no_wrap=not k) for k, name in enumerate(head)]
+        table = Table(*columns, box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False)
         for row in rows:
             table.add_row(*map(Text, row))
         console.print(table)

@@ -245,7 +245,8 @@ class Result(Saveable):
     def head(self) -> tuple[str, ...]:
         """Return the titles of the table of causes."""
         held_out = any(one.gain_held_out.is_held_out for one in self.causes if isinstance(one, Cause))
-        return "cause", "where", "parameters", f"{'held-out' if held_out else 'fitted'} gain", "equivalents"
+        lost = f"lost without it, {'held out' if held_out else 'fitted'}"
+        return "cause", "where", "parameters, 95 %", lost, "p", "equivalents"
 
     def record(self) -> dict[str, Any]:
         """The JSON file as a dictionary, without the text and the table that a saved result has as well."""

@@ -281,12 +281,11 @@ class Explained:
         return 100.0 * gone / max(self.nominal - (self.noise or 0.0), gone, 1e-300)
 
     def __str__(self) -> str:
-        gone, noise = self.of(self.nominal), self.noise
-        above = f" ({self.above_noise:.0f} % of what is above the noise)" if noise is not None and gone >= 0.0 else ""
-        alone = f"; noise alone leaves {percent(noise)}" if noise is not None else ""
-        share = f"{gone:.0f} %" if gone >= 0.0 else "none"
+        above = "" if self.noise is None else " above the noise"
+        alone = "" if self.noise is None else f"; noise alone leaves {percent(self.noise)}"
+        share = f"{self.above_noise:.0f} %" if self.extended <= self.nominal else "none"
         errors = f"E {percent(self.nominal)} -> {percent(self.extended)}, {ON[self.on]}"
-        return f"{share} of the squared error of {self.what}{above}: {errors}{alone}"
+        return f"{share} of the squared error{above} of {self.what}: {errors}{alone}"
 
     def record(self) -> dict[str, Any]:
         """As JSON files have it."""
@@ -471,7 +470,8 @@ class Cause(Named):
         """Return name, site, values, gain and equivalents."""
         values = "\n".join(f"{n} {one}" for n, one in self.parameters.items())
         where = f"trial {self.trial}" if self.trial is not None else self.site or self.stage
-        return self.name, where, values, str(self.gain_held_out), ", ".join(self.equivalents) or "-"
+        test = probability(self.p_value).removeprefix("p = ").removeprefix("p ")
+        return self.name, where, values, str(self.gain_held_out), test, ", ".join(self.equivalents) or "-"
 
     def _gain_cells(self) -> tuple[float, ...]:
         return self.gain_held_out.percent, self.gain_held_out.low, self.gain_held_out.high

@@ -35,7 +35,7 @@ def safe(content: Content) -> str:
     """Content as HTML: markup as it is, text escaped, with signs for what is typed in their place."""
     if isinstance(content, Markup):
         return content.text
-    return html.escape(content.replace("->", "\N{RIGHTWARDS ARROW}").replace("+-", "\N{PLUS-MINUS SIGN}"), quote=True)
+    return html.escape(content.replace("->", "\N{RIGHTWARDS ARROW}"), quote=True)
 
 
 def element(tag: str, *contents: Content, **attributes: str) -> Markup:

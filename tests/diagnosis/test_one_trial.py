@@ -59,11 +59,11 @@ def test_friction_is_found_beneath_a_random_torque(tmp_path):
     estimate = cause.parameters["torque_nm"]
     assert abs(estimate.value - 0.02) < 4.0 * estimate.std < 0.02
     assert not found.causes[0].gain_held_out.is_held_out and found.explained.on == FITTED
-    assert "fitted gain" in str(found) and "held" not in str(found)
+    assert "lost without it, fitted" in str(found) and "held" not in str(found)
     gains = found.record()["causes"][0]["gain_percent"]
     assert gains["held_out"] is None and gains["ci95"][0] <= gains["ci95"][1]
     page = report_html(found)
-    assert "fitted gain" in page and "held-out gain" not in page
+    assert "lost without it, fitted" in page and "lost without it, held out" not in page
 
 
 def test_a_random_torque_alone_has_no_name(tmp_path):

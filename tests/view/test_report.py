@@ -178,10 +178,10 @@ def test_the_first_screen_answers_what_a_reader_asks():
     for words in (
         "The model lacks coulomb friction",
         "Dry friction at the joint",
-        "torque 0.01 \u00b1 0.10 N m",
+        "torque 0.01 [-0.19, 0.21] N m",
         "By chance alone over the whole library: p = 1e-09",
         "These data cannot distinguish this cause from quadratic_damping",
-        "Explained 80 % of the squared error of free simulations (99 % of what is above the noise)",
+        "Explained 99 % of the squared error above the noise of free simulations",
         "E 9.1 % \u2192 1.8 %",
         "on what was fitted; noise alone leaves 1.7 %",
         "Next to separate coulomb_friction and quadratic_damping: they differ most on this trial",
@@ -255,7 +255,7 @@ def diagnosis_of(folder, free):
 def test_a_driven_rig_shows_three_errors_side_by_side_and_reasons_along_its_motion(tmp_path):
     text = checked(diagnosis_of(tmp_path, 310.0))
     for words in (
-        "of the squared error of predictions 0.3 s ahead",
+        "of the squared error above the noise of predictions 0.3 s ahead",
         "E 9.5 % \u2192 0.4 %, cross-validated; noise alone leaves 0.2 %",
         "predictions one sample ahead on what was fitted below 0.001 %",
         "free simulations on what was fitted 310 % 310 %",
