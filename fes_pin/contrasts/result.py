@@ -8,7 +8,9 @@ from fes_pin.data.results import Result
 from fes_pin.identify.fit import Fit
 from fes_pin.infer.result import Change, Named, ParameterEstimate, shown
 from fes_pin.infer.text import listed, percent
+from fes_pin.models.assumed import assumed_of
 from fes_pin.models.catalogue import Catalogue, installed
+from fes_pin.models.nominal import nominal_model
 from fes_pin.models.stage import Effect
 
 SEEN = "would have been seen in 95 of 100"
@@ -63,15 +65,19 @@ class Contrast(Result):
         said = [(n, f"did not change by its score: more than {size} {SEEN}") for n, size in seen.items()]
         return said + [(n, "not testable with these data") for n in self.untestable]
 
+    def assumed(self) -> dict[str, str]:
+        """See `Result.assumed`: constants that are held, how trials begin, and the estimator."""
+        return {**assumed_of(nominal_model(self.study), self.study.trials), **super().assumed()}
+
     def title(self) -> str:
         """The verdict in a few words."""
         between = listed(list(self.groups))
         if self.verdict == "unexplained":
             return f"something differs between {between}, and nothing in the library explains it"
-        many = {0: "nothing", 1: "one thing"}.get(len(self.changes), f"{len(self.changes)} things")
         begun = "stopped: best set so far: " if self.is_stopped else ""
         shown = "" if self.changes or self.is_stopped else " that these data show"
-        return f"{begun}{many} changed between {between}{shown}"
+        changed = listed(list(map(_size_in_group, self.changes))) if self.changes else "nothing"
+        return f"{begun}{changed} changed between {between}{shown}"
 
     def head(self) -> tuple[str, ...]:
         """Titles of the table of changes."""
@@ -120,6 +126,15 @@ class Contrast(Result):
         if self.untestable:
             return f"record trials that show {listed(list(self.untestable))}; one model for all groups fits these"
         return "use one model for all groups"
+
+
+def _size_in_group(change: Change) -> str:
+    """Return a change in a few words: its name, its group, and its first value there and elsewhere."""
+    groups = dict(next(iter(change.parameters.values())))
+    here, name = groups.pop(change.group), change.name.replace("_", " ")
+    from_ = [f"{one.value:.3g} -> " for one in groups.values()][:1]
+    where = change.group if change.trial is None else f"trial {change.trial}"
+    return f"{name} in {where} ({''.join(from_)}{here.value:.3g} {here.unit}".rstrip() + ")"
 
 
 def _shares(shares: Mapping[str, float]) -> str:

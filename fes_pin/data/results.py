@@ -202,7 +202,13 @@ class Result(Saveable):
 
     def notes(self) -> list[tuple[str, str]]:
         """Return notes in addition to the table of causes, by topic."""
-        return [*self.judged(), ("next", self.advice()), *(("warning", words) for words in self.warnings)]
+        assumed = "; ".join(f"{topic}: {words}" for topic, words in self.assumed().items())
+        rows = [*self.judged(), *([("assumed", assumed)] if assumed else []), ("next", self.advice())]
+        return rows + [("warning", words) for words in self.warnings]
+
+    def assumed(self) -> dict[str, str]:
+        """Return what the answer takes as known, in words by topic."""
+        return {"estimator": self.why.estimator} if self.why else {}
 
     def effect(self, name: str) -> type | None:
         """Return the class of a cause, with its equation; None without one."""
@@ -256,6 +262,8 @@ class Result(Saveable):
             f"{self.KIND.__name__.lower()}s": [one.record() for one in self.causes],
             "remainder": self.remainder.record(),
             **({"explained": self.explained.record()} if self.explained else {}),
+            "next": self.advice(),
+            "assumed": self.assumed(),
             **self.own_record(),
             **({"why": self.why.record()} if self.why else {}),
             "warnings": list(self.warnings),

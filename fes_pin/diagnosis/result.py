@@ -15,6 +15,7 @@ from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.stored import log_table, stored_tables
 from fes_pin.infer.result import FITTED, STOPPED, Explained, ParameterEstimate, Ranked, shown
 from fes_pin.infer.text import percent
+from fes_pin.models.assumed import assumed_of
 from fes_pin.models.catalogue import Catalogue, installed
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
@@ -100,6 +101,10 @@ class Diagnosis(ModelResult):
             if free is not None and extended is not None:
                 out.append(Explained(FREE, on[k], free, extended, self.ceiling_percent))
         return out
+
+    def assumed(self) -> dict[str, str]:
+        """See `Result.assumed`: constants that are held, how trials begin, and the estimator."""
+        return {**assumed_of(self.nominal.model, self.nominal.trials), **super().assumed()}
 
     def effect(self, name: str) -> type[Effect] | None:
         """Return the class of a cause; None of a misread condition."""

@@ -138,6 +138,13 @@ class WalkDiagnosis(ModelResult):
         record = self.models_record(nominal, extended, noise, ("coordinates", "file"))
         return {**record, "cutoff_hz": self.cutoff_hz}
 
+    def assumed(self) -> dict[str, str]:
+        """See `Result.assumed`: the body, what errors are ordinary, the low pass, and the estimator."""
+        body = self.models.designs.as_read.trials[0].motion.body
+        errors = "landmarks, plates and soft tissue have ordinary errors"
+        known = {"body": f"{body.mass_kg:.4g} kg", "ordinary": errors, "low pass": f"{self.cutoff_hz:g} Hz"}
+        return {**known, **super().assumed()}
+
     def effect(self, name: str) -> type[WalkEffect] | None:
         """Return the class of a cause."""
         return next((e for e in EFFECTS if e.name == name), None)
@@ -149,7 +156,6 @@ class WalkDiagnosis(ModelResult):
         state += " repeats in every stride" if many else " exceeds that of 1 mm of marker noise"
         most = f", most in {where}" if where else ""
         rows = [("noise from stride to stride alone", f"E {percent(self.ceiling_percent)}")] * many
-        rows += [("low pass", f"{self.cutoff_hz:g} Hz")]
         rows += [("lack of fit", f"{state} ({self.remainder.tested()}{most})")]
         for cause in self.causes:
             if (gain := cause.further.get("other_leg")) is not None:
