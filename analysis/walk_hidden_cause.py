@@ -44,7 +44,8 @@ print(diagnosis)
 first = diagnosis.causes[0]
 share = first.parameters.get("share")
 if first.name == "segment_mass" and first.site == "trunk":
-    print(f"\nfound: {100 * share.value:.1f} +- {100 * share.std:.1f} %, hidden: {100 * HIDDEN:.0f} %")
+    low, high = share.interval
+    print(f"\nfound: {100 * share.value:.1f} % [{100 * low:.1f}, {100 * high:.1f}], hidden: {100 * HIDDEN:.0f} %")
 believed, found = fp.Body.from_subject(subject.mass_kg, subject.height_m), diagnosis.model
 print(f"believed body {believed.mass_kg:.1f} kg, extended body {found.mass_kg:.1f} kg")
 
