@@ -6,9 +6,9 @@ from fes_pin.contrasts.grouped import Grouped
 from fes_pin.contrasts.models import ContrastModels, Found
 from fes_pin.contrasts.words import of_cause, of_nominal
 from fes_pin.faults.misread import NAME, Misread
-from fes_pin.infer.distributions import normal_quantile
+from fes_pin.infer.family import least_seen
 from fes_pin.infer.keys import Key
-from fes_pin.infer.levels import CLAIM_LEVEL, IDENTIFIABLE_SHARE, SEEN_POWER
+from fes_pin.infer.levels import CLAIM_LEVEL, IDENTIFIABLE_SHARE
 from fes_pin.infer.result import Change, Evidence, ParameterEstimate
 from fes_pin.models.catalogue import Catalogue
 
@@ -75,8 +75,7 @@ def not_changed(
         For parameters of the model, shares of their values by name; for other causes, sizes in their units by name; and
         the names of parameters and causes whose change is not testable.
     """
-    single = 1.0 - (1.0 - CLAIM_LEVEL) ** (1.0 / models.family.tests)
-    reach, named = normal_quantile(1.0 - 0.5 * single) + normal_quantile(SEEN_POWER), {i.name for i in best.items}
+    reach, named = least_seen(CLAIM_LEVEL, models.family.tests), {i.name for i in best.items}
     values, units, largest, seen = best.values, best.grouped.rig.units(), dict[str, float](), dict[str, str]()
     for one in models.screen.scores(best).scored:
         name, size = one.item.name, reach * one.deviation * math.sqrt(max(one.spread.phi, 1.0))

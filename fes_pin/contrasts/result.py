@@ -6,14 +6,12 @@ from typing import Any, ClassVar
 
 from fes_pin.data.results import Result
 from fes_pin.identify.fit import Fit
-from fes_pin.infer.result import Change, Named, ParameterEstimate, shown
+from fes_pin.infer.result import SEEN, Change, Named, ParameterEstimate, shown
 from fes_pin.infer.text import listed, percent
 from fes_pin.models.assumed import assumed_of
 from fes_pin.models.catalogue import Catalogue, installed
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.stage import Effect
-
-SEEN = "would have been seen in 95 of 100"
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)

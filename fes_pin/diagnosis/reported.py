@@ -9,7 +9,7 @@ import numpy as np
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.decide.chosen_again import share_of
-from fes_pin.diagnosis.decide.rivals import estimates, experiment, not_identifiable, ranking
+from fes_pin.diagnosis.decide.rivals import estimates, experiment, not_identifiable, ranking, seen_sizes
 from fes_pin.diagnosis.errors_ahead import AheadErrors, free_errors, noise_that_is_small
 from fes_pin.diagnosis.estimators import WHITE_PROCESS_NOISE, LeastSquares, WhiteProcessNoise
 from fes_pin.diagnosis.likelihood_models import Found, LikelihoodSearch
@@ -23,7 +23,7 @@ from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.estimators import choose
 from fes_pin.infer.result import CROSS_VALIDATED, FITTED, HELD_OUT, STOPPED, Cause, Gain, Remainder
 from fes_pin.infer.scatter import as_wide_as_estimates_differ, as_wide_as_trials_differ, with_honest_intervals
-from fes_pin.infer.verdict import word_of
+from fes_pin.infer.verdict import ADEQUATE, word_of
 from fes_pin.infer.why import why_of
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
@@ -57,9 +57,11 @@ def diagnosis_of(
     causes.sort(key=lambda c: -c.gain_held_out.percent)
     said = (*words_of_reading(best.noise, best.model.rig, trials[0]), *_words_of_far(search.models, found.nominal))
     reached = [e for e in (fitted[1].free, held and held[1].free) if e is not None]
+    word, models = word_of(bool(causes), left), search.models
+    seen = seen_sizes(best, models.library.scores(found.nominal), models.family.tests) if word == ADEQUATE else {}
     return Diagnosis(
         study=study,
-        verdict=word_of(bool(causes), left),
+        verdict=word,
         causes=tuple(causes),
         remainder=left,
         absorbed=not_identifiable(best, search.models.scored(found), search.models.library.not_excited()),
@@ -72,6 +74,7 @@ def diagnosis_of(
         ranking=ranking(best, found.rivals),
         held_out_by=on,
         warnings=(*said, WHITE_PROCESS_NOISE) if best.noise.timed else said,
+        seen=seen,
         random=state.weighed.random,
         is_driven=search.models.judged_s is not None,
         reason=left.reason if not left.unexplained or state.weighed.is_moved else UNMOVED,

@@ -13,7 +13,7 @@ from fes_pin.diagnosis.experiment import NextExperiment
 from fes_pin.identify.error_measures import FREE, ONE_STEP
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.stored import log_table, stored_tables
-from fes_pin.infer.result import FITTED, STOPPED, Explained, ParameterEstimate, Ranked, shown
+from fes_pin.infer.result import FITTED, SEEN, STOPPED, Explained, ParameterEstimate, Ranked, shown
 from fes_pin.infer.text import percent
 from fes_pin.models.assumed import assumed_of
 from fes_pin.models.catalogue import Catalogue, installed
@@ -46,6 +46,8 @@ class Diagnosis(ModelResult):
         Samples taken for spikes, by trial and column; in `study` they are interpolated.
     catalogue
         The causes that were searched, as far as the rig can have them.
+    seen
+        Of an adequate model, for each cause the size of its first amplitude above which it would have been named.
     random, ahead
         Of a driven rig: its process noise, and its errors by horizon.
     log
@@ -62,6 +64,7 @@ class Diagnosis(ModelResult):
     held_out_by: str
     left_out: Mapping[str, Mapping[str, tuple[int, ...]]] = field(default_factory=dict)
     catalogue: Catalogue = field(default_factory=installed)
+    seen: Mapping[str, ParameterEstimate] = field(default_factory=dict)
     random: tuple[RandomPart, ...] = ()
     ahead: AheadErrors | None = None
     log: Log = field(default_factory=Log)
@@ -132,6 +135,7 @@ class Diagnosis(ModelResult):
                 ("looked for as well", f"{', '.join(names)}, code of {Path(where).name}")
                 for where, names in self.catalogue.origins().items()
             ),
+            (f"absent ({SEEN} beyond)", ", ".join(f"{n} {p.value:.2g} {p.unit}".strip() for n, p in self.seen.items())),
             ("not testable here", ", ".join(self.absorbed)),
         ]
         return [(topic, words) for topic, words in topics if words] + super().notes()
@@ -145,7 +149,14 @@ class Diagnosis(ModelResult):
         left_out = {t: {n: len(k) for n, k in columns.items()} for t, columns in self.left_out.items()}
         noise = {n: {"std": shown(m.std), "ar": [shown(a) for a in m.ar]} for n, m in self.extended.noise.items()}
         library = {Path(where).name: names for where, names in self.catalogue.origins().items()}
-        own = {"left_out_samples": left_out, "reason": self.reason, "log": log_table(self.log), "library": library}
+        seen = {n: {"size": shown(p.value), "unit": p.unit} for n, p in self.seen.items()}
+        own = {
+            "absent_beyond": seen,
+            "left_out_samples": left_out,
+            "reason": self.reason,
+            "log": log_table(self.log),
+            "library": library,
+        }
         models = self.models_record(self._model("nominal"), self._model("extended"), noise)
         return {**models, **{n: value for n, value in own.items() if value}, **self._ahead_record()}
 

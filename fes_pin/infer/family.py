@@ -9,7 +9,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fes_pin.infer.distributions import chi2_tail
+from fes_pin.infer.distributions import chi2_tail, normal_quantile
+from fes_pin.infer.levels import SEEN_POWER
 
 DRAWS = 4000
 """Simulated score vectors; the 5 % quantile of the smallest p-value then has a standard error of 7 %."""
@@ -71,6 +72,12 @@ class SimulatedFamily:
         if gain <= 0.0:
             return 1.0
         return max(float(-np.expm1(-np.exp(-(gain - self.place) / self.scale))), SMALLEST_P)
+
+
+def least_seen(level: float, tests: float) -> float:
+    """Return the size, in standard deviations, that a family of tests at a level finds with the power `SEEN_POWER`."""
+    single = 1.0 - (1.0 - level) ** (1.0 / tests)
+    return normal_quantile(1.0 - 0.5 * single) + normal_quantile(SEEN_POWER)
 
 
 def _effective_tests(gram: np.ndarray, blocks: Sequence[slice], seed: int) -> float:

@@ -14,6 +14,8 @@ from fes_pin.infer.text import percent, probability, quantity
 
 CELLS = ("value", "std", "unit", "low", "high", "at_bound")
 """Columns of tables of estimates; `low` and `high` are the ends of the 95 % interval."""
+SEEN = "would have been seen in 95 of 100"
+"""What is said of a size that a test finds with the power `levels.SEEN_POWER`."""
 DIGITS = 6
 """Significant digits printed: the last that does not depend on how sums are ordered."""
 

@@ -19,6 +19,8 @@ from fes_pin.infer.result import FITTED, Evidence, Gain, Remainder, p_shown
 from fes_pin.infer.search import M, Search, SearchResult
 from fes_pin.infer.text import WHOLE, probability
 
+ADEQUATE = "adequate"
+"""Verdict on a model without a lack of fit, of which no candidate is named."""
 CLAIMS = {
     "drop_unmoved": "the motion is as likely without the recorded input, so something else moves the system",
     "drop_errors_of_form": "process noise is large, and it gains no more than an error of form may",
@@ -345,4 +347,4 @@ def share_in(found: SearchResult[F], name: str) -> float:
 
 def word_of(has_candidates: bool, lack_of_fit: Remainder) -> str:
     """Return the verdict in a word."""
-    return "causes_found" if has_candidates else "unexplained" if lack_of_fit.unexplained else "adequate"
+    return "causes_found" if has_candidates else "unexplained" if lack_of_fit.unexplained else ADEQUATE
