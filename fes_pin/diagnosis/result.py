@@ -150,13 +150,8 @@ class Diagnosis(ModelResult):
         noise = {n: {"std": shown(m.std), "ar": [shown(a) for a in m.ar]} for n, m in self.extended.noise.items()}
         library = {Path(where).name: names for where, names in self.catalogue.origins().items()}
         seen = {n: {"size": shown(p.value), "unit": p.unit} for n, p in self.seen.items()}
-        own = {
-            "absent_beyond": seen,
-            "left_out_samples": left_out,
-            "reason": self.reason,
-            "log": log_table(self.log),
-            "library": library,
-        }
+        own = {"absent_beyond": seen, "left_out_samples": left_out, "reason": self.reason}
+        own |= {"log": log_table(self.log), "library": library}
         models = self.models_record(self._model("nominal"), self._model("extended"), noise)
         return {**models, **{n: value for n, value in own.items() if value}, **self._ahead_record()}
 
