@@ -6,7 +6,19 @@ from typing import Annotated
 import typer
 
 from fes_pin.cli.group import needs
-from fes_pin.cli.options import Exclude, Force, Libraries, Limit, Seed, Trials, Why, output, study_of
+from fes_pin.cli.options import (
+    Exclude,
+    FailOn,
+    Force,
+    Libraries,
+    Limit,
+    Seed,
+    Trials,
+    Why,
+    fail_on,
+    output,
+    study_of,
+)
 from fes_pin.cli.progress import catalogue_with, print_result, progress, say_whose_code
 
 
@@ -26,6 +38,7 @@ def contrast(
     library: Libraries = None,
     force: Force = False,
     why: Why = None,
+    refused: FailOn = None,
 ) -> None:
     """Say what differs between groups of trials, by how much, and what did not change."""
     from fes_pin.contrasts.contrast import contrast as find
@@ -47,3 +60,4 @@ def contrast(
     say_whose_code(catalogue)
     print_result(found, [line for name in why or () for line in found.explain(name)])
     typer.echo(f"report: {out / 'report.html'}")
+    fail_on(found.verdict, refused)

@@ -12,7 +12,19 @@ from fes_pin.cli.compare import compare
 from fes_pin.cli.contrast import contrast
 from fes_pin.cli.datasets import datasets
 from fes_pin.cli.group import App
-from fes_pin.cli.options import Exclude, Force, Libraries, Limit, Seed, Trials, Why, output, study_of
+from fes_pin.cli.options import (
+    Exclude,
+    FailOn,
+    Force,
+    Libraries,
+    Limit,
+    Seed,
+    Trials,
+    Why,
+    fail_on,
+    output,
+    study_of,
+)
 from fes_pin.cli.out import pulses, urdf
 from fes_pin.cli.own import check, new_study
 from fes_pin.cli.predict import predict
@@ -62,6 +74,7 @@ def diagnose(
     library: Libraries = None,
     force: Force = False,
     why: Why = None,
+    refused: FailOn = None,
 ) -> None:
     """Show what the study's model gets wrong, name the cause, extend the model, measure the gain."""
     from fes_pin.data.outputs import Outputs
@@ -105,6 +118,7 @@ def diagnose(
     outputs.write(out, files, without=old - set(files))  # what an earlier diagnosis proposed is not this one's
     print_result(found, [line for name in why or () for line in found.explain(name)])
     typer.echo(f"report: {out / REPORT_FILE}")
+    fail_on(found.verdict, refused)
 
 
 @app.command()

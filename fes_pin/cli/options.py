@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+import click
 import typer
 
 from fes_pin.data.errors import InputError
@@ -25,10 +26,21 @@ Libraries = Annotated[
 Force = Annotated[bool, typer.Option("--force", help="Write over files that this command did not write as they are.")]
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Of simulated critical values and bootstrap intervals.")]
 Limit = Annotated[float | None, typer.Option("--limit", min=0.0, help="Seconds of a search; then the best set so far.")]
+VERDICTS = ("adequate", "causes_found", "unexplained", "stopped", "changed", "nothing_changed")
+FailOn = Annotated[
+    list[str] | None,
+    typer.Option("--fail-on", help="A verdict with exit code 1; may be repeated.", click_type=click.Choice(VERDICTS)),
+]
 Why = Annotated[list[str] | None, typer.Option("--why", help="A cause: print why it is named, or is not.")]
 
 Trials = Annotated[str | None, typer.Option("--trials", help="Only these trials: a,b, or a* for all that begin so.")]
 Exclude = Annotated[str | None, typer.Option("--exclude", help="All trials but these: a,b, or a*.")]
+
+
+def fail_on(verdict: str, refused: Sequence[str] | None) -> None:
+    """End the command with exit code 1 where its verdict is one of those refused; its files are written by then."""
+    if verdict in (refused or ()):
+        raise typer.Exit(1)
 
 
 def study_of(path: Path, catalogue: Catalogue, trials: str | None = None, exclude: str | None = None) -> Study:

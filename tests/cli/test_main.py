@@ -114,7 +114,8 @@ def test_the_seed_changes_only_what_is_simulated(made):
 
 def test_every_cause_has_an_answer_to_why(made, diagnosis, tmp_path, monkeypatch, capsys):
     words = [word for name in ("coulomb_friction", "sensor_lag", "nonsense") for word in ("--why", name)]
-    assert run(monkeypatch, "diagnose", made / "study", "--out", tmp_path / "why", *words) == 0
+    refused = ("--fail-on", "unexplained", "--fail-on", "causes_found")
+    assert run(monkeypatch, "diagnose", made / "study", "--out", tmp_path / "why", *words, *refused) == 1
     named, other, unknown = capsys.readouterr().out.splitlines()[-4:-1]
     assert named.startswith("coulomb_friction: named (p ") and "twice the log-likelihood" in named
     assert other.startswith("sensor_lag: ") and diagnosis.explain("sensor_lag") == [other]
@@ -129,18 +130,36 @@ def test_every_cause_has_an_answer_to_why(made, diagnosis, tmp_path, monkeypatch
     assert "Why these, and no others" in (tmp_path / "why/report.html").read_text()
 
 
+def test_a_verdict_that_does_not_exist_is_refused_before_any_work(made, tmp_path, monkeypatch, capsys):
+    asked = ("diagnose", made / "study", "--out", tmp_path / "no", "--fail-on", "wrong")
+    assert run(monkeypatch, *asked) == 2
+    assert "causes_found" in capsys.readouterr().err and not (tmp_path / "no").exists()
+
+
 def test_the_record_is_as_the_contract_says(made):
     found = json.loads((made / "one/diagnosis.json").read_text())
     assert list(found) == [
-        *("study", "verdict", "causes", "remainder", "explained", "absorbed", "nominal", "extended", "noise"),
+        *(
+            "study",
+            "verdict",
+            "causes",
+            "remainder",
+            "explained",
+            "next",
+            "assumed",
+            "absorbed",
+            "nominal",
+            "extended",
+            "noise",
+        ),
         *("ceiling_percent", "next_experiment", "horizon_s", "why", "warnings", "wall_s", "provenance", *SAVED),
     ]
     (cause,) = found["causes"]
     assert list(cause) == ["name", "stage", "parameters", "equivalents", "p_value", "gain_percent", "judged_by"]
     assert cause["name"] == "coulomb_friction" and cause["stage"] == "joint"
-    assert set(cause["parameters"]["torque_nm"]) == {"value", "std"}
+    assert set(cause["parameters"]["torque_nm"]) == {"value", "std", "low", "high"}
     assert set(cause["gain_percent"]) == {"fit", "held_out", "ci95"}
-    assert set(found["remainder"]) == {"unexplained", "p_value", "where"}
+    assert set(found["remainder"]) == {"unexplained", "p_value", "level", "where"}
     assert set(found["noise"]) == {"angle_rad", "force_n"}
     assert found["extended"]["error_percent"]["held_out"] < found["nominal"]["error_percent"]["held_out"]
     before, after = (found[which]["error_percent"] for which in ("nominal", "extended"))
