@@ -9,11 +9,11 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import click
 import typer
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import number_in
+from fes_pin.data.schema import one_of
 
 if TYPE_CHECKING:
     from fes_pin.data.study import Study
@@ -27,9 +27,17 @@ Force = Annotated[bool, typer.Option("--force", help="Write over files that this
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Of simulated critical values and bootstrap intervals.")]
 Limit = Annotated[float | None, typer.Option("--limit", min=0.0, help="Seconds of a search; then the best set so far.")]
 VERDICTS = ("adequate", "causes_found", "unexplained", "stopped", "changed", "nothing_changed")
+
+
+def _verdicts(words: list[str] | None) -> list[str] | None:
+    for word in words or ():
+        one_of(word, VERDICTS, lambda message: InputError(message, column="--fail-on"))
+    return words
+
+
 FailOn = Annotated[
     list[str] | None,
-    typer.Option("--fail-on", help="A verdict with exit code 1; may be repeated.", click_type=click.Choice(VERDICTS)),
+    typer.Option("--fail-on", help="A verdict with exit code 1; may be repeated.", callback=_verdicts),
 ]
 Why = Annotated[list[str] | None, typer.Option("--why", help="A cause: print why it is named, or is not.")]
 
