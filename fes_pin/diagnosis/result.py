@@ -123,7 +123,7 @@ class Diagnosis(ModelResult):
             ("noise of the readings alone", f"E {percent(self.ceiling_percent)}"),
             ("falls", "by itself: free errors are meaningless" if self.is_falling else ""),
             *((f"random {r.name}", r.words(unit)) for r in self.random),
-            ("lack of fit", self.reason or f"{state} ({left.tested()}{where})"),
+            ("lack of fit", self.reason or f"{state} ({left.tested()}{where}){self._left()}"),
             ("left out as spikes", left_out_text(self.left_out, self.study.trials)),
             *(
                 (f"{c.name} chosen again", f"in {k[0]} of {k[1]} folds, each without its trials")
@@ -139,6 +139,13 @@ class Diagnosis(ModelResult):
             ("not testable here", ", ".join(self.absorbed)),
         ]
         return [(topic, words) for topic, words in topics if words] + super().notes()
+
+    def _left(self) -> str:
+        """Return how large a lack of fit is: what the extended model leaves of what counts, and what of it is noise."""
+        if not self.remainder.unexplained or (one := self.explained) is None:
+            return ""
+        noise = "" if one.noise is None else f", noise alone {percent(one.noise)}"
+        return f": E of {one.what} {percent(one.extended)} stays{noise}"
 
     def files(self) -> dict[str, str | bytes]:
         """Return the content of every file of the diagnosis but the report, by name: with the extended model."""
