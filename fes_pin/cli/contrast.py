@@ -38,7 +38,7 @@ def contrast(
     library: Libraries = None,
     force: Force = False,
     why: Why = None,
-    refused: FailOn = None,
+    fail: FailOn = None,
 ) -> None:
     """Say what differs between groups of trials, by how much, and what did not change."""
     from fes_pin.contrasts.contrast import contrast as find
@@ -60,4 +60,4 @@ def contrast(
     say_whose_code(catalogue)
     print_result(found, [line for name in why or () for line in found.explain(name)])
     typer.echo(f"report: {out / 'report.html'}")
-    fail_on(found.verdict, refused)
+    fail_on(found.verdict, fail)

@@ -74,7 +74,7 @@ def diagnose(
     library: Libraries = None,
     force: Force = False,
     why: Why = None,
-    refused: FailOn = None,
+    fail: FailOn = None,
 ) -> None:
     """Show what the study's model gets wrong, name the cause, extend the model, measure the gain."""
     from fes_pin.data.outputs import Outputs
@@ -118,7 +118,7 @@ def diagnose(
     outputs.write(out, files, without=old - set(files))  # what an earlier diagnosis proposed is not this one's
     print_result(found, [line for name in why or () for line in found.explain(name)])
     typer.echo(f"report: {out / REPORT_FILE}")
-    fail_on(found.verdict, refused)
+    fail_on(found.verdict, fail)
 
 
 @app.command()

@@ -45,9 +45,9 @@ Trials = Annotated[str | None, typer.Option("--trials", help="Only these trials:
 Exclude = Annotated[str | None, typer.Option("--exclude", help="All trials but these: a,b, or a*.")]
 
 
-def fail_on(verdict: str, refused: Sequence[str] | None) -> None:
-    """End the command with exit code 1 where its verdict is one of those refused; its files are written by then."""
-    if verdict in (refused or ()):
+def fail_on(verdict: str, failures: Sequence[str] | None) -> None:
+    """End the command with exit code 1 where its verdict is one of the failures; its files are written by then."""
+    if verdict in (failures or ()):
         raise typer.Exit(1)
 
 
