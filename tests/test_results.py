@@ -1,6 +1,7 @@
 """Every result: read-only, equal to its copies, shown as a table, saved as JSON and loaded, sent through pools."""
 
 import copy
+import html
 import json
 import multiprocessing
 import pickle
@@ -173,7 +174,7 @@ def test_what_is_saved_is_loaded_as_it_was(made, kind, tmp_path):
         assert copied == found
     with pytest.raises(TypeError):
         loaded.found["verdict"] = "adequate"
-    assert str(loaded).split("\n")[0] in loaded._repr_html_().replace("&#x27;", "'") or kind == "Diagnosis"
+    assert str(loaded).split("\n")[0] in html.unescape(loaded._repr_html_()) or kind == "Diagnosis"
     pytest.importorskip("pandas")
     assert loaded.to_frame().shape == found.to_frame().shape
 

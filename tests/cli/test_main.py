@@ -114,6 +114,7 @@ def test_the_seed_changes_only_what_is_simulated(made):
 
 def test_every_cause_has_an_answer_to_why(made, diagnosis, tmp_path, monkeypatch, capsys):
     words = [word for name in ("coulomb_friction", "sensor_lag", "nonsense") for word in ("--why", name)]
+    monkeypatch.setenv("COLUMNS", "1000")
     refused = ("--fail-on", "unexplained", "--fail-on", "causes_found")
     assert run(monkeypatch, "diagnose", made / "study", "--out", tmp_path / "why", *words, *refused) == 1
     named, other, unknown = capsys.readouterr().out.splitlines()[-4:-1]
