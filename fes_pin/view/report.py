@@ -128,7 +128,7 @@ def _named(result: Result) -> list[Markup]:
     if not gains:
         return [table, *cards]
     drawn = intervals_drawing([(n, g.percent, g.low, g.high, s) for n, g, s in gains], f"{head[3]} (%)", (0.0, 100.0))
-    caption = "Lost without a cause, with the 95 % interval: percent of the nominal model's squared error above the noise."
+    caption = "Lost without a cause, with the 95 % interval: percent of the nominal squared error above the noise."
     return [table, figure(drawn, caption, "narrow", "gains"), *cards]
 
 
