@@ -51,12 +51,17 @@ class GroupConditions(Conditions[Grouped, ContrastModels]):
 
 
 def noise_in_groups(models: ContrastModels, found: Found, log: Log, recorded: Sequence[Trial]) -> Fault | None:
-    """Return the noise of efforts that was removed before the search, with a fit to the efforts as recorded."""
+    """Return the noise of efforts that was removed before the search, with a fit to the efforts as recorded.
+
+    It is None where none was removed, and where no time is left.
+    """
     if not log.effort_noise:
         return None
     best = found.best
     fits = GroupedFits(models.nominal_model, in_groups(recorded), best.is_driven)
-    bare = attempted(lambda: fits.again(best), best)
+    bare = attempted(lambda: fits.again(best), None)
+    if bare is None:
+        return None
     unit = models.nominal_model.rig.units()["effort"]
     words = words_of_noise(log.effort_noise, unit)
     return Fault(EFFORT_NOISE, replace(log, effort_noise=0.0), log, bare.sse - best.sse, words, bare)

@@ -105,11 +105,11 @@ class LikelihoodModels(LikelihoodFits):
         acting = self.with_process_noise(calm)
         if not acting.criterion < calm.criterion:
             return False
-        self.calm, self.noise, self.fits = {**self.fits, names: acting}, PROCESS, {}
+        further = {names: acting} if names else {}
+        self.calm, self.noise, self.fits = {**self.fits, **further}, PROCESS, {}
         self._converged, self._begun, self._compared, self._calm = set(), set(), {}, None
         self.nominal()
-        if names:
-            self.fits[names] = acting
+        self.fits |= further
         return True
 
 

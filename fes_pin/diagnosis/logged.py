@@ -48,15 +48,20 @@ class LogFaults(EffortNoise):
         return Fault(LOW_PASS, answer.log, log, gain, words_of_low_pass(hz, names))
 
     def effort_noise(self, answer: Diagnosis) -> Fault | None:
-        """Return the noise of efforts; None where the answer has no lack of fit or cause that it may explain."""
+        """Return the noise of efforts; None where the answer has no lack of fit or cause that it may explain.
+
+        It is None too where no time is left to estimate it.
+        """
         fitted, noise, bare = answer.extended, answer.log.effort_noise, None
         if noise:
-            bare = self.in_time(lambda: maximum_from(fitted, self.prepared(self.trials)), fitted)
+            bare = self.in_time(lambda: maximum_from(fitted, self.prepared(self.trials)), None)
+            if bare is None:
+                return None
             gain = bare.sse - fitted.sse
-        elif answer.verdict == "adequate":
+        elif answer.verdict == "adequate" or (found := self.in_time(lambda: self.of(fitted), None)) is None:
             return None
         else:
-            noise, gain = self.in_time(lambda: self.of(fitted), (0.0, 0.0))
+            noise, gain = found
         plain, log = (replace(answer.log, effort_noise=one) for one in (0.0, noise))
         words = words_of_noise(noise, answer.model.rig.units()["effort"])
         return Fault(EFFORT_NOISE, plain, log, gain, words, bare)
