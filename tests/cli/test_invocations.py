@@ -179,6 +179,8 @@ def stubs(monkeypatch, inputs):
 class Told(str):
     """A result that says how it was asked for."""
 
+    verdict = "nothing_changed"
+
     def as_table(self):
         return self, (), (), ()
 

@@ -46,7 +46,9 @@ def test_the_record_says_so(diagnosis, tmp_path):
     assert diagnosis.record()["causes"][0]["parameters"]["torque_nm"] == known
     extended = diagnosis.record()["extended"]["parameters"]
     assert extended["coulomb_friction.torque_nm"]["at_bound"] and extended["coulomb_friction.torque_nm"]["std"] is None
-    assert set(extended["gain"]) == {"value", "std"} and extended["gain"]["std"] > 0.0
+    gain = extended["gain"]
+    assert set(gain) == {"value", "std", "low", "high"} and gain["std"] > 0.0
+    assert gain["low"] < gain["value"] < gain["high"]
     fp.save_result(diagnosis, tmp_path / "d.json")
     assert fp.load_result(tmp_path / "d.json").causes[0]["parameters"]["torque_nm"]["at_bound"] is True
 

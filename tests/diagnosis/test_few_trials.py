@@ -39,7 +39,8 @@ def test_the_headline_says_how_much_is_explained():
     diagnosis = diagnose_joint(study)
     first, gain = str(diagnosis).splitlines()[0], diagnosis.explained
     assert first.startswith(f"{study.name}: the model lacks coulomb friction: that explains ")
-    assert f"{100.0 * (1.0 - gain.extended / gain.nominal):.0f} % of the squared error of {gain.what}" in first
+    share = 100.0 * (gain.nominal - gain.extended) / (gain.nominal - min(gain.noise, gain.extended))
+    assert f"{share:.0f} % of the squared error above the noise of {gain.what}" in first
     assert any("rest on 4 trials" in w for w in diagnosis.warnings)
 
 
