@@ -12,7 +12,7 @@ from fes_pin.diagnosis.decide.chosen_again import share_of
 from fes_pin.diagnosis.decide.rivals import estimates, experiment, not_identifiable, ranking, seen_sizes
 from fes_pin.diagnosis.errors_ahead import AheadErrors, free_errors, noise_that_is_small
 from fes_pin.diagnosis.estimators import WHITE_PROCESS_NOISE, LeastSquares, WhiteProcessNoise
-from fes_pin.diagnosis.likelihood_models import Found, LikelihoodSearch
+from fes_pin.diagnosis.likelihood_models import Found, LikelihoodModels, LikelihoodSearch
 from fes_pin.diagnosis.rejected import UNMOVED
 from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.diagnosis.verdict import RigState, RigVerdict
@@ -21,7 +21,7 @@ from fes_pin.identify.fit import rough_noise
 from fes_pin.identify.likelihood import is_simulated
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.estimators import choose
-from fes_pin.infer.result import CROSS_VALIDATED, FITTED, HELD_OUT, STOPPED, Cause, Gain, Remainder
+from fes_pin.infer.result import CROSS_VALIDATED, FITTED, HELD_OUT, STOPPED, Cause, Gain, ParameterEstimate, Remainder
 from fes_pin.infer.scatter import as_wide_as_estimates_differ, as_wide_as_trials_differ, with_honest_intervals
 from fes_pin.infer.verdict import ADEQUATE, word_of
 from fes_pin.infer.why import why_of
@@ -57,8 +57,7 @@ def diagnosis_of(
     causes.sort(key=lambda c: -c.gain_held_out.percent)
     said = (*words_of_reading(best.noise, best.model.rig, trials[0]), *_words_of_far(search.models, found.nominal))
     reached = [e for e in (fitted[1].free, held and held[1].free) if e is not None]
-    word, models = word_of(bool(causes), left), search.models
-    seen = seen_sizes(best, models.library.scores(found.nominal), models.family.tests) if word == ADEQUATE else {}
+    word = word_of(bool(causes), left)
     return Diagnosis(
         study=study,
         verdict=word,
@@ -74,13 +73,18 @@ def diagnosis_of(
         ranking=ranking(best, found.rivals),
         held_out_by=on,
         warnings=(*said, WHITE_PROCESS_NOISE) if best.noise.timed else said,
-        seen=seen,
+        seen=_seen(search.models, found.nominal) if word == ADEQUATE else {},
         random=state.weighed.random,
         is_driven=search.models.judged_s is not None,
         reason=left.reason if not left.unexplained or state.weighed.is_moved else UNMOVED,
         why=why_of(state),
         ahead=AheadErrors(search.models.horizon_s, *fitted, *(held or (None, None))),
     )
+
+
+def _seen(models: LikelihoodModels, nominal: LikelihoodFit) -> dict[str, ParameterEstimate]:
+    """Return the size of each cause above which a search would have named it, where the nominal model is adequate."""
+    return seen_sizes(nominal, models.library.scores(nominal), models.family.tests)
 
 
 def _with_intervals(state: RigState, other: LikelihoodFit | None) -> LikelihoodFit:

@@ -95,14 +95,19 @@ class Conditions(ABC, Generic[F, M]):
             return made.search, made.searched, made
         search, searched = self.run(list(trials))
         if made is None and not search.was_stopped:
-            # the trial is restated that is an outlier under the causes found, if that explains it
-            misread = self._misread(trials, searched) if searched.without else first
-            made = None if misread is None else self._restated(trials, misread)
-            made = made if made is not None and self.is_explained(made) else None
+            made = self._under_causes(trials, searched, first)
         if made is None or search.was_stopped or made.search.was_stopped:
             return search, searched, None
         named = self._tested(made, trials, searched).is_named
         return (made.search, made.searched, made) if named else (search, searched, None)
+
+    def _under_causes(
+        self, trials: Sequence[Trial], searched: SearchResult[F], first: Misread | None
+    ) -> Restated[F, M] | None:
+        """Return the search with the trial restated that is an outlier under the causes found, if that explains it."""
+        misread = self._misread(trials, searched) if searched.without else first
+        made = None if misread is None else self._restated(trials, misread)
+        return made if made is not None and self.is_explained(made) else None
 
     def _tested(self, made: Restated[F, M], trials: Sequence[Trial], searched: SearchResult[F] | None) -> Correction:
         """Return the test of a misreading, one condition among all that are stated."""
