@@ -73,7 +73,7 @@ def diagnosis_of(
         ranking=ranking(best, found.rivals),
         held_out_by=on,
         warnings=(*said, WHITE_PROCESS_NOISE) if best.noise.timed else said,
-        seen=_seen(search.models, found.nominal) if word == ADEQUATE else {},
+        seen=_seen(search.models, found.nominal, word),
         random=state.weighed.random,
         is_driven=search.models.judged_s is not None,
         reason=left.reason if not left.unexplained or state.weighed.is_moved else UNMOVED,
@@ -82,8 +82,10 @@ def diagnosis_of(
     )
 
 
-def _seen(models: LikelihoodModels, nominal: LikelihoodFit) -> dict[str, ParameterEstimate]:
-    """Return the size of each cause above which a search would have named it, where the nominal model is adequate."""
+def _seen(models: LikelihoodModels, nominal: LikelihoodFit, verdict: str) -> dict[str, ParameterEstimate]:
+    """Return the size of each cause above which a search would have named it; none of a model that is not adequate."""
+    if verdict != ADEQUATE:
+        return {}
     return seen_sizes(nominal, models.library.scores(nominal), models.family.tests)
 
 
