@@ -30,7 +30,7 @@ def test_a_gain_is_measured_against_a_constant_the_nominal_model_and_the_noise()
 
 
 def test_a_gain_is_one_share_with_the_errors_that_it_is_of():
-    """Once "100 %, 0 % stays" stood beside E 5.9 -> 4.3 %; then two shares stood in one sentence."""
+    """A sentence with a second share, of another reference, was read as a contradiction."""
     words = str(Explained("predictions 0.3 s ahead", CROSS_VALIDATED, 5.9, 4.3, 4.5))
     share, errors = words.split(": ")
     assert share == "100 % of the squared error above the noise of predictions 0.3 s ahead"

@@ -130,9 +130,9 @@ def _size_in_group(change: Change) -> str:
     """Return a change in a few words: its name, its group, and its first value there and elsewhere."""
     groups = dict(next(iter(change.parameters.values())))
     here, name = groups.pop(change.group), change.name.replace("_", " ")
-    from_ = [f"{one.value:.3g} -> " for one in groups.values()][:1]
+    before = [f"{one.value:.3g} -> " for one in groups.values()][:1]
     where = change.group if change.trial is None else f"trial {change.trial}"
-    return f"{name} in {where} ({''.join(from_)}{here.value:.3g} {here.unit}".rstrip() + ")"
+    return f"{name} in {where} ({''.join(before)}{here.value:.3g} {here.unit}".rstrip() + ")"
 
 
 def _shares(shares: Mapping[str, float]) -> str:

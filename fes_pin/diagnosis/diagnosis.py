@@ -135,7 +135,7 @@ class _Work:
         faults = LogFaults(study.trials, lambda trials: _searched(study, trials, driven), self.end)
         answer = self._logged(study, Log(effort_noise=faults.of_nominal(nominal)) if logged else Log())
         tests = list[Correction]()
-        for estimate in ASKED_OF_EFFORTS if logged else () if driven else ASKED_OF_READINGS:
+        for estimate in ASKED_OF_EFFORTS if logged else ASKED_OF_READINGS:
             fault = None if self.stops else estimate(faults, answer)
             if fault is not None:
                 again = partial(self._logged, study)

@@ -54,7 +54,8 @@ class LogFault(Generic[A]):
     ) -> tuple[R, Correction]:
         """Return the answer with or without the fault, and the test of the fault.
 
-        A fault that was corrected before any cause was searched must be significant given the causes as well.
+        A fault that was corrected before any cause was searched must be significant given the causes as well. Its
+        answer is compared with the same causes under the log without it.
 
         Parameters
         ----------

@@ -113,7 +113,7 @@ def sets_of(record: Mapping[str, Any]) -> tuple[tuple[str, ...], ...]:
 
 
 def _is_left(remainder: Mapping[str, Any]) -> bool:
-    """Whether something is left; an error that all groups share is no change, and is left to a diagnosis."""
+    """Whether there is a lack of fit. One that all groups share is no change, and does not count."""
     return bool(remainder["unexplained"] and not remainder.get("in_every_group", False))
 
 
