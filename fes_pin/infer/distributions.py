@@ -15,6 +15,11 @@ def normal_quantile(p: float) -> float:
     return float(special.ndtri(p))
 
 
+def normal_tail(x: float) -> float:
+    """Return P(X > x) for the standard normal distribution."""
+    return float(special.ndtr(-x))
+
+
 def chi2_tail(x: Any, degrees: float) -> Any:
     """Return P(X > x) for a chi-square distribution; numbers or arrays of any shape."""
     return special.gammaincc(0.5 * degrees, np.maximum(x, 0.0) * 0.5)

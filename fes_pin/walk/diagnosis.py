@@ -149,8 +149,8 @@ def _judged(study: Study, search: WalkSearch, found: SearchResult[WalkFit]) -> W
     state = verdict.of(found)
     found, left, errors = state.found, verdict.lack_of_fit(state), verdict.errors
     causes = [verdict.cause(state, n) for n in found.best.names]
-    noise = marker_noise(models.designs)
-    causes += [noise] if noise is not None and noise.name not in {c.name for c in causes} else []
+    noise = [one] if (one := marker_noise(models.designs)) is not None else []
+    causes += [cause for fault, cause in noise if fault.is_named and fault.name not in {c.name for c in causes}]
     causes.sort(key=lambda c: (c.gain_held_out.is_none, -c.gain_held_out.percent))
     in_a_set = {n for c in causes for n in (c.name, *c.equivalents)}  # these may be the true causes
     return WalkDiagnosis(
@@ -167,5 +167,5 @@ def _judged(study: Study, search: WalkSearch, found: SearchResult[WalkFit]) -> W
         models=models,
         best=found.best,
         warnings=tuple(models.designs.stated.contradictions(study)),
-        why=why_of(state),
+        why=replace(why_of(state), corrections=tuple(fault for fault, _ in noise)),
     )

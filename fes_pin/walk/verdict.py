@@ -3,8 +3,9 @@
 from dataclasses import replace
 from functools import cache, partial
 
-from fes_pin.infer.distributions import chi2_tail, normal_quantile
-from fes_pin.infer.levels import CLAIM_LEVEL
+from fes_pin.infer.corrected import Correction
+from fes_pin.infer.distributions import normal_tail
+from fes_pin.infer.levels import CLAIM_LEVEL, PARAMETER_PENALTY, SEPARABLE
 from fes_pin.infer.result import FITTED, NO_GAIN, Cause, Evidence, ParameterEstimate, Remainder
 from fes_pin.infer.search import SearchResult
 from fes_pin.infer.text import listed
@@ -18,8 +19,6 @@ from fes_pin.walk.white_noise import white_noise
 
 ORDINARY_MM = 2.0
 """Marker noise up to this is no cause: cameras and fixations have it (L. Chiari et al., Gait Posture 21, 2005)."""
-SURELY = normal_quantile(1.0 - CLAIM_LEVEL)
-"""Standard deviations by which marker noise must exceed that."""
 
 
 Judgement = State[WalkFit, WalkModels, Weighed]
@@ -101,24 +100,28 @@ def _on_other_leg(models: WalkModels, name: str) -> float | None:
     return None if of_none else other_leg(models.designs, models.fit((name,)))
 
 
-def marker_noise(designs: Designs) -> Cause | None:
-    """Return white noise on the coordinates above that of cameras, from differences between strides; else None.
+def marker_noise(designs: Designs) -> tuple[Correction, Cause] | None:
+    """Return white noise on the coordinates as a fault of the record, and as a cause; None of a single stride.
 
-    It is judged by its size and by the likelihood of these differences, as no model of the mean stride predicts it.
+    The test is that of noise above that of cameras. The noise is estimated from differences between strides, which no
+    model of the mean stride predicts, so that its likelihood is that of these differences.
     """
-    level, std, saved = white_noise(designs) or (0.0, 0.0, 0.0)
-    evidence = Evidence(saved, saved, FITTED)
-    if level - SURELY * std < ORDINARY_MM or evidence.low < 0.0:
+    if (estimated := white_noise(designs)) is None:
         return None
-    return Cause(
-        name="marker_noise",
+    level, std, saved = estimated
+    beyond = normal_tail((level - ORDINARY_MM) / std) if level > ORDINARY_MM else 1.0
+    words = f"white noise of {level:.2g} mm on the coordinates"
+    fault = Correction("marker_noise", beyond, CLAIM_LEVEL, words, saved - PARAMETER_PENALTY, SEPARABLE)
+    cause = Cause(
+        name=fault.name,
         stage=STAGE,
         site="white",
         parameters={"markers_m": ParameterEstimate(1e-3 * level, 1e-3 * std, "m")},
         equivalents=(),
-        p_value=float(chi2_tail(saved, 1)),
+        p_value=fault.p_value,
         gain_fit=NO_GAIN.percent,
         gain_held_out=NO_GAIN,
-        evidence=evidence,
+        evidence=replace(Evidence.of(saved), on=FITTED),
         further={"other_leg": None},
     )
+    return fault, cause

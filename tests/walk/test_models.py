@@ -89,13 +89,18 @@ def test_what_strides_held_out_do_not_bear_out_is_refused(models):
 
 
 def test_marker_noise_has_no_gain_where_none_is_computed(gait, tmp_path):
-    loud = marker_noise(models_of(gait, tmp_path, 5, "marker_noise", "", 0.008, strides=4).designs)
-    assert loud is not None
+    fault, loud = marker_noise(models_of(gait, tmp_path, 5, "marker_noise", "", 0.008, strides=4).designs)
+    assert fault.is_named and fault.p_value == loud.p_value < fault.level
     assert loud.gain_held_out.is_none and loud.evidence.low > 0.0
     assert loud.record()["gain_percent"] == {"fit": None, "held_out": None, "ci95": None, "other_leg": None}
     found = loud.parameters["markers_m"]
     assert found.unit == "m" and found.value == pytest.approx(0.008, abs=3.0 * found.std)
 
 
-def test_ordinary_marker_noise_is_no_cause(models):
-    assert marker_noise(models.designs) is None
+def test_ordinary_marker_noise_is_no_fault_and_its_test_is_listed(models):
+    fault, _ = marker_noise(models.designs)
+    assert not fault.is_named and fault.p_value > fault.level
+
+
+def test_a_single_stride_shows_no_marker_noise(gait, tmp_path):
+    assert marker_noise(models_of(gait, tmp_path, 5, strides=1).designs) is None
