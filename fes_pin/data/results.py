@@ -262,6 +262,7 @@ class Result(Saveable):
             f"{self.KIND.__name__.lower()}s": [one.record() for one in self.causes],
             "remainder": self.remainder.record(),
             **({"explained": self.explained.record()} if self.explained else {}),
+            **({"errors": [one.errors() for one in errors]} if (errors := self.errors()) else {}),
             "next": self.advice(),
             "assumed": self.assumed(),
             **self.own_record(),

@@ -289,6 +289,11 @@ class Explained:
         errors = f"E {percent(self.nominal)} -> {percent(self.extended)}, {ON[self.on]}"
         return f"{share} of the squared error{above} of {self.what}: {errors}{alone}"
 
+    def errors(self) -> dict[str, Any]:
+        """Return the errors of both models as JSON files have them, with their measure and data."""
+        measure = {"measure": f"squared error of {self.what}", "on": self.on}
+        return {**measure, "nominal": shown(self.nominal), "extended": shown(self.extended)}
+
     def record(self) -> dict[str, Any]:
         """As JSON files have it."""
         errors = {n: shown(getattr(self, n)) for n in ("constant", "nominal", "extended", "noise")}

@@ -146,6 +146,7 @@ def test_the_record_is_as_the_contract_says(made):
             "causes",
             "remainder",
             "explained",
+            "errors",
             "next",
             "assumed",
             "absorbed",

@@ -1,0 +1,1 @@
+"""Numbers of answers: those that are printed, compared with those that are saved."""
