@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+import re
 import shutil
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from fes_pin.cli.group import VOICE, remark
 
@@ -56,24 +57,55 @@ def progress(every_s: float = math.inf) -> Iterator[Callable[[float, str], None]
         yield lambda share, words: bar.update(task, completed=share, description=words)
 
 
+PIECES = re.compile(r"\[[^\]]*\]|\S+")
+"""What stays on one line of a cell: an interval, or a word."""
+ASIDE = "equivalents"
+"""Column that becomes a line below a table that is wider than the terminal."""
+
+
 def print_result(found: Saveable, notes: Sequence[str] = ()) -> None:
     """Print a result as a table, and further notes: as wide as the terminal, in a pipe as `COLUMNS`, or 80, says.
 
-    No cell is cut, and names of causes stay whole.
+    No cell is cut; names of causes and intervals stay whole.
     """
-    from rich import box
     from rich.console import Console
-    from rich.table import Column, Table
     from rich.text import Text
 
     title, head, rows, own = found.as_table()
     console = Console(width=shutil.get_terminal_size().columns, highlight=False)
     console.print(Text(title, style="bold"))
     if rows:
-        columns = [Column(name, overflow="fold", no_wrap=not k) for k, name in enumerate(head)]
-        table = Table(*columns, box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False)
-        for row in rows:
-            table.add_row(*map(Text, row))
+        table = _table(head, rows)
+        if console.measure(table, options=console.options.update(max_width=10**4)).maximum > console.width:
+            table = _narrow_table(head, rows)
+            own = [*_aside(head, rows), *own]
         console.print(table)
     for note in (*own, *notes):
         console.print(Text(note))
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> Any:
+    """Return a table for the terminal; no column is narrower than its longest piece."""
+    from rich import box
+    from rich.table import Column, Table
+    from rich.text import Text
+
+    longest = [max(len(p) for cell in column for p in PIECES.findall(cell)) for column in zip(head, *rows, strict=True)]
+    columns = [Column(n, overflow="fold", no_wrap=not k, min_width=longest[k]) for k, n in enumerate(head)]
+    table = Table(*columns, box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False)
+    for row in rows:
+        table.add_row(*map(Text, row))
+    return table
+
+
+def _narrow_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> Any:
+    """Return a table with every interval on a line of its own, and without the equivalents."""
+    kept = [k for k, name in enumerate(head) if name != ASIDE]
+    return _table([head[k] for k in kept], [[row[k].replace(" [", "\n[") for k in kept] for row in rows])
+
+
+def _aside(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    """Return the equivalents of each cause that has some, in a line."""
+    k = head.index(ASIDE) if ASIDE in head else None
+    said = [f"{row[0]}: {row[k]}" for row in rows if k is not None and row[k] != "-"]
+    return [f"{ASIDE} of {'; of '.join(said)}"] if said else []

@@ -19,9 +19,9 @@ FAMILIES = ("free", "driven", "imposed", "walking", "contrast")
 
 
 def answered(command: str, study: Path, out: Path) -> str:
-    """Return what a command prints at 80 columns while it writes its answer into a folder."""
+    """Return what a command prints in one line a row while it writes its answer into a folder."""
     asked = [sys.executable, "-P", "-m", "fes_pin", command, str(study), "--out", str(out)]
-    run = subprocess.run(asked, capture_output=True, text=True, check=True, env={**os.environ, "COLUMNS": "80"})
+    run = subprocess.run(asked, capture_output=True, text=True, check=True, env={**os.environ, "COLUMNS": "200"})
     return run.stdout
 
 
