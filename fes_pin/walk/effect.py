@@ -3,9 +3,10 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import partial
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
+import pinocchio as pin
 
 from fes_pin.body.joints import SIDES
 from fes_pin.infer.keys import Key
@@ -120,3 +121,42 @@ def segment_form(cause: str, site: str, parameters: tuple[str, ...], plausible: 
 
 def _regressed(trial: WalkTrial, change: SegmentChange) -> np.ndarray:
     return np.sum([trial.regressors[s] @ d for s, d in change(trial.motion.parameters).items()], axis=0)
+
+
+ROUNDED = 1e-3
+"""Share by which rounded moments of inertia may miss the triangle inequality."""
+
+
+class Segment(NamedTuple):
+    """Mass, kg, centre (3,), m, and central inertia (3, 3), kg m2, of a segment, in the frame of its link."""
+
+    mass: float
+    lever: np.ndarray
+    inertia: np.ndarray
+
+
+def changed_segment(believed: np.ndarray, change: np.ndarray) -> Segment:
+    """Return a segment whose mass, first moment and central inertia are changed by what forms are linear in.
+
+    The ten parameters have the inertia about the joint, which is quadratic in the place of the centre. The central
+    inertia is what a body is held to: the part of the change that the centre's way makes is left out of it.
+
+    Parameters
+    ----------
+    believed, change
+        Ten mass parameters, and the sum of their changes.
+    """
+    one = pin.Inertia.FromDynamicParameters(believed)
+    moved = (change[1:4] - one.lever * change[0]) / one.mass
+    c, d = pin.skew(one.lever), pin.skew(moved)
+    xx, xy, yy, xz, yz, zz = change[4:]
+    about_joint = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    central = one.inertia + about_joint - change[0] * c.T @ c - one.mass * (c.T @ d + d.T @ c)
+    mass = one.mass + change[0]
+    return Segment(mass, (one.mass * one.lever + change[1:4]) / (mass or 1.0), central)
+
+
+def is_of_a_body(segment: Segment) -> bool:
+    """Return whether a body can have a mass and moments of inertia: both positive, none above the sum of the others."""
+    moments = np.linalg.eigvalsh(segment.inertia)
+    return bool(segment.mass > 0.0 < moments[0] and moments[2] <= (moments[0] + moments[1]) * (1.0 + ROUNDED))

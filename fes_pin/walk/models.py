@@ -14,6 +14,7 @@ from fes_pin.infer.fits import Candidate, FittedSets, Names
 from fes_pin.infer.levels import CERTAIN_LEVEL, CONFIDENCE_95, POSSIBLE_SIZES, STRONG_EVIDENCE, WALK_LEVEL
 from fes_pin.infer.search import Policy, Search, SearchResult
 from fes_pin.walk.designs import Designs
+from fes_pin.walk.effect import Segment, changed_segment, is_of_a_body
 from fes_pin.walk.likelihood import Fitted, fit_many
 from fes_pin.workers import Progress, check_limit
 
@@ -176,8 +177,18 @@ class WalkModels(FittedSets[WalkFit, None]):
         return self.fit(tuple(n for n in names if n != name))
 
     def is_possible(self, fitted: WalkFit) -> bool:
-        """Return whether every size of a fit is possible."""
-        return math.isfinite(fitted.criterion)
+        """Return whether every size of a fit is possible, and every segment that of a body."""
+        return math.isfinite(fitted.criterion) and all(map(is_of_a_body, self.segments(fitted).values()))
+
+    def segments(self, fitted: WalkFit) -> dict[str, Segment]:
+        """Return the segments whose mass, centre or inertia the forms of a fit change."""
+        believed = self.designs.as_read.trials[0].motion.parameters
+        changed: dict[str, np.ndarray] = {}
+        for name, sizes in self.sizes(fitted).items():
+            if (change := self.designs.forms[name].segments) is not None:
+                for segment, columns in change(believed).items():
+                    changed[segment] = changed.get(segment, np.zeros(10)) + columns @ sizes
+        return {n: changed_segment(believed[n], one) for n, one in changed.items()}
 
     def noise_p_value(self, gain: float, degrees: int) -> float:
         """Return the p-value of a gain over all forms by the simulated null; 0 before the noise is known."""

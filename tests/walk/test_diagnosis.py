@@ -15,6 +15,7 @@ from fes_pin.cohort.one import Work, diagnose_one
 from fes_pin.data.study import read_study
 from fes_pin.view.report import report_html
 from fes_pin.walk.diagnosis import diagnose_walk
+from fes_pin.walk.effect import changed_segment
 from fes_pin.walk.likelihood import WalkNoise, fit_many
 from fes_pin.walk.motion import Session, motion_of
 from fes_pin.walk.result import extended_body, with_segments
@@ -189,7 +190,7 @@ def test_the_measured_walk_is_honestly_unexplained(walk, tmp_path):
 def test_the_extended_body_requires_what_the_column_says(measured, hip):
     motion, columns = measured
     parameters = motion.parameters
-    heavier = with_segments(motion.body, {"trunk": 1.1 * parameters["trunk"]})
+    heavier = with_segments(motion.body, {"trunk": changed_segment(parameters["trunk"], 0.1 * parameters["trunk"])})
     assert isinstance(heavier, Body)
     assert heavier.mass_kg == pytest.approx(motion.body.mass_kg + 0.1 * parameters["trunk"][0])
     moved = motion_of(heavier, motion.time, columns, hip, Session())

@@ -1,13 +1,16 @@
 """Sets of forms of a walk as the search of `infer` sees them."""
 
+import itertools
 import math
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from fes_pin.data.study import read_study
 from fes_pin.infer.levels import POSSIBLE_SIZES, WALK_LEVEL
 from fes_pin.walk.designs import Designs
+from fes_pin.walk.effect import Segment, changed_segment, is_of_a_body
 from fes_pin.walk.models import WalkModels, WalkSearch
 from fes_pin.walk.recording import recordings_of
 from fes_pin.walk.verdict import WalkVerdict, marker_noise
@@ -104,3 +107,27 @@ def test_ordinary_marker_noise_is_no_fault_and_its_test_is_listed(models):
 
 def test_a_single_stride_shows_no_marker_noise(gait, tmp_path):
     assert marker_noise(models_of(gait, tmp_path, 5, strides=1).designs) is None
+
+
+def test_a_segment_of_every_possible_size_is_that_of_a_body(models):
+    """A trunk whose centre lay 7 cm off had moments that no body has, and its answer could not be written."""
+    believed = models.designs.as_read.trials[0].motion.parameters
+    for name, form in models.designs.forms.items():
+        for segment, columns in (form.segments(believed) if form.segments else {}).items():
+            ends = [0.99 * end for end in models.limits[name]]
+            for sizes in itertools.product(ends, repeat=len(form.parameters)):
+                assert is_of_a_body(changed_segment(believed[segment], columns @ sizes)), (name, sizes)
+
+
+def test_a_centre_that_lies_elsewhere_leaves_the_central_inertia(models):
+    believed = models.designs.as_read.trials[0].motion.parameters["trunk"]
+    ahead = models.designs.forms["segment_com@trunk, forward"].segments({"trunk": believed})["trunk"] @ [0.1]
+    before, after = pin.Inertia.FromDynamicParameters(believed), changed_segment(believed, ahead)
+    np.testing.assert_allclose(after.lever - before.lever, [0.1, 0.0, 0.0], atol=1e-12)
+    np.testing.assert_allclose(after.inertia, before.inertia, atol=1e-9)
+
+
+def test_a_segment_without_mass_or_with_one_moment_is_of_no_body():
+    rod = np.diag([1.0, 1.0, 2.1])
+    assert not is_of_a_body(Segment(1.0, np.zeros(3), rod))
+    assert not is_of_a_body(Segment(-1.0, np.zeros(3), np.eye(3)))
