@@ -202,6 +202,7 @@ class Allocation(ByName, ReadOnly):
             "torque_nm": {n: {"wanted": w, "achieved": a, "band": band} for n, w, a, band in torques if w or a},
             "strength_band": list(self.problem.band),
             "reasons": self.reasons,
+            "assumed": self.problem.assumed,
             "held": list(self.held),
             "residual": float(self.certificate.residual),
             "gap": float(self.gap),
@@ -217,11 +218,19 @@ class Allocation(ByName, ReadOnly):
         parts = [f"{self.joints[j].replace('_', ' ')} {low[j]:.1f} to {high[j]:.1f} N m" for j in shown]
         return [f"with {weak:.2g} to {strong:.2g} of the strength assumed: {', '.join(parts)}"]
 
+    def achieved_lines(self) -> list[str]:
+        """Return the torques that were wanted, with what is achieved of them."""
+        each = zip(self.joints, self.achieved, self.wanted, strict=True)
+        parts = [f"{name.replace('_', ' ')} {got:.1f} of {asked:.1f} N m" for name, got, asked in each if asked]
+        return [f"achieved: {', '.join(parts)}"] if parts else []
+
     def __str__(self) -> str:
         each = zip(self.names, self.pulse_width_us, strict=True)
         on = [f"{name.replace('_', ' ')} {width:.0f} us" for name, width in each if width > 0.0]
-        lines = [", ".join(on) or "nothing stimulated", *(self.reasons or ["every torque within 0.5 N m"])]
-        lines += [*self.band_lines(), *self.held]
+        lines = [", ".join(on) or "nothing stimulated", *self.achieved_lines()]
+        lines += self.reasons or [f"every torque within {REPORTED_NM:g} N m"]
+        assumed = [f"assumed: {self.problem.assumed}"] if self.problem.assumed else []
+        lines += [*self.band_lines(), *assumed, *self.held]
         residual, is_exact = max(self.certificate.residual, 0.0), self.problem.least is None
         proof = f"optimal to {residual:.0e}" if is_exact else f"gap {self.gap:.0e}"
         return "\n".join([*lines, f"{proof}{'; ' + self.note if self.note else ''}"])

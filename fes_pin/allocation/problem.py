@@ -127,9 +127,9 @@ class AllocationProblem(ReadOnly):
         See `Options`.
     scale
         (N m)^2, the weighed squared torque of the strongest channel.
-    held, band
-        Joints whose moment arms were taken at another angle than asked, in words, and the factors between which the
-        strength is likely to lie (`Nerves`); without nerves nothing, and 1.
+    assumed, held, band
+        Strength and posture, and joints whose moment arms were taken at another angle than asked, both in words, and
+        the factors between which the strength is likely to lie (`Nerves`); without nerves nothing, and 1.
     other
         Order of the posture's joints, if it came by name in another one than `joints`: torques then need names.
     """
@@ -151,6 +151,7 @@ class AllocationProblem(ReadOnly):
     rounding: bool
     seconds: float
     scale: float
+    assumed: str
     held: tuple[str, ...]
     band: tuple[float, float]
     other: tuple[str, ...] | None
@@ -233,6 +234,7 @@ def problem_of(nerves: Any, q: Any, v: Any, options: Options) -> AllocationProbl
         **{name: getattr(options, name) for name in ("change", "rate", "lexicographic", "rounding", "seconds")},
         cubes=options.effort_kind == "cubes",
         scale=scale,
+        assumed=nerves.assumed(q) if named else "",
         held=tuple(nerves.held(q)) if named else (),
         band=nerves.strength_band if named else (1.0, 1.0),
         other=q.names if isinstance(q, NamedArray) and named and q.names != joints else None,

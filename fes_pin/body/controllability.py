@@ -106,10 +106,12 @@ class ModalControllability(Tabulated):
         out = [f"{self.inputs.n} inputs, horizon {self.horizon:g} s: " + ", ".join(self.inputs.names)]
         if not self.linear.conservative:
             out.append("(of the modes without damping and rates: see pbh)")
-        out.append(f"{'mode':70s} PBH  both ways  {f'1 deg, {self.inputs.price_unit}':>15s}  strongest input")
+        price = f"1 deg, {self.inputs.price_unit}"
+        out.append(f"     PBH both ways {price} {'strongest input':26s} mode")
         for i, mode in enumerate(self.modes):
             pbh, both = ("yes" if one[i] else "no" for one in (self.controllable, self.both_ways))
-            out.append(f"{i + 1:3d} {mode.name:66s} {pbh:4s} {both:10s} {self.energy[i]:15.3g}  {self._strongest[i]}")
+            by = f"{self.energy[i]:{len(price)}.3g} {self._strongest[i]:26s}"
+            out.append(f"{i + 1:3d}  {pbh:3s} {both:9s} {by} {mode.name}")
         return "\n".join(out)
 
 

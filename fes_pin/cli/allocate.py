@@ -8,6 +8,7 @@ import typer
 
 from fes_pin.cli.group import needs
 from fes_pin.cli.options import numbers_of, pairs
+from fes_pin.cli.progress import print_text
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import between
 
@@ -77,7 +78,7 @@ def allocate(
         raise InputError(f"--threshold-us must lie below --saturation-us, got {threshold_us:g} and {saturation_us:g}")
     channels = Nerves(nerve or None, strength=strength)
     if nerves:
-        typer.echo(str(channels))
+        print_text(str(channels))
         return
     if walk is not None:
         typer.echo(walk_table(walk, channels, 0.0 if passive is None else between(passive, 0.0, 10.0, "--passive")))
@@ -91,7 +92,10 @@ def allocate(
     rates = {name: radians(value) for name, value in joint_numbers(rate, "--rate", MOST_DEG_S).items()}
     curve = LinearRecruitment(threshold_us, saturation_us)
     answer = solve(wanted, channels, posture, least=least, recruitment=curve, v=rates or None)
-    typer.echo(json.dumps(answer.as_dict(), indent=1) if as_json else str(answer))
+    if as_json:
+        typer.echo(json.dumps(answer.as_dict(), indent=1))
+    else:
+        print_text(str(answer))
 
 
 def _alone(walk: bool, nerves: bool, torques: bool) -> None:

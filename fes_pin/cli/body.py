@@ -10,6 +10,7 @@ import typer
 
 from fes_pin.cli.group import App, needs, python_names, release_output
 from fes_pin.cli.options import Force, output
+from fes_pin.cli.progress import print_text
 from fes_pin.data.errors import InputError, errors_of
 from fes_pin.data.numbers import between
 from fes_pin.data.outputs import Outputs
@@ -85,7 +86,7 @@ def modes(
         best = fewest_goniometers(linear, within_deg=doubt)
         fewest = f"Fewest goniometers that leave every fall known to {doubt:g} deg"
         lines.append(f"\n{fewest} ({len(best)} such sets; the best):\n{best[0]}")
-    typer.echo("\n".join(lines))
+    print_text("\n".join(lines))
 
 
 @app.command()
@@ -150,7 +151,7 @@ def nerves(
     if map_to is not None:
         outputs.write_file(map_to, influence_image(result, check_image(map_to)))
         lines.append(f"wrote {map_to}")
-    typer.echo("\n".join(lines))
+    print_text("\n".join(lines))
 
 
 def _fewest(linear, inputs, lean: float, max_braces: int, stimulation: str, settle: float) -> list[str]:

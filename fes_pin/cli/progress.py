@@ -6,6 +6,7 @@ import math
 import re
 import shutil
 import sys
+import textwrap
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -55,6 +56,14 @@ def progress(every_s: float = math.inf) -> Iterator[Callable[[float, str], None]
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("reading", total=1.0)
         yield lambda share, words: bar.update(task, completed=share, description=words)
+
+
+def print_text(text: str) -> None:
+    """Print lines of words, broken between words where they are longer than the terminal is wide."""
+    width = shutil.get_terminal_size().columns
+    for line in text.splitlines():
+        kept = textwrap.wrap(line, width, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False)
+        print("\n".join(kept))
 
 
 PIECES = re.compile(r"\[[^\]]*\]|\S+")

@@ -248,11 +248,18 @@ class Nerves(ReadOnly):
         torque = self.torque_matrix(q)
         return low * torque, high * torque
 
-    def __str__(self) -> str:
+    def assumed(self, q=None) -> str:
+        """Return the strength and the posture that torques are taken at, in words."""
         low, high = (self.assumed_strength * factor for factor in self.strength_band)
         kind = "paralysed muscle" if self.strength is None else "as given"
         strength = f"{self.assumed_strength:g} of a healthy adult's strength ({kind}; {low:.2g} to {high:.2g})"
-        lines = [f"{self.n} channels, {strength}; torque when full, neutral posture:"]
+        degrees = np.broadcast_to(np.rad2deg(0.0 if q is None else angles_of(q)), len(JOINT_NAMES))
+        bent = [f"{name} {angle:.3g}" for name, angle in zip(JOINT_NAMES, degrees, strict=True) if angle]
+        posture = f"posture in degrees: {', '.join(bent)}, else 0" if bent else "neutral posture"
+        return f"{strength}, {posture}"
+
+    def __str__(self) -> str:
+        lines = [f"{self.n} channels, {self.assumed()}; torque when full:"]
         matrix = self.torque_matrix()
         for name, column in zip(self.names, matrix.T, strict=True):
             order = np.argsort(-np.abs(column))[:3]

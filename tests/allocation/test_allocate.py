@@ -216,6 +216,15 @@ def test_a_met_torque_has_no_complaints():
     assert a.reasons == [] and "every torque within 0.5 N m" in str(a)
 
 
+def test_an_answer_says_what_is_achieved_and_what_is_assumed():
+    a = allocate({"left_knee_flexion": -30.0}, Nerves(strength=0.5), {"left_knee_flexion": np.deg2rad(20.0)})
+    assert f"achieved: left knee flexion {a.achieved[a.joints.index('left_knee_flexion')]:.1f} of -30.0 N m" in str(a)
+    assumed = a.as_dict()["assumed"]
+    assert assumed in str(a) and "0.5 of a healthy adult's strength (as given" in assumed
+    assert assumed.endswith("posture in degrees: left_knee_flexion 20, else 0")
+    assert Nerves().assumed().endswith("0.7), neutral posture")
+
+
 def test_a_channel_that_dies_is_replaced_as_far_as_it_can_be():
     torque = {"left_knee_flexion": 25.0, "left_hip_flexion": -35.0}
     whole, without = allocate(torque, LEFT), allocate(torque, LEFT, dead=["left_hamstrings"])

@@ -1,5 +1,7 @@
 """The commands modes, nerves and view."""
 
+import re
+
 import pytest
 from typer.testing import CliRunner
 
@@ -16,12 +18,17 @@ def run(*arguments):
     return CliRunner().invoke(app, list(arguments))
 
 
+def words(output):
+    """Printed lines as one text."""
+    return " ".join(output.split())
+
+
 def test_modes_in_words():
     result = run("modes", "--posture", "mid_stance", "--slope", "0.05", "0.0", "--mass", "60", "--sex", "female")
     assert result.exit_code == 0
     assert "60.0 kg" in result.output
     assert "fall sideways about the stance ankle" in result.output
-    assert len(result.output.splitlines()) == 23
+    assert len(re.findall(r"^ [ \d]\d  ", result.output, re.MULTILINE)) == 19
     assert "mid_stance is an instant of a walk" in result.output
 
 
@@ -70,15 +77,14 @@ def test_strength_settling_and_passive_legs_are_options():
 def test_without_a_strength_muscle_is_paralysed_and_that_is_said():
     """The default of allocation: 0.5 of a healthy adult's, 0.3 to 0.7."""
     common = ("nerves", "femoral", "tibial", "--posture", "standing")
-    output = run(*common).output
+    output = words(run(*common).output)
     assert (
         "At 0.5 of the strength of a healthy man of 18 to 25 years, 73 kg and 1.80 m (paralysed, stimulated muscle)"
         in output
     )
     assert "It may be 0.3 to 0.7" in output
-    assert (
-        "At 1 of the strength of a healthy man of 18 to 25 years, 73 kg and 1.80 m"
-        in run(*common, "--strength", "1").output
+    assert "At 1 of the strength of a healthy man of 18 to 25 years, 73 kg and 1.80 m" in words(
+        run(*common, "--strength", "1").output
     )
 
 

@@ -448,3 +448,11 @@ def test_a_joint_that_begins_nowhere_is_told_in_options(tmp_path, monkeypatch, c
     said = fails(monkeypatch, capsys, *given)
     assert "expected it (its first sample) or --set position0=..." in said
     assert "among the conditions" not in said
+
+
+@pytest.mark.parametrize("asked", [("body", "nerves"), ("allocate", "left_knee_flexion=-40"), ("allocate", "--nerves")])
+def test_no_line_is_wider_than_the_terminal(asked, monkeypatch, capsys):
+    monkeypatch.setenv("COLUMNS", "80")
+    assert run(monkeypatch, *asked) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines and max(map(len, lines)) <= 80
