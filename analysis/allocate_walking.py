@@ -2,7 +2,7 @@
 
 Measured walking (two strides, one adult) gives the joint torques; what ligaments and resting muscle give by themselves
 (Riener and Edrich 1999, healthy legs) is taken off; four sets of nerves are asked for the others, with the strength of
-paralysed muscle, weaker and stronger ones beside it, and with forces that fall off over length and speed. Levers of
+paralysed, of weaker and of stronger muscle, and with forces that fall off over length and speed. Levers of
 the trunk's muscles are round figures of the size that imaging gives (Jorgensen et al. 2001, McGill et al. 1993),
 constant over posture: read "legs and trunk" as a sign and a size, no more (fes_pin/muscles/tables/SOURCE.md).
 Run the cells, or `python analysis/allocate_walking.py`; the picture goes to out/allocate_walking.png.
@@ -151,7 +151,7 @@ figure, axes = plt.subplots(2, 3, figsize=(13, 7.2), constrained_layout=True)
 titles = ("right hip, flexion +", "right knee, flexion +", "right ankle, dorsiflexion +")
 for axis, joint, title in zip(axes[0], SAGITTAL[3:], titles, strict=True):
     j = JOINT_NAMES.index(joint)
-    axis.plot(walk.time, walk.torque[:, j], color="0.25", lw=2.2, label="measured walking, less passive torque")
+    axis.plot(walk.time, walk.torque[:, j], color="k", lw=0.9, zorder=3, label="measured walking, less passive torque")
     axis.plot(
         walk.time,
         sagittal.achieved[:, j],
@@ -182,7 +182,7 @@ wide = fp.AttainableTorques(fp.Nerves(both_sides(SETS["every leg nerve"])), walk
 axes[1, 1].fill(*wide.T, color="tab:blue", alpha=0.15, label="every leg nerve")
 axes[1, 1].fill(*outline.T, color="tab:orange", alpha=0.35, label="four a leg")
 knee, ankle = (walk.torque[:, JOINT_NAMES.index(j)] for j in ("right_knee_flexion", "right_ankle_dorsiflexion"))
-axes[1, 1].plot(knee, ankle, color="0.25", lw=1.5, label="measured walking")
+axes[1, 1].plot(knee, ankle, color="k", lw=0.9, zorder=3, label="measured walking")
 axes[1, 1].set(
     title="attainable torque, knee and ankle", xlabel="knee flexion (N m)", ylabel="ankle dorsiflexion (N m)"
 )

@@ -207,9 +207,9 @@ figure.savefig(OUT / "ankle_fatigue.png", dpi=100)
 # %% What others report, and what this says about it
 print(
     f"""
-Beside what others report. Zhou and others (IEEE Access 7, 2019, doi 10.1109/ACCESS.2019.2943453) predict a person's
-ankle angle from the stimulus, open loop: RMSE 2.78 degrees, NRMSE 23.7 %. That belongs beside predictions, which
-analysis/ankle_complete.py prints, not beside tracking, where feedback sees the angle. Tracking here has RMS
+For comparison: Zhou and others (IEEE Access 7, 2019, doi 10.1109/ACCESS.2019.2943453) predict a person's
+ankle angle from the stimulus, open loop: RMSE 2.78 degrees, NRMSE 23.7 %. That compares with predictions, which
+analysis/ankle_complete.py prints, not with tracking, where feedback sees the angle. Tracking here has RMS
 {waved.rms_error_deg():.2f} degrees, {100 * waved.rms_error_deg() / 15.0:.1f} % of the range, on a twin:
 eq. (1) with 2 mrad of white noise, known load, one muscle that pulls one way, errors of the model put in by hand. So
 the law is not what limits the accuracy; it bears 30 % of error and fatigue to 60 %, and it warns before it fails. It

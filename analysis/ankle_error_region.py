@@ -32,7 +32,7 @@ for name in PRINTED:
         )
 
 
-# %% Tables 1 and 2 beside ours
+# %% Tables 1 and 2, and ours
 def bounds(domain, ratio):
     ends = domain.minimum(ratio), domain.maximum(ratio)
     return "[" + ", ".join(f"{v:.1f}" if 0 < v < np.inf else "no end" for v in ends) + "]"

@@ -47,7 +47,7 @@ for seed in range(2000, 2000 + runs):
         if k == 1125:
             squares.append(nees(tracker, twin.gain, twin.time_constant_s))
 
-# %% The same by a batch fit, and a step beside its simulation
+# %% The same by a batch fit, and a step with its simulation
 batch = fit(nominal_model(paper_study("3-23")), [trial], {"force_n": Noise(FORCE_NOISE_N)})
 step = isometric(staircase([(0.1, 0.0), (0.4, 1000.0), (0.3, 0.0)]), 77)
 known = batch.model.with_parameters({"gain": history.gain[-1], "time_constant_s": history.time_constant_s[-1]})

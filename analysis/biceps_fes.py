@@ -9,6 +9,7 @@ Run the cells, or `python analysis/biceps_fes.py`; the picture goes to out/bicep
 
 # %% The trials, and the models of the literature on whole trains left out
 import sys
+from itertools import islice
 from pathlib import Path
 
 import matplotlib
@@ -126,11 +127,11 @@ print("So nothing before a train predicts more than 29 or 30 pulses do: the stre
 figure, axes = plt.subplots(1, 3, figsize=(14, 4.2), width_ratios=(1.6, 1.2, 1.5))
 for k, colour in ((2, "C0"), (9, "C1"), (16, "C2")):
     time = np.arange(SHORTEST) * TRAINS[k].dt
-    axes[0].plot(time, FORCE[k], color=colour, lw=0.8, alpha=0.6)
+    axes[0].plot(time, FORCE[k], color=colour, lw=0.8, zorder=3)
     late, left = predicted_rest[k]
     step = round(4e-3 / TRAINS[k].dt)
     measured = FORCE[k][: SHORTEST // step * step].reshape(-1, step).mean(axis=1)[-len(left) :]
-    axes[0].plot(late, measured - left, color=colour, lw=1.6, label=f"train {k}: {pooled([left]):.1f} N")
+    axes[0].plot(late, measured - left, color=colour, lw=2.4, alpha=0.5, label=f"train {k}: {pooled([left]):.1f} N")
 axes[0].axvline(GIVEN_S, color="0.7", lw=0.8)
 axes[0].set(title="measured (thin), predicted from the first 0.3 s", xlabel="time, s", ylabel="force, N")
 axes[0].legend(fontsize=8, loc="lower center")
@@ -144,14 +145,22 @@ steps = {
     f"{name}, train left out": free,
     **{f"+ {n}": predicted_by[n] for n in ("time in the session", "the train before", "number of pulses")},
     "+ its own strength": known,
-    "rest, free": free_rest,
-    "rest, 0.3 s given": from_model,
+    "after 0.3 s, free": free_rest,
+    "first 0.3 s given": from_model,
     "+ common to all": from_both,
 }
-axes[2].barh(list(steps), list(steps.values()), color=["0.7"] * len(ranked.models) + ["C0"] * 6 + ["C3"] * 3)
-axes[2].bar_label(axes[2].containers[0], fmt="%.2f", fontsize=7, padding=2)
+groups = {
+    "0.7": ("models of the literature", len(ranked.models)),
+    "C0": ("its own train left out", 6),
+    "C3": ("after 0.3 s", 3),
+}
+rows = iter(steps.items())
+for colour, (group, count) in groups.items():
+    bars = axes[2].barh(*zip(*islice(rows, count), strict=True), color=colour, label=group)
+    axes[2].bar_label(bars, fmt="%.2f", fontsize=7, padding=2)
+axes[2].legend(fontsize=7, loc="lower right", title="error of", title_fontsize=7)
 axes[2].invert_yaxis()
-axes[2].set(xlabel="root mean squared error, N", title="whole trains (grey, blue), rest of them (red)", xlim=(0, 5.2))
+axes[2].set(xlabel="root mean squared error, N", title="error, whole trains and after 0.3 s", xlim=(0, 5.2))
 axes[2].tick_params(axis="y", labelsize=7)
 figure.tight_layout()
 OUT.mkdir(exist_ok=True)

@@ -50,16 +50,17 @@ for name, errors in missed.items():
 # %% The smallest swings, and by how much each model misses them
 trial, colours = HELD[-1], {"viscous friction only": "C0", "with what was found": "C3"}
 figure, axes = plt.subplots(1, 3, figsize=(14, 4.2), width_ratios=(2, 2, 1.4))
-axes[0].plot(trial.time, trial["position"] - np.pi, color="0.6", lw=2.5, label="measured, held out")
+axes[0].plot(trial.time, trial["position"] - np.pi, color="k", lw=0.7, zorder=3, label="measured, held out")
 for k, (name, model) in enumerate(MODELS.items()):
     shown = predicted(model, trial)
-    axes[0].plot(trial.time, shown - np.pi, color=colours[name], lw=0.8, label=name)
+    axes[0].plot(trial.time, shown - np.pi, color=colours[name], lw=1.8, label=name)
     axes[1].plot(trial.time, 1e3 * (trial["position"] - shown), color=colours[name], lw=0.8)
-    axes[2].bar(np.arange(2) + 0.4 * k - 0.2, missed[name], 0.4, color=colours[name])
+    axes[2].bar(np.arange(2) + 0.4 * k - 0.2, missed[name], 0.4, color=colours[name], label=name)
 axes[0].set(title=f"{trial.name}, predicted from its first sample", xlabel="time, s", ylabel="angle from hanging, rad")
 axes[0].set_ylim(-0.45, 0.8)
 axes[0].legend(loc="upper right", fontsize=8)
-axes[1].set(title="measured less predicted", xlabel="time, s", ylabel="angle, mrad")
+axes[2].legend(loc="upper left", fontsize=8)
+axes[1].set(title="residual: measured - predicted", xlabel="time, s", ylabel="angle, mrad")
 axes[2].set(ylabel="rms error of the angle, mrad", title="both trials held out")
 axes[2].set_xticks(range(2), [t.name for t in HELD])
 figure.tight_layout()

@@ -2,7 +2,7 @@
 
 A test stand imposes the stroke of a banded rotary damper and measures the force (public data, three tensions and a
 fourth of another year). The model believes in a mass and viscous damping; `fes-pin diagnose` on the study names dry
-friction that builds up over a way, beside an offset. Here its level is fitted at each tension, and compared with half
+friction that builds up over a way, and an offset. Here its level is fitted at each tension, and compared with half
 the height of the loops in the middle of the stroke.
 Run the cells, or `python analysis/friction_damper.py`; the picture goes to out/friction_damper.png.
 """
@@ -77,8 +77,8 @@ figure, axes = plt.subplots(1, len(GROUPS), figsize=(15, 4.2), sharey=True)
 for axis, group in zip(axes, GROUPS, strict=True):
     trial = next(t for t in of_group(group) if t.role == "held_out")
     shown = fp.simulate(fits[group].model, trial)
-    axis.plot(1e3 * trial["position"], 1e-3 * trial["effort"], color="0.6", lw=0.8, label="measured, held out")
-    axis.plot(1e3 * trial["position"], 1e-3 * shown["effort"], color="C3", lw=1.0, label="with the band's friction")
+    axis.plot(1e3 * trial["position"], 1e-3 * trial["effort"], color="k", lw=0.6, zorder=3, label="measured, held out")
+    axis.plot(1e3 * trial["position"], 1e-3 * shown["effort"], color="C3", lw=2.0, label="with the band's friction")
     axis.set(title=f"{group}: {1e-3 * fitted[group]:.1f} kN", xlabel="stroke, mm")
 axes[0].set_ylabel("force, kN")
 axes[0].legend(loc="lower right", fontsize=8)

@@ -3,7 +3,7 @@
 Each joint's greatest isometric torque, all muscles that help fully active, is held against what healthy young men have
 been measured to make (Anderson, Madigan and Nussbaum 2007) and, at the knee, against a pool of 411 studies (Sarabon,
 Kozinc and Perman 2021), at the hip's abductors against sportsmen (Sugimoto et al. 2014): these took no part in fitting
-the strengths. The source model's own strengths stand beside, and
+the strengths. The source model's own strengths are shown too, and
 what paralysed muscle is taken to have. Run the cells, or `python analysis/joint_torques.py`; the picture goes to
 out/joint_torques.png.
 """
@@ -70,7 +70,7 @@ for axis, (action, curve) in zip(axes.T.flat, ANDERSON_2007.items(), strict=True
     axis.fill_between(
         angles, measured - spread, measured + spread, color="0.88", lw=0, label="measured, 2 sd of people"
     )
-    axis.plot(angles, measured, color="0.35", lw=2.2, label="measured, mean of young men")
+    axis.plot(angles, measured, color="k", lw=1.2, zorder=3, label="measured, mean of young men")
     ours = greatest_torque_nm(table, curve, wide)
     axis.plot(wide, ours, color="tab:orange", lw=1.8, label="here, healthy")
     axis.plot(wide, PARALYSED * ours, color="tab:orange", lw=1.2, ls="--", label="here, paralysed")

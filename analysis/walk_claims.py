@@ -236,8 +236,8 @@ figure, axes = plt.subplots(2, 2, figsize=(11, 6.4), layout="constrained")
 centre = motion.centre
 needed, read = about(motion.required, centre), about(plates.total, centre)
 for panel, channel, word in ((axes[0, 0], 2, "vertical force (N)"), (axes[0, 1], 0, "forward force (N)")):
-    panel.plot(motion.time, read[:, channel], color="#17191c", label="measured")
-    panel.plot(motion.time, needed[:, channel], color="#d55e00", label="required by the motion")
+    panel.plot(motion.time, read[:, channel], color="#17191c", lw=1.0, zorder=3, label="measured")
+    panel.plot(motion.time, needed[:, channel], color="#d55e00", lw=2.0, label="required by the motion")
     panel.fill_between(motion.time, 0, 1, where=singles, transform=panel.get_xaxis_transform(), color="#eceef1", lw=0)
     panel.set_ylabel(word)
 axes[0, 0].legend(frameon=False, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)

@@ -71,9 +71,9 @@ print(
 OUT.mkdir(exist_ok=True)
 figure, axes = plt.subplots(2, 1, figsize=(8, 5.2), sharex=True, layout="constrained")
 for panel, channel, word in ((axes[0], 2, "vertical force (N)"), (axes[1], 4, "moment about left (N m)")):
-    panel.plot(motion.time, read[:, channel], color="#17191c", label="read by the plates")
-    panel.plot(motion.time, needed[:, channel], color="#d55e00", label="required, believed body")
-    panel.plot(motion.time, extended[:, channel], color="#0072b2", label="required, extended body")
+    panel.plot(motion.time, read[:, channel], color="#17191c", lw=0.9, zorder=3, label="measured by the plates")
+    panel.plot(motion.time, needed[:, channel], color="#d55e00", label="required, nominal body")
+    panel.plot(motion.time, extended[:, channel], color="#56b4e9", lw=3.0, label="required, extended body")
     panel.set_ylabel(word)
     panel.spines[["top", "right"]].set_visible(False)
 axes[0].legend(frameon=False, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3)
