@@ -179,7 +179,7 @@ def _along(path: Path, model: Model, trial: Trial, horizon_s: float) -> Trial:
 
 def _errors(path: Path, measured: Sequence[Trial], found: Sequence[Trial], horizon_s: float | None) -> list[str]:
     """E of each trial whose outputs were measured, and of all of them, in words; SI units of a model without noise."""
-    from fes_pin.diagnosis.replay import squares_of
+    from fes_pin.identify.replay import squares_of
     from fes_pin.identify.stored import load_random
     from fes_pin.infer.held_out import percent_of_spread
 

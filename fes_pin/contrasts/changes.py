@@ -1,10 +1,15 @@
 """Reports of each change, and of parameters and causes that did not change."""
 
 import math
+from collections.abc import Sequence
+
+import numpy as np
 
 from fes_pin.contrasts.grouped import Grouped
 from fes_pin.contrasts.models import ContrastModels, Found
 from fes_pin.contrasts.words import of_cause, of_nominal
+from fes_pin.data.trial import Trial
+from fes_pin.data.units import own_unit
 from fes_pin.faults.misread import NAME, Misread
 from fes_pin.infer.family import least_seen
 from fes_pin.infer.keys import Key
@@ -84,9 +89,23 @@ def not_changed(
         largest[name] = max(largest.get(name, 0.0), size / abs(values.get(name, 1.0)))
         if one.effect is not None and one.kept >= IDENTIFIABLE_SHARE:
             seen[name] = one.effect.parameters()[one.effect.amplitudes()[0]].in_units(units).unit
-    unchanged = {n: v for n, v in largest.items() if n in values and v < 1.0}
-    excluded = {n: ParameterEstimate(largest[n], 0.0, unit) for n, unit in seen.items() if math.isfinite(largest[n])}
+    unchanged, most = (
+        {n: v for n, v in largest.items() if n in values and v < 1.0},
+        ranges(best.trials, units["q"] == "rad"),
+    )
+    known = {n: unit for n, unit in seen.items() if math.isfinite(v := largest[n]) and v <= most.get(unit, v)}
+    excluded = {n: ParameterEstimate(largest[n], 0.0, unit) for n, unit in known.items()}
     return unchanged, excluded, tuple(sorted({*largest} - {*excluded, *unchanged}))
+
+
+def ranges(trials: Sequence[Trial], revolute: bool) -> dict[str, float]:
+    """Return the largest range of the columns of trials by their unit: a larger size is none that these data show."""
+    out: dict[str, float] = {}
+    for trial in trials:
+        for name, values in trial.columns.items():
+            unit = own_unit(name, revolute)
+            out[unit] = max(out.get(unit, 0.0), float(np.ptp(values[np.isfinite(values)])))
+    return out
 
 
 def misread_change(models: ContrastModels, misread: Misread) -> Change:

@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
+from fes_pin.contrasts.grouped import Grouped
 from fes_pin.data.results import Result
-from fes_pin.identify.fit import Fit
 from fes_pin.infer.result import SEEN, Change, Named, ParameterEstimate, shown
 from fes_pin.infer.text import listed, percent
 from fes_pin.models.assumed import assumed_of
@@ -44,7 +44,7 @@ class Contrast(Result):
     unchanged: Mapping[str, float]
     excluded: Mapping[str, ParameterEstimate]
     untestable: tuple[str, ...]
-    fit: Fit
+    fit: Grouped
     driven: bool
     repeats: Mapping[str, float] = field(default_factory=dict)
     catalogue: Catalogue = field(default_factory=installed)

@@ -85,6 +85,11 @@ class Fit(Optimum, Saveable):
         check_known([name], self.free, fault_at())
         return super().place(name)
 
+    def unknowns_of(self, trial: Trial) -> Unknowns | None:
+        """Return the unknowns of a trial that was fitted from its first sample on; None of another trial."""
+        begun, fits = (trial.name, trial.time[0]), zip(self.trials, self.unknowns, strict=True)
+        return [dict(u) for t, u in fits if (t.name, t.time[0]) == begun] or None
+
     def interval(self, name: str, method: str = "wald") -> tuple[float, float]:
         """Return the 95 % interval of a fitted parameter, cut at its bounds; one-sided, by profile, at a bound.
 

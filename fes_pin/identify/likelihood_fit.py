@@ -49,11 +49,7 @@ class LikelihoodFit(Fit):
 
         Its initial state is among them. A trial may have been fitted without its spikes, or its later samples.
         """
-        if not is_simulated(self.noise, [trial]):
-            return None
-        begun = trial.name, trial.time[0]
-        fits = zip(self.trials, self.unknowns, strict=True)
-        return [dict(u) for t, u in fits if (t.name, t.time[0]) == begun] or None
+        return super().unknowns_of(trial) if is_simulated(self.noise, [trial]) else None
 
 
 def fit_of(problem: LikelihoodProblem, found: Optimum) -> LikelihoodFit:

@@ -502,6 +502,10 @@ class Cause(Named):
         }
 
 
+ABSENT = "absent"
+"""What is printed for the size of a cause in a group that does not have it."""
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Change(Named):
     """One change between groups.
@@ -532,7 +536,7 @@ class Change(Named):
     def row(self) -> tuple[str, ...]:
         """Return name, kind of change, values by group, p-value and equivalents."""
         lines = [
-            f"{name}: " + ", ".join(f"{g} {one if one.std else 'none'}" for g, one in groups.items())
+            f"{name}: " + ", ".join(f"{g} {one if one.std else ABSENT}" for g, one in groups.items())
             for name, groups in self.parameters.items()
         ]
         return self.name, self.words, "\n".join(lines), probability(self.p_value), ", ".join(self.equivalents) or "-"

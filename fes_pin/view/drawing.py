@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 
 from fes_pin.view.style import COLOURS
 
-WIDE, LEFT, RIGHT, TOP, BOTTOM, GAP = 420.0, 66.0, 8.0, 18.0, 38.0, 10.0
+WIDE, LEFT, RIGHT, TOP, BOTTOM, GAP = 420.0, 66.0, 8.0, 20.0, 38.0, 14.0
 """Width of a figure, room about its panels and between them; points."""
 INK = COLOURS["ink"]
 LOOK = {
@@ -31,10 +31,10 @@ is drawn with as many points as show on the page, and every extreme stays."""
 SHORTER = {
     r"\s*\n\s*": " ",
     r' id="[\w.]+_\d+"': "",
-    r"(\.\d\d)\d+": r"\1",
+    r"(\.\d\d)\d+(?![^<>]{0,60}</text>)": r"\1",
     r"font(?:-size)?: ([\d.]+px)[^;]*;(?: font-family: [^;]*;)?": r"font-size: \1;",
 }
-"""Parts of matplotlib's text that are omitted: names that other figures have as well, digits, and type."""
+"""Parts of matplotlib's text that are omitted: names that other figures have as well, digits of places, and type."""
 NO_METADATA = dict.fromkeys(("Creator", "Date", "Format", "Type"))
 
 

@@ -32,10 +32,11 @@ Content = Markup | str
 
 
 def safe(content: Content) -> str:
-    """Content as HTML: markup as it is, text escaped, with signs for what is typed in their place."""
+    """Content as HTML: markup as it is, text escaped, with signs and code for what is typed in their place."""
     if isinstance(content, Markup):
         return content.text
-    return html.escape(content.replace("->", "\N{RIGHTWARDS ARROW}"), quote=True)
+    escaped = html.escape(content.replace("->", "\N{RIGHTWARDS ARROW}"), quote=True)
+    return re.sub("`([^`]*)`", r"<code>\1</code>", escaped)
 
 
 def element(tag: str, *contents: Content, **attributes: str) -> Markup:

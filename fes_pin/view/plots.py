@@ -5,19 +5,19 @@ one row a name show estimates with their intervals, and rivals by how much worse
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.replay import Replay
+from fes_pin.identify.replay import Replay
 from fes_pin.infer.levels import SEPARABLE
-from fes_pin.infer.noise import NoiseModel
 from fes_pin.infer.result import Named
 from fes_pin.infer.text import percent
-from fes_pin.view.drawing import Drawing, panels, rows_csv, svg
+from fes_pin.view.drawing import LEFT, Drawing, panels, rows_csv, svg
 from fes_pin.view.missing import Missing, binned, smoothed
 from fes_pin.view.style import COLOURS, WIDTHS, label, milli, quantity
 
@@ -27,38 +27,45 @@ NARROW = 330.0
 """Width of a figure of the missing torque."""
 
 
-def trial_drawing(one: Replay, noise: NoiseModel, position_unit: str = "rad") -> Drawing:
+Legend = Mapping[str, tuple[str, str]]
+"""Name of a colour of `view.style`, and words, by name of a curve."""
+MEASURED: Legend = {"measured": ("measured", "measured")}
+MODELS: Legend = {
+    **MEASURED,
+    "nominal": ("nominal", "nominal model, fitted"),
+    "extended": ("extended", "extended model"),
+}
+"""Legend of the trials of a diagnosis."""
+
+
+def trial_drawing(one: Replay, legend: Legend = MODELS, position_unit: str = "rad") -> Drawing:
     """One trial: measured over simulated, the residual (measured - simulated) below, the stimulus as a strip.
 
-    The residual is drawn as it is, faint, and smoothed.
+    The residual's band is twice the standard deviation of the noise.
 
     Parameters
     ----------
     one
         The trial.
-    noise
-        Of each output; the residual's band is twice its standard deviation.
+    legend
+        Of "measured" and of each model.
     position_unit
         "rad" or "m".
     """
     time, inputs = one.measured.time, [n for n in one.measured.columns if n not in one.outputs]
     columns = {"time_s": time}
-    drawing, axes = panels([130.0, 76.0] * len(one.outputs) + [28.0] * len(inputs))
+    drawing, axes = panels([*OVER_RESIDUAL] * len(one.outputs) + [28.0] * len(inputs))
     rows = iter(axes[:, 0])
     for name in one.outputs:
-        curves = {of: trial[name] for of, trial in (*one.models.items(), ("measured", one.measured))}
-        columns |= {f"{name}_{of}": values for of, values in reversed(curves.items())}
-        panel = next(rows)
-        for of, values in curves.items():
-            panel.plot(time, values, color=COLOURS[of], linewidth=WIDTHS[of])
-        panel.set_ylabel(label(name, position_unit))
-        factor, unit = milli(one.residuals(name)["nominal"], quantity(name, position_unit)[1])
-        band = factor * 2.0 * noise[name].std if name in noise else 0.0
-        _residuals(next(rows), one, name, factor, band, f"residual\n({unit})")
+        curves = {"measured": one.measured[name], **{of: trial[name] for of, trial in one.models.items()}}
+        columns |= {f"{name}_{of.replace(',', ' ')}": values for of, values in curves.items()}
+        std = one.noise[name].std if name in one.noise else 0.0
+        over_residual((next(rows), next(rows)), time, curves, legend, quantity(name, position_unit), std)
     for name in inputs:
         columns[name] = one.measured[name]
         _strip(next(rows), one.measured, name, position_unit)
     axes[-1, 0].set_xlabel("time (s)")
+    add_legend(drawing, {n: legend[n] for n in ("measured", *one.models)})
     return Drawing.of(svg(drawing, described(one, position_unit)), columns)
 
 
@@ -70,33 +77,99 @@ def described(one: Replay, position_unit: str) -> str:
         missed = [f"{of} model at most {_short(np.abs(r).max())} {unit} off" for of, r in one.residuals(name).items()]
         low, high = _short(trial[name].min()), _short(trial[name].max())
         words.append(f"{what} from {low} to {high} {unit}; {', '.join(missed)}")
-    errors = ", extended ".join(percent(e) for e in one.errors)
-    return f"Trial {trial.name}, {trial.kind}, {trial.duration:.3g} s: {'. '.join(words)}. E nominal {errors}."
+    return f"Trial {trial.name}, {trial.kind}, {trial.duration:.3g} s: {'. '.join(words)}. E {errors_in_words(one)}."
+
+
+def errors_in_words(one: Replay) -> str:
+    """Return the error E of each model."""
+    return ", ".join(f"{of} {percent(e)}" for of, e in one.errors.items())
 
 
 def _short(value: float) -> str:
     return f"{float(value):.3g}"
 
 
-def _residuals(panel: Axes, one: Replay, name: str, factor: float, band: float, title: str) -> None:
-    """Residuals of the models, as they are and smoothed."""
-    time, residuals = one.measured.time, {of: factor * r for of, r in one.residuals(name).items()}
-    panel.axhspan(-band, band, color=COLOURS["band"])
-    panel.axhline(color=COLOURS["faint"], linewidth=0.8)
-    for of, residual in residuals.items():
-        panel.plot(time, residual, color=COLOURS[of], linewidth=0.6, alpha=0.45)
-    for of, residual in residuals.items():
-        panel.plot(*smoothed(time, residual), color=COLOURS[of], linewidth=1.9)
-    limit = 1.1 * max(float(np.abs(r).max()) for r in residuals.values()) or 1.0
-    panel.set(ylim=(-limit, limit), ylabel=title)
+OVER_RESIDUAL = (130.0, 76.0)
+"""Heights of a panel of curves, and of that of their residuals."""
+
+
+def over_residual(
+    pair: Iterable[Axes],
+    time: np.ndarray,
+    curves: Mapping[str, np.ndarray],
+    legend: Legend,
+    of: tuple[str, str],
+    std: float = 0.0,
+) -> None:
+    """Draw what was measured in front of models, and residuals (measured - model) below, as they are and smoothed.
+
+    Parameters
+    ----------
+    pair
+        The panel of the curves, and that of the residuals.
+    time
+        Shape (n,), s.
+    curves
+        "measured" and each model, shape (n,), by their names in the legend.
+    of
+        Name of the quantity, and its unit.
+    std
+        Standard deviation of the noise, in that unit; 0 where it is not known.
+    """
+    upper, lower = pair
+    colour = {n: legend[n][0] for n in curves}
+    for n in sorted(curves, key=lambda n: -WIDTHS.get(colour[n], WIDTHS["nominal"])):  # what was measured is thinnest
+        width = WIDTHS.get(colour[n], WIDTHS["nominal"])
+        upper.plot(time, curves[n], color=COLOURS[colour[n]], linewidth=width)
+    what, unit = of
+    upper.set_ylabel(f"{what} ({unit})" if unit else what)
+    residuals = {n: curves["measured"] - values for n, values in curves.items() if n != "measured"}
+    largest = max(residuals.values(), key=lambda r: float(np.abs(r).max()))
+    factor, small = milli(largest, unit)
+    lower.axhspan(-2.0 * factor * std, 2.0 * factor * std, color=COLOURS["band"])
+    lower.axhline(color=COLOURS["faint"], linewidth=0.8)
+    for n, residual in residuals.items():
+        lower.plot(time, factor * residual, color=COLOURS[colour[n]], linewidth=0.6, alpha=0.45)
+    for n, residual in residuals.items():
+        lower.plot(*smoothed(time, factor * residual), color=COLOURS[colour[n]], linewidth=1.9)
+    limit = 1.1 * factor * float(np.abs(largest).max()) or 1.0
+    lower.set(ylim=(-limit, limit), ylabel=f"residual\n({small})" if small else "residual")
+
+
+LONGEST = 28
+"""Letters of a name in a figure; of a longer one the end is left out."""
+
+
+def add_legend(drawing: Figure, entries: Legend, left: float = LEFT) -> None:
+    """Write a legend above the panels of a figure."""
+    known = [(COLOURS[colour], WIDTHS.get(colour, WIDTHS["nominal"]), words) for colour, words in entries.values()]
+    lines = [Line2D([], [], color=colour, linewidth=width, label=_cut(words)) for colour, width, words in known]
+    written = drawing.legend(
+        handles=lines,
+        loc="upper left",
+        bbox_to_anchor=(left / 72.0 / drawing.get_figwidth(), 1.0),
+        ncols=len(lines),
+        frameon=False,
+        labelcolor=COLOURS["ink"],
+        fontsize=10,
+        borderaxespad=0.0,
+        handlelength=1.4,
+        columnspacing=1.4,
+    )
+    for text in written.get_texts():
+        text.set_parse_math(False)  # a group may be called $a_b$
+
+
+def _cut(name: str) -> str:
+    return name if len(name) < LONGEST else name[: LONGEST - 2] + "\N{HORIZONTAL ELLIPSIS}"
 
 
 def _strip(panel: Axes, trial: Trial, name: str, position_unit: str) -> None:
-    """The stimulus, thin."""
+    """The stimulus, thin, with its name above."""
     panel.plot(trial.time, trial[name], color=COLOURS["stimulus"], drawstyle="steps-post", linewidth=0.7)
     panel.locator_params(axis="y", nbins=2)
-    words = label(name, position_unit).replace("pulse width", "width").replace(" (", "\n(")
-    panel.set_ylabel(words, rotation=0.0, ha="right", va="center")
+    title = label(name, position_unit)
+    panel.set_title(title, loc="left", pad=2.0, fontsize=9, color=COLOURS["ink"], parse_math=False)
 
 
 def missing_drawing(
@@ -239,8 +312,7 @@ def rivals_drawing(cause: Named, rivals: Sequence[tuple[str, float, str]]) -> Dr
 def _rows(names: Sequence[tuple[str, str]]) -> tuple[Figure, Axes]:
     """A figure of one panel, with a row for each name in the colour of its stage."""
     drawing, ((panel,),) = panels([ROW * len(names)], left=NAMES)
-    cut = [name if len(name) < 28 else name[:26] + "\N{HORIZONTAL ELLIPSIS}" for name, _ in names]
-    panel.set_yticks(range(len(names)), cut)
+    panel.set_yticks(range(len(names)), [_cut(name) for name, _ in names], parse_math=False)
     panel.set_ylim(len(names) - 0.5, -0.5)
     panel.tick_params(axis="y", length=0.0)
     for text, (_, stage) in zip(panel.get_yticklabels(), names, strict=True):

@@ -9,7 +9,7 @@ from fes_pin.data.files import write_text
 from fes_pin.data.numbers import instance
 from fes_pin.data.results import Result
 from fes_pin.identify.error_measures import E_WORDS
-from fes_pin.infer.result import ON, Cause, Change, Named
+from fes_pin.infer.result import ABSENT, ON, Cause, Change, Named, ParameterEstimate
 from fes_pin.infer.text import percent, probability
 from fes_pin.models.describe import equation, remark, sentence
 from fes_pin.view.mathml import equations_mathml
@@ -135,13 +135,18 @@ def _named(result: Result) -> list[Markup]:
 def _card(result: Result, one: Named) -> Markup:
     """Return the card of a cause or a change, in a frame in the colour of its stage."""
     kind, stage = result.effect(one.name), getattr(one, "stage", "")
-    rows: list[list[Content]] = [
-        [*(element("code", n) for n in cell), *value_and_interval(estimate)] for cell, estimate in one.estimates()
-    ]
+    values = [(cell, _value(one, estimate)) for cell, estimate in one.estimates()]
+    rows: list[list[Content]] = [[*(element("code", n) for n in cell), *printed] for cell, printed in values]
     about = [equations_mathml(equation(kind)), element("p", f"Tell-tale: {remark(kind, 'Tell-tale:')}")] if kind else []
     table = html_table((*one.CELL, "value", "unit", "95 % interval"), rows, (len(one.CELL), len(one.CELL) + 2))
     drawn = [table, _by_group(one) if isinstance(one, Change) else _rivals(result, one)]
     return element("article", element("div", element("h3", _heading(one)), *about, *drawn), class_=f"cause {stage}")
+
+
+def _value(one: Named, estimate: ParameterEstimate) -> tuple[str, str, str]:
+    """Return value, unit and interval; of a change where a group does not have it, that it is absent."""
+    is_absent = isinstance(one, Change) and estimate.std == 0.0
+    return (ABSENT, "", "-") if is_absent else value_and_interval(estimate)
 
 
 def _why(result: Result) -> list[Markup]:

@@ -1,25 +1,69 @@
-"""Sections of the report of a contrast: parameters and causes that did not change."""
+"""Sections of the report of a contrast: its trials with the models of its groups, and what did not change."""
 
+from collections.abc import Mapping
+
+from fes_pin.contrasts.replay import EVERY, errors_by_group, horizon_of, replayed_groups
 from fes_pin.contrasts.result import Contrast
+from fes_pin.identify.error_measures import E_WORDS
+from fes_pin.infer.result import FITTED, Explained
+from fes_pin.infer.text import percent
 from fes_pin.view.page import Content, Markup, element, html_table, section, unit_text
+from fes_pin.view.plots import MEASURED, Legend
+from fes_pin.view.report_trials import trials_section
 from fes_pin.view.sections import Parts
+
+COLOURS_OF_GROUPS = ("nominal", "extended", "stage-muscle", "stage-joint", "stage-sensor")
+"""Colours of the models of the groups, in their order."""
 
 
 def _counts(found: Contrast) -> str:
     """Return the number of trials of each group, in words."""
-    return ", ".join(f"{g}: {sum(t.group == g for t in found.study.trials)} trials" for g in found.groups)
+    counts = {g: sum(t.group == g for t in found.study.trials) for g in found.groups}
+    return ", ".join(f"{g}: {n} trial{'s' * (n > 1)}" for g, n in counts.items())
+
+
+def _legend(found: Contrast) -> Legend:
+    """Return the colour and the words of the model of each group."""
+    names = found.groups if found.fit.changes else (EVERY,)
+    each = {g: COLOURS_OF_GROUPS[k % len(COLOURS_OF_GROUPS)] for k, g in enumerate(names)}
+    return {**MEASURED, **{g: (colour, f"model of {g}") for g, colour in each.items()}}
 
 
 def _sections(found: Contrast) -> list[Markup]:
     """Its own sections."""
+    replays, horizon_s = replayed_groups(found), horizon_of(found)
+    ahead = f"Simulated: {horizon_s:g} s ahead of what was measured, for it is driven. " if horizon_s else ""
+    unit = found.fit.grouped.rig.units()["q"]
+    return [
+        section("Errors by group", *_errors(found, errors_by_group(replays), horizon_s)),
+        section("Trials", *trials_section(replays, _legend(found), unit, ahead)),
+        section("What did not change", *_unchanged(found)),
+    ]
+
+
+def _errors(found: Contrast, errors: Mapping[str, Mapping[str, float]], horizon_s: float | None) -> list[Markup]:
+    """Return E of the trials of each group by each model, and what a group's own values remove."""
+    models = [n for n in (*found.groups, EVERY) if any(n in own for own in errors.values())]
+    rows: list[list[Content]] = [[g, *(percent(own.get(n)) for n in models)] for g, own in errors.items()]
+    head = ("trials of", *(f"E, model of {n}" for n in models))
+    what = f"predictions {horizon_s:g} s ahead" if horizon_s else "free simulations"
+    gains = []
+    for group in dict.fromkeys(one.group for one in found.changes if one.group in errors[one.group]):
+        (other,) = set(errors[group]) - {group}
+        pair = errors[group][other], errors[group][group]
+        gone = Explained(f"{what} of the trials of {group}", FITTED, *pair)
+        gains.append(element("p", f"The model of {group}, instead of that of {other}, removes {gone}."))
+    return [element("p", E_WORDS, class_="soft"), *gains, html_table(head, rows, range(1, len(head)))]
+
+
+def _unchanged(found: Contrast) -> list[Markup]:
     rows: list[list[Content]] = [[element("code", n), f"{100.0 * v:.2g} %"] for n, v in found.unchanged.items()]
     rows += [[element("code", n), f"{p.value:.2g} {unit_text(p.unit)}"] for n, p in found.excluded.items()]
     said = (
         "A change of these parameters by more than a share of their value, and a cause that came with more than a "
         "size, would have been seen in 95 of 100 studies."
     )
-    table = html_table(("parameter or cause", "at most"), rows, (1,))
-    return [section("What did not change", element("p", said), table)] if rows else []
+    return [element("p", said), html_table(("parameter or cause", "at most"), rows, (1,))] if rows else []
 
 
 PARTS = Parts(_counts, _sections, ("did not change", "did not come"))

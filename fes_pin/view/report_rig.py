@@ -10,7 +10,7 @@ from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.infer.result import ParameterEstimate
 from fes_pin.models.outside import origin
 from fes_pin.view.page import Content, Markup, element, figure, html_table, section, unit_text
-from fes_pin.view.plots import stimulus_drawing
+from fes_pin.view.plots import MODELS, stimulus_drawing
 from fes_pin.view.report_trials import missing_section, position_unit, trials_section
 from fes_pin.view.sections import Parts, not_testable, value_and_interval
 from fes_pin.view.style import quantity
@@ -25,13 +25,14 @@ def _counts(diagnosis: Diagnosis) -> str:
 
 def _sections(diagnosis: Diagnosis) -> list[Markup]:
     """Its own sections."""
-    replays = replayed_trials(diagnosis)
+    replays, span = replayed_trials(diagnosis), diagnosis.over_horizon
+    ahead = f"Simulated: {span.horizon_s:g} s ahead of what was measured, for it is driven. " if span else ""
     why = "the nominal parameters take them up, or no input of these trials drives them"
     return [
         not_testable(diagnosis, diagnosis.absorbed, why),
         section("Next experiment", *_next(diagnosis)),
         section("Missing torque and force", *missing_section(diagnosis, replays)),
-        section("Trials", *trials_section(diagnosis, replays)),
+        section("Trials", *trials_section(replays, MODELS, position_unit(diagnosis), ahead)),
         section("Parameters and noise", *_parameters(diagnosis)),
         section("The model, to be used", *_use(diagnosis)),
     ]

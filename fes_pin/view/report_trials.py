@@ -1,18 +1,18 @@
 """The part of the report that shows the trials: curves, residuals, missing torque."""
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Collection, Sequence
 
 from fes_pin.data.schema import IMPOSED
-from fes_pin.diagnosis.replay import Replay
 from fes_pin.diagnosis.result import Diagnosis
-from fes_pin.infer.text import percent
+from fes_pin.identify.replay import Replay
 from fes_pin.models.free_run import can_track
 from fes_pin.view.missing import Missing, missing_input
 from fes_pin.view.page import Markup, element, figure, folded, joined, key
-from fes_pin.view.plots import missing_drawing, share, trial_drawing
+from fes_pin.view.plots import Legend, errors_in_words, missing_drawing, share, trial_drawing
 
 OPEN = 4
-"""Trials that are drawn at once, those that the nominal model misses most; the others are folded."""
+"""Trials that are drawn at once, those of largest errors; the others are folded."""
 FLAG = element("strong", "worse", class_="worse")
 WORSE = 0.01
 """Share by which a trial's error must grow to count as worse: less is the noise of one trial's fit."""
@@ -54,7 +54,7 @@ def missing_section(diagnosis: Diagnosis, replays: Sequence[Replay]) -> list[Mar
 
 def _missing(diagnosis: Diagnosis, replays: Sequence[Replay], which: str) -> list[Missing]:
     model, tracked = getattr(diagnosis, which).model, _is_tracked(diagnosis)
-    free = [None if tracked and r.measured.kind != IMPOSED else getattr(r, which) for r in replays]
+    free = [None if tracked and r.measured.kind != IMPOSED else r.models[which] for r in replays]
     return [missing_input(model, r.measured, one) for r, one in zip(replays, free, strict=True)]
 
 
@@ -63,39 +63,51 @@ def _is_tracked(diagnosis: Diagnosis) -> bool:
     return diagnosis.over_horizon is not None and can_track(diagnosis.model)
 
 
-def trials_section(diagnosis: Diagnosis, replays: Sequence[Replay]) -> list[Markup]:
-    """A figure of each trial, those with small errors folded."""
-    noise, unit = diagnosis.extended.noise, position_unit(diagnosis)
+def trials_section(replays: Sequence[Replay], legend: Legend, unit: str, said: str = "") -> list[Markup]:
+    """A figure of each trial; those with small errors are folded.
 
-    def drawn(k: int) -> Markup:
-        made = trial_drawing(replays[k], noise, unit)
-        return figure(made, _trial_caption(replays[k]), file=f"trial_{k + 1}")
+    Parameters
+    ----------
+    replays
+        The trials.
+    legend
+        As of `trial_drawing`.
+    unit
+        Of the joint's position.
+    said
+        How the models were simulated.
+    """
+    shown = _open(replays)
 
-    worst = set(sorted(range(len(replays)), key=lambda k: -replays[k].nominal_error)[:OPEN])
-    others = [k for k in range(len(replays)) if k not in worst]
-    span = diagnosis.over_horizon
-    ahead = f"Simulated: {span.horizon_s:g} s ahead of what was measured, for it is driven. " if span else ""
+    def drawn(chosen: Collection[int]) -> Markup:
+        made = {k: trial_drawing(replays[k], legend, unit) for k in sorted(chosen)}
+        figures = [figure(one, _trial_caption(replays[k]), file=f"trial_{k + 1}") for k, one in made.items()]
+        return element("div", joined(figures), class_="grid")
+
     text = (
-        f"{ahead}Residual = measured - simulated, as it is (faint) and smoothed; its band is twice the standard "
+        f"{said}Residual = measured - simulated, as it is (faint) and smoothed; its band is twice the standard "
         "deviation of the noise."
     )
-    names = [("measured", "measured"), ("nominal", "nominal model, fitted")]
-    out = [
-        element("p", text, class_="soft"),
-        *_worse_note(replays),
-        key(*names, *([("extended", "extended model")] if diagnosis.causes else [])),
-        element("div", joined([drawn(k) for k in sorted(worst)]), class_="grid"),
-    ]
-    if others:
-        few = f"the other {len(others)} trials, which" if len(others) > 1 else "the other trial, which"
-        rest = element("div", joined([drawn(k) for k in others]), class_="grid")
-        out.append(folded(f"Show {few} the nominal model misses less", rest))
+    out = [element("p", text, class_="soft"), *_worse_note(replays), drawn(shown)]
+    if others := set(range(len(replays))) - shown:
+        few = f"the other {len(others)} trials" if len(others) > 1 else "the other trial"
+        out.append(folded(f"Show {few}, with smaller errors", drawn(others)))
     return out
+
+
+def _open(replays: Sequence[Replay]) -> set[int]:
+    """Return the trials that are drawn at once: those that a model misses most, of each group in turn."""
+    errors, seen, turn = [max(one.errors.values()) for one in replays], Counter[str | None](), dict[int, int]()
+    for k in sorted(range(len(replays)), key=lambda k: -errors[k]):
+        turn[k] = seen[replays[k].measured.group]
+        seen[replays[k].measured.group] += 1
+    return set(sorted(turn, key=lambda k: (turn[k], -errors[k]))[:OPEN])
 
 
 def got_worse(one: Replay) -> bool:
     """True if the extended model misses a trial by more than the nominal one, and by more than noise makes it."""
-    return one.has_cause and one.extended_error > (1.0 + WORSE) * one.nominal_error
+    errors = one.errors
+    return "extended" in errors and errors["extended"] > (1.0 + WORSE) * errors["nominal"]
 
 
 def _worse_note(replays: Sequence[Replay]) -> list[Markup]:
@@ -105,8 +117,8 @@ def _worse_note(replays: Sequence[Replay]) -> list[Markup]:
 
 
 def _trial_caption(one: Replay) -> Markup:
-    trial, errors = one.measured, " -> ".join(percent(e) for e in one.errors)
+    trial = one.measured
     conditions = "".join(f", {n} = {v:g}" for n, v in trial.conditions.items())
     held_out = ", held out" if trial.role == "held_out" else ""
-    said = f" \u00b7 {trial.kind}{conditions}{held_out}, {trial.duration:.4g} s \u00b7 E {errors} "
+    said = f" \u00b7 {trial.kind}{conditions}{held_out}, {trial.duration:.4g} s \u00b7 E {errors_in_words(one)} "
     return element("strong", trial.name) + element("span", said) + (FLAG if got_worse(one) else Markup(""))

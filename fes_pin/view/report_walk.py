@@ -10,7 +10,8 @@ import pinocchio as pin
 
 from fes_pin.view.arrows import Arrow
 from fes_pin.view.drawing import Drawing, panels, svg
-from fes_pin.view.page import Markup, element, figure, key, section
+from fes_pin.view.page import Markup, element, figure, section
+from fes_pin.view.plots import MEASURED, OVER_RESIDUAL, add_legend, over_residual
 from fes_pin.view.sections import Parts, not_testable
 from fes_pin.view.style import COLOURS
 from fes_pin.view.viewer import FRAMES_A_SECOND, BodyScene
@@ -81,8 +82,12 @@ def _arrow(wrench: np.ndarray, way: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 
 SHOWN_S = 4.0
 """Longest part of each trial that is shown, s."""
-ROW = 144.0
-"""Height of a channel."""
+LEGEND = {
+    **MEASURED,
+    "nominal": ("nominal", "required by the nominal body"),
+    "extended": ("extended", "required by the extended body"),
+}
+"""Legend of the ground reaction."""
 PYTHON = f'import fes_pin as fp\n\nbody = fp.Body.from_urdf("{BODY_FILE}")\nlinear = fp.linearize(body, "mid_stance")'
 
 
@@ -102,48 +107,46 @@ def _sections(diagnosis: WalkDiagnosis) -> list[Markup]:
 
 
 def _trials(diagnosis: WalkDiagnosis) -> list[Markup]:
-    designs, best = diagnosis.models.designs, diagnosis.best
-    extended = [("extended", "required by the extended model")] if best.names else []
-    out = [key(("measured", "measured"), ("nominal", "required"), *extended)]
+    designs, best, out = diagnosis.models.designs, diagnosis.best, []
     for number, trial in enumerate(designs.as_read.trials):
-        curves = {"nominal": trial.needed, "measured": trial.measured}
+        curves = {"measured": trial.measured, "nominal": trial.needed}
         if best.names:
             with_it = designs.design(best.names).trials[number]
             made = trial.measured - (with_it.residual - designs.signals(best.names, with_it) @ best.fitted.values)
-            curves = {"extended": made, **curves}
+            curves["extended"] = made
         single = trial.plates.loaded["left"] ^ trial.plates.loaded["right"]
         drawn = _drawing(trial.name, trial.motion.time, curves, single)
         words = f"Trial {trial.name}, at most {SHOWN_S:g} s of it; single supports are shaded."
         out.append(figure(drawn, words, file=trial.name))
-    return out
+    said = "Residual = measured - required, as it is (faint) and smoothed."
+    return [element("p", said, class_="soft"), *out]
 
 
 def _drawing(trial: str, time: np.ndarray, curves: Mapping[str, np.ndarray], single: np.ndarray) -> Drawing:
-    """Six channels about the centre of mass, forces on the left and moments on the right.
+    """Six channels about the centre of mass with their residuals, forces on the left and moments on the right.
 
     Parameters
     ----------
     curves
-        Each of shape (n, 6), by the name of its colour, the last in front.
+        Each of shape (n, 6), by its name in `LEGEND`.
     single
         Shape (n,): whether one foot alone is on the ground.
     """
     shown = time <= time[0] + SHOWN_S
     time = time[shown]
     columns, words = {"time_s": time}, []
-    drawing, axes = panels([ROW] * 3, columns=2)
-    for channel, (name, panel) in enumerate(zip(CHANNELS, axes.T.flat, strict=True)):
-        unit = "N" if channel < 3 else "N m"
+    drawing, axes = panels([*OVER_RESIDUAL] * 3, columns=2)
+    for channel, name in enumerate(CHANNELS):
+        pair, unit = axes[2 * (channel % 3) :, channel // 3][:2], "N" if channel < 3 else "N m"
         own = {of: values[shown, channel] for of, values in curves.items()}
-        columns |= {f"{name.replace(' ', '_')}_{of}": values for of, values in reversed(own.items())}
+        columns |= {f"{name.replace(' ', '_')}_{of}": values for of, values in own.items()}
         for rows in stretches(single[shown]):
-            panel.axvspan(time[rows.start], time[rows.stop - 1], color=COLOURS["band"])
-        for of, values in own.items():
-            panel.plot(time, values, color=COLOURS[of], linewidth=2.4 if of == "extended" else 1.2)
-        panel.set_ylabel(f"{name} ({unit})".replace(" about", "\nabout"))
+            pair[0].axvspan(time[rows.start], time[rows.stop - 1], color=COLOURS["band"])
+        over_residual(pair, time, own, LEGEND, (name.replace(" about", "\nabout"), unit))
         words.append(f"{name} from {own['measured'].min():.3g} to {own['measured'].max():.3g} {unit}")
     for panel in axes[-1]:
         panel.set_xlabel("time (s)")
+    add_legend(drawing, {of: LEGEND[of] for of in curves})
     return Drawing.of(svg(drawing, f"Ground reaction of trial {trial}: {', '.join(words)}."), columns)
 
 

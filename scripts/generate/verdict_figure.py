@@ -17,7 +17,7 @@ def main() -> None:
     diagnosis = diagnose_joint(read_study(ANALYSIS / "studies" / "ankle_demo"))
     print(diagnosis)
     (one,) = (r for r in replayed_trials(diagnosis) if r.measured.name == TRIAL)
-    drawn = trial_drawing(one, diagnosis.extended.noise).svg
+    drawn = trial_drawing(one).svg
     sized = re.sub(r'viewBox="0 0 (\S+) (\S+)"', r'\g<0> width="\1" height="\2" font-family="sans-serif"', drawn)
     white = sized.replace(">", '><rect width="100%" height="100%" fill="#ffffff"/>', 1)
     alone = re.sub(r"var\(--[\w-]+, (#\w+)\)", r"\1", white)  # there is no page whose colours it could have

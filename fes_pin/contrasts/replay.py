@@ -1,0 +1,49 @@
+"""Every trial of a contrast with the predictions of the models of its groups, and the errors of these by group."""
+
+from collections.abc import Sequence
+
+from fes_pin.contrasts.result import Contrast
+from fes_pin.data.trial import derived_trial
+from fes_pin.identify.ahead import default_horizon
+from fes_pin.identify.replay import Replay, replayed, squares_of
+from fes_pin.infer.held_out import percent_of_spread
+
+EVERY = "every group"
+"""Name of the model where nothing differs between the groups."""
+
+
+def horizon_of(found: Contrast) -> float | None:
+    """Return the horizon of the predictions that are shown, s; None for a rig that is simulated freely."""
+    return default_horizon(found.study.trials) if found.driven else None
+
+
+def replayed_groups(found: Contrast) -> tuple[Replay, ...]:
+    """Return every trial of the study, in its order, as models predict it: that of its group, and that of another.
+
+    The other group is the one before its own, of the first group the second. Where no change is named, the groups share
+    one model, `EVERY`.
+    """
+    fit, groups, horizon_s, made = found.fit, found.groups, horizon_of(found), []
+    conditions = {t.name: t.conditions for t in fit.trials}  # a misread one is corrected
+    for measured in found.study.trials:
+        trial = derived_trial(measured, conditions=conditions.get(measured.name, measured.conditions))
+        place = groups.index(str(trial.group))
+        noise, known, models = fit.weights.noise[groups[place]], fit.unknowns_of(trial), {}
+        for k in sorted({place, place - 1 if place else 1}):
+            name = groups[k] if fit.changes else EVERY
+            models[name] = replayed(fit.grouped.models[groups[k]], trial, noise, noise, horizon_s, known)
+        rig = fit.grouped.models[groups[place]].rig
+        made.append(Replay(trial, models, noise, tuple(n for n in rig.outputs(trial.kind) if n in trial)))
+    return tuple(made)
+
+
+def errors_by_group(replays: Sequence[Replay]) -> dict[str, dict[str, float]]:
+    """Return E of all trials of each group together, percent, by group and model."""
+    squares: dict[str, dict[str, list[tuple[float, float]]]] = {}
+    for one in replays:
+        own = squares.setdefault(str(one.measured.group), {})
+        for name, model in one.models.items():
+            own.setdefault(name, []).append(squares_of(one.measured, model, one.outputs, one.noise))
+    return {
+        g: {n: percent_of_spread(*zip(*pairs, strict=True)) for n, pairs in own.items()} for g, own in squares.items()
+    }
