@@ -65,7 +65,8 @@ def trial_drawing(one: Replay, legend: Legend = MODELS, position_unit: str = "ra
         columns[name] = one.measured[name]
         _strip(next(rows), one.measured, name, position_unit)
     axes[-1, 0].set_xlabel("time (s)")
-    add_legend(drawing, {n: legend[n] for n in ("measured", *one.models)})
+    of_group = f", {one.measured.group}" if one.measured.group else ""
+    add_legend(drawing, {"measured": ("measured", f"measured{of_group}"), **{n: legend[n] for n in one.models}})
     return Drawing.of(svg(drawing, described(one, position_unit)), columns)
 
 

@@ -84,8 +84,8 @@ SHOWN_S = 4.0
 """Longest part of each trial that is shown, s."""
 LEGEND = {
     **MEASURED,
-    "nominal": ("nominal", "required by the nominal body"),
-    "extended": ("extended", "required by the extended body"),
+    "nominal": ("nominal", "required, nominal body"),
+    "extended": ("extended", "required, extended body"),
 }
 """Legend of the ground reaction."""
 PYTHON = f'import fes_pin as fp\n\nbody = fp.Body.from_urdf("{BODY_FILE}")\nlinear = fp.linearize(body, "mid_stance")'
