@@ -32,6 +32,7 @@ def cohort(
     """Diagnose many studies, and say what they have in common. What is there already is not done again."""
     from fes_pin.cohort.run import run_cohort
     from fes_pin.data.provenance import this_command
+    from fes_pin.data.show import table_text
 
     with progress(SAID_EVERY_S) as tell:
         made = run_cohort(
@@ -46,10 +47,8 @@ def cohort(
             force=force,
             progress=tell,
         )
-    good = len(made.studies) - len(made.failed)
-    typer.echo(f"{good} of {len(made.studies)} studies diagnosed")
-    for row in made.prevalence:
-        typer.echo(f"  {row['cause']:28s} in {row['studies']} ({row['share_percent']:.0f} %)")
+    title, head, rows, notes = made.as_table()
+    typer.echo(table_text(title, head, rows, [one for one in notes if not one.startswith("failed")]))
     for row in made.failed:
         typer.echo(f"failed: {row['study']}: {row['error']}", err=True)
     typer.echo(f"page: {out / 'cohort.html'}")

@@ -13,7 +13,7 @@ from typing import Any
 
 from fes_pin.cohort.one import STATE, Answer, Store, Work, diagnose_one
 from fes_pin.cohort.processes import Task, in_processes, on_cluster
-from fes_pin.cohort.tables import ERRORS, Row, cohort_html, tables_of
+from fes_pin.cohort.tables import ERRORS, Row, advice_of, cohort_html, named_in, tables_of, title_of
 from fes_pin.data.errors import InputError
 from fes_pin.data.outputs import Outputs
 from fes_pin.data.results import Saveable
@@ -90,12 +90,18 @@ class Cohort(Saveable):
 
     def as_table(self) -> tuple[str, Sequence[str], Sequence[Sequence[str]], Sequence[str]]:
         """Title, head, rows and notes of the table that is printed."""
-        rows = [(r["cause"], str(r["studies"]), f"{r['share_percent']:.0f} %") for r in self.prevalence]
-        failed = [f"failed: {r['study']}: {r['error']}" for r in self.failed]
-        return repr(self), ("cause", "studies", "share"), rows, failed
+        good = len(self.studies) - len(self.failed)
+        rows = [(r["cause"], named_in(r, good), f"{r['share_percent']:.0f} %") for r in self.prevalence]
+        notes = [f"failed: {r['study']}: {r['error']}" for r in self.failed]
+        return (
+            repr(self),
+            ("cause", "studies", "share"),
+            rows,
+            [*notes, f"next: {advice_of(self.studies, self.causes)}"],
+        )
 
     def __repr__(self) -> str:
-        return f"{len(self.studies) - len(self.failed)} of {len(self.studies)} studies diagnosed"
+        return title_of(self.studies)
 
 
 def run_cohort(
@@ -197,10 +203,21 @@ def _files(made: Cohort, seed: int, command: str) -> dict[str, str | bytes]:
 
 HEADS = {
     "studies": (
-        *("study", "verdict", "causes", "unexplained", *ERRORS, "horizon_s", "ceiling_percent", "wall_s", "error"),
+        *(
+            "study",
+            "verdict",
+            "causes",
+            "not_testable",
+            "unexplained",
+            *ERRORS,
+            "horizon_s",
+            "ceiling_percent",
+            "wall_s",
+            "error",
+        ),
     ),
     "causes": (
-        *("study", "cause", "stage", "parameter", "value", "std", "p_value", "false_discovery_rate"),
+        *("study", "cause", "stage", "parameter", "value", "std", "low", "high", "p_value", "false_discovery_rate"),
         *("gain_percent", "gain_low", "gain_high", "equivalents"),
     ),
     "pooled": (
@@ -209,7 +226,7 @@ HEADS = {
     ),
     "prevalence": (
         *("cause", "stage", "studies", "certain", "share_percent", "share_low", "share_high"),
-        *("median_gain_percent", "alone"),
+        *("median_gain_percent", "alone", "equivalents"),
     ),
 }
 """Columns of each table."""

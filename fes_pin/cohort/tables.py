@@ -13,10 +13,10 @@ from fes_pin.cohort.pool import discovery_rates, pooled, share_interval
 from fes_pin.data.provenance import Provenance, today, versions
 from fes_pin.identify.error_measures import E_WORDS, MEASURES
 from fes_pin.infer.levels import CONFIDENCE_95, UNUSUAL_LEVEL
-from fes_pin.infer.text import percent, probability, rounded
+from fes_pin.infer.text import listed, percent, probability, rounded
 from fes_pin.view.drawing import Drawing
 from fes_pin.view.page import Content, Markup, document, element, figure, folded, html_table, joined, section
-from fes_pin.view.plots import intervals_drawing
+from fes_pin.view.plots import HeatCell, heat_drawing, intervals_drawing
 from fes_pin.view.sections import header, provenance_parts, stage_mark
 
 Row = Mapping[str, Any]
@@ -45,6 +45,7 @@ def study_row(one: Kept) -> Row:
         "study": one.name,
         "verdict": found.get("verdict", "failed"),
         "causes": " + ".join(c["name"] for c in found["causes"]) if found else None,
+        "not_testable": " ".join(found.get("absorbed", ())) if found else None,
         "unexplained": found["remainder"]["unexplained"] if found else None,
         **{name: _number(found.get(model, {}).get("error_percent", {}).get(n)) for name, (model, n) in ERRORS.items()},
         "horizon_s": _number(found.get("horizon_s")),
@@ -71,6 +72,8 @@ def cause_rows(one: Kept) -> Iterator[Row]:
                 "parameter": name,
                 "value": _number(size["value"]),
                 "std": _number(size["std"]),
+                "low": _number(size.get("low")),
+                "high": _number(size.get("high")),
                 "p_value": _number(cause.get("p_value")),
                 "gain_percent": _number(gain.get("held_out")),
                 "gain_low": _number(low),
@@ -131,6 +134,7 @@ def prevalence_rows(causes: Sequence[Row], studies: int) -> list[Row]:
                 "share_high": high,
                 "median_gain_percent": gains[len(gains) // 2] if gains else math.nan,
                 "alone": sum(not r["equivalents"] for r in rows.values()),
+                "equivalents": " ".join(sorted({n for r in rows.values() for n in r["equivalents"].split()})),
             }
         )
     return sorted(out, key=lambda r: (-r["studies"], r["cause"]))
@@ -151,8 +155,9 @@ def cohort_html(tables: Mapping[str, Sequence[Row]], seed: int, command: str = "
     studies, prevalence = tables["studies"], tables["prevalence"]
     good = [r for r in studies if r["verdict"] != "failed"]
     parts = [
-        _head(studies, good, prevalence),
+        _head(studies, prevalence, tables["causes"]),
         section("Which causes, and in how many studies", *_prevalence(prevalence, len(good))),
+        section("Studies by causes", *_by_cause(good, tables["causes"])),
         section("How large they are in the population", *_pooled(tables["causes"], tables["pooled"])),
         section("Studies", *_studies(studies)),
         section("Where this comes from", *provenance_parts(Provenance(today(), versions(), {}, seed, command))),
@@ -160,32 +165,89 @@ def cohort_html(tables: Mapping[str, Sequence[Row]], seed: int, command: str = "
     return document("Cohort", parts)
 
 
-def _head(studies: Sequence[Row], good: Sequence[Row], prevalence: Sequence[Row]) -> Markup:
-    counts = Counter(r["verdict"] for r in good)
-    failed = len(studies) - len(good)
-    if prevalence:
-        first = prevalence[0]
-        name = first["cause"].replace("_", " ")
-        title = f"{name[0].upper()}{name[1:]} in {first['studies']} of {len(good)} studies"
-    else:
-        title = f"No cause is named in {len(good)} studies"
-    rows: list[tuple[Content, Content]] = [
-        ("A cause was named", f"in {counts['causes_found']} of {len(good)} studies"),
-        ("The model is adequate", f"in {counts['adequate']}"),
-        ("Something stays unexplained", f"in {sum(bool(r['unexplained']) for r in good)}"),
+def title_of(studies: Sequence[Row]) -> str:
+    """Return the number of studies by verdict, in words."""
+    counts = Counter(map(_verdict, studies))
+    known = [f"{counts[word]} {word}" for word in VERDICTS.values() if counts[word]]
+    return f"{len(studies)} stud{'y' if len(studies) == 1 else 'ies'}: {', '.join(known)}"
+
+
+VERDICTS = {
+    "causes_found": "explained",
+    "partly": "partly explained",
+    "adequate": "adequate",
+    "unexplained": "unexplained",
+    "stopped": "stopped",
+    "failed": "failed",
+}
+"""Verdicts in words; "partly" is of a study with named causes and a lack of fit."""
+
+
+def _verdict(row: Row) -> str:
+    is_partly = row["verdict"] == "causes_found" and row["unexplained"]
+    return VERDICTS["partly" if is_partly else row["verdict"]]
+
+
+def named_in(row: Row, studies: int) -> str:
+    """Return in how many studies a cause was named, and what it ties with there, in words."""
+    tied = _tied(row)
+    return f"{row['studies']} of {studies}" + (f" (ties with {tied})" if tied else "")
+
+
+def _tied(row: Row) -> str:
+    """Return the causes that data cannot distinguish from one, and in how many studies; "" for none."""
+    tied = row["studies"] - row["alone"]
+    return f"{listed(row['equivalents'].split())} in {tied}" if tied else ""
+
+
+def advice_of(studies: Sequence[Row], causes: Sequence[Row]) -> str:
+    """Return the next step, in words."""
+    of: dict[str, list[str]] = defaultdict(list)
+    for row in studies:
+        of[_verdict(row)].append(row["study"])
+    tied = sorted({r["study"] for r in causes if r["equivalents"]})
+    steps = [
+        ("correct the files of", of["failed"]),
+        ("diagnose again with a longer limit of time", of["stopped"]),
+        ("record the trial that separates equivalent causes in", tied),
+        ("read which sensor or condition is missed most in the reports of", of["unexplained"] + of["partly explained"]),
     ]
-    if counts["stopped"]:
-        rows.append(("The search was stopped", f"in {counts['stopped']}: the causes are the best set so far"))
-    if failed:
-        rows.append(("Could not be diagnosed", f"{failed}: see the table of studies"))
-    return header(f"cohort of {len(studies)} studies", title, "causes_found", rows)
+    said = [f"{words} {_few(names)}" for words, names in steps if names]
+    return "; ".join(said) or "use the model of each study: extended where a cause is named, nominal elsewhere"
+
+
+FEW = 5
+"""Studies that are listed in a sentence; of more their number stands there too."""
+
+
+def _few(names: Sequence[str]) -> str:
+    more = len(names) - FEW
+    return listed([*names[:FEW], *([f"{more} more"] if more > 0 else [])])
+
+
+def _head(studies: Sequence[Row], prevalence: Sequence[Row], causes: Sequence[Row]) -> Markup:
+    good = sum(r["verdict"] != "failed" for r in studies)
+    most = [r for r in prevalence if r["studies"] == prevalence[0]["studies"]]
+    each = [f"{r['cause'].replace('_', ' ')} in {named_in(r, good)}" for r in most[:FEW]]
+    more = f"; {len(most) - FEW} more as often" if len(most) > FEW else ""
+    rows: list[tuple[Content, Content]] = [("Named most often", "; ".join(each) + more)] if most else []
+    rows.append(("Next", advice_of(studies, causes)))
+    style = "adequate" if not prevalence else "causes_found"
+    return header(f"cohort of {len(studies)} studies", title_of(studies), style, rows)
 
 
 def _prevalence(rows: Sequence[Row], studies: int) -> list[Markup]:
     if not rows:
         return [element("p", "None.")]
-    found = ("share [95 %]", "median gain", "only cause in its set in", "false discovery rate below 5 % in")
-    head = ("cause", "stage", "studies", *found)
+    head = (
+        "cause",
+        "stage",
+        "studies",
+        "share [95 %]",
+        "median gain",
+        "false discovery rate below 5 % in",
+        "ties with",
+    )
     cells: list[list[Content]] = [
         [
             element("code", r["cause"]),
@@ -193,8 +255,8 @@ def _prevalence(rows: Sequence[Row], studies: int) -> list[Markup]:
             f"{r['studies']} of {studies}",
             f"{r['share_percent']:.0f} % [{r['share_low']:.0f}, {r['share_high']:.0f}]",
             percent(r["median_gain_percent"]),
-            str(r["alone"]),
             str(r["certain"]),
+            _tied(r) or "-",
         ]
         for r in rows
     ]
@@ -202,7 +264,7 @@ def _prevalence(rows: Sequence[Row], studies: int) -> list[Markup]:
         "A study in which a cause was not named may still have it: small, or such as its trials cannot show. The false "
         "discovery rate is over all causes that were looked for in all studies."
     )
-    return [html_table(head, cells, (2, 3, 4, 5, 6)), element("p", words, class_="soft")]
+    return [html_table(head, cells, (2, 3, 4), prose=True), element("p", words, class_="soft")]
 
 
 def _pooled(causes: Sequence[Row], rows: Sequence[Row]) -> list[Markup]:
@@ -215,15 +277,43 @@ def _pooled(causes: Sequence[Row], rows: Sequence[Row]) -> list[Markup]:
         "somewhat too large."
     )
     head = ("of", "parameter", "studies", "mean [95 %]", "tau", "next study [95 %]", "I²", "all alike")
-    out = [element("p", words, class_="soft"), html_table(head, [_pooled_cells(r) for r in rows], (2, 3, 4, 5, 6, 7))]
+    table = html_table(head, [_pooled_cells(r) for r in rows], (2, 3, 4, 5, 6, 7))
+    return [element("p", words, class_="soft"), table, *_forests(causes, rows)]
+
+
+def _forests(causes: Sequence[Row], rows: Sequence[Row]) -> list[Markup]:
+    """Return a forest plot of the first parameter of each cause that two studies or more have: that of its size."""
     means = {(r["cause"], r["parameter"]): r for r in rows}
-    drawn, shown = [], set()
+    first: dict[str, str] = {}
+    for row in causes:
+        first.setdefault(row["cause"], row["parameter"])
+    drawn = []
     for (cause, parameter), many in by_parameter(causes).items():
-        if len(many) > 1 and cause not in shown:
-            shown.add(cause)  # the first parameter is what gives a cause its size
+        if len(many) > 1 and first[cause] == parameter:
             forest = _forest(parameter, many, means.get((cause, parameter)))
-            drawn.append(figure(forest, f"{cause}, {parameter}", file=f"{cause}_{parameter}"))
-    return [*out, element("div", joined(drawn), class_="grid")] if drawn else out
+            words = f"{cause}: {parameter} with its 95 % interval in each study, and pooled"
+            drawn.append(figure(forest, words, file=f"{cause}_{parameter}"))
+    return [element("div", joined(drawn), class_="grid")] if drawn else []
+
+
+def _by_cause(studies: Sequence[Row], causes: Sequence[Row]) -> list[Markup]:
+    """Return the heat map of studies by causes: loss without a named cause, equivalents, and what is not testable."""
+    named = [r["cause"] for r in causes]
+    columns = list(dict.fromkeys([*named, *(n for r in causes for n in r["equivalents"].split())]))
+    if not columns or len(studies) > FOREST:
+        return []
+    cells: dict[tuple[str, str], HeatCell] = {}
+    for study in studies:
+        cells |= {(study["study"], n): "not testable" for n in (study["not_testable"] or "").split()}
+    for row in causes:
+        cells |= {(row["study"], n): "equivalent" for n in row["equivalents"].split()}
+    cells |= {(r["study"], r["cause"]): r["gain_percent"] for r in causes}
+    words = (
+        "Named causes by what is lost without them, percent of the nominal squared error above the noise; = equivalent "
+        "to a named cause; x not testable with these data; empty: not named."
+    )
+    drawn = heat_drawing([r["study"] for r in studies], columns, cells)
+    return [figure(drawn, words, "narrow" if len(columns) <= FEW else "", "studies_by_causes")]
 
 
 def _pooled_cells(r: Row) -> list[Content]:
@@ -244,18 +334,20 @@ def _pooled_cells(r: Row) -> list[Content]:
 def _forest(parameter: str, rows: Sequence[Row], mean: Row | None) -> Drawing:
     """Values of a parameter study by study with their 95 % intervals, and the pooled mean below."""
     known = [r for r in rows if math.isfinite(r["value"])]
-    drawn = [r for r in known if math.isfinite(r["std"])] if len(known) <= FOREST else []
-    lines = []
-    for r in drawn:
-        half = CONFIDENCE_95 * r["std"]
-        lines.append((r["study"], r["value"], r["value"] - half, r["value"] + half, "measured"))
+    lines = [(r["study"], r["value"], *_ends(r), "measured") for r in known] if len(known) <= FOREST else []
     if mean is not None:
-        lines.append(("pooled", mean["mean"], mean["low"], mean["high"], "extended"))
+        lines.append((f"pooled, {mean['studies']} studies", mean["mean"], mean["low"], mean["high"], "extended"))
     return intervals_drawing(lines, parameter)
 
 
+def _ends(row: Row) -> tuple[float, float]:
+    """Return the ends of the 95 % interval of a value: as its study has them, or from its deviation."""
+    half = CONFIDENCE_95 * row["std"]
+    return (row["low"], row["high"]) if math.isfinite(row["low"]) else (row["value"] - half, row["value"] + half)
+
+
 def _studies(rows: Sequence[Row]) -> list[Markup]:
-    head = ("study", "verdict", "causes", "E free", "E ahead", "left")
+    head = ("study", "verdict", "causes", "E free", "E ahead", "lack of fit")
     cells: list[list[Content]] = []
     for r in rows:
         if r["verdict"] == "failed":
@@ -263,7 +355,7 @@ def _studies(rows: Sequence[Row]) -> list[Markup]:
             continue
         link = element("a", r["study"], href=f"studies/{r['study']}/report.html")
         free = _errors(r, "fit" if math.isnan(r["nominal_held_out_percent"]) else "held_out")
-        left = "something" if r["unexplained"] else "nothing"
+        left = "found" if r["unexplained"] else "none found"
         cells.append([link, r["verdict"].replace("_", " "), r["causes"] or "-", free, _errors(r, "horizon"), left])
     made = html_table(head, cells, (3, 4))
     about = element("p", f"{E_WORDS} {MODELS}", class_="soft")

@@ -39,7 +39,7 @@ NO_METADATA = dict.fromkeys(("Creator", "Date", "Format", "Type"))
 
 
 def panels(
-    heights: Sequence[float], width: float = WIDE, left: float = LEFT, columns: int = 1
+    heights: Sequence[float], width: float = WIDE, left: float = LEFT, columns: int = 1, top: float = TOP
 ) -> tuple[Figure, np.ndarray]:
     """A figure of panels with one horizontal axis, and the panels, shape (rows, columns).
 
@@ -51,10 +51,12 @@ def panels(
         Widths of a column and of the margin to the left of its panels; points.
     columns
         How many there are.
+    top
+        Height above the panels, points.
     """
-    tall, inner = TOP + sum(heights) + GAP * (len(heights) - 1) + BOTTOM, width - left - RIGHT
+    tall, inner = top + sum(heights) + GAP * (len(heights) - 1) + BOTTOM, width - left - RIGHT
     place = {"left": left / width / columns, "right": 1.0 - RIGHT / width / columns}
-    place |= {"top": 1.0 - TOP / tall, "bottom": BOTTOM / tall}
+    place |= {"top": 1.0 - top / tall, "bottom": BOTTOM / tall}
     place |= {"hspace": GAP / float(np.mean(heights)), "wspace": (left + RIGHT) / inner}
     with style.context(LOOK):
         figure = Figure((columns * width / 72.0, tall / 72.0))

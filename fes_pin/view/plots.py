@@ -6,18 +6,20 @@ one row a name show estimates with their intervals, and rivals by how much worse
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Literal
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patches import Rectangle
 
 from fes_pin.data.trial import Trial
 from fes_pin.identify.replay import Replay
 from fes_pin.infer.levels import SEPARABLE
 from fes_pin.infer.result import Named
-from fes_pin.infer.text import percent
-from fes_pin.view.drawing import LEFT, Drawing, panels, rows_csv, svg
+from fes_pin.infer.text import WHOLE, percent
+from fes_pin.view.drawing import LEFT, RIGHT, TOP, WIDE, Drawing, panels, rows_csv, svg
 from fes_pin.view.missing import Missing, binned, smoothed
 from fes_pin.view.style import COLOURS, WIDTHS, label, milli, quantity
 
@@ -310,9 +312,49 @@ def rivals_drawing(cause: Named, rivals: Sequence[tuple[str, float, str]]) -> Dr
     return Drawing(svg(drawing, about), rows_csv(("rival", axis.replace(" ", "_")), [r[:2] for r in rivals]))
 
 
-def _rows(names: Sequence[tuple[str, str]]) -> tuple[Figure, Axes]:
+HeatCell = float | Literal["equivalent", "not testable"]
+"""A cell of a heat map: a share in percent (NaN where it is not known), or why there is none."""
+SIGNS = {"equivalent": "=", "not testable": "x"}
+COLUMN, PALEST = 46.0, 0.25
+"""Width of a column of a heat map, and the opacity of a share of zero."""
+
+
+def heat_drawing(rows: Sequence[str], columns: Sequence[str], cells: Mapping[tuple[str, str], HeatCell]) -> Drawing:
+    """Draw a heat map: cells by row and column, darker for a larger share, with the share or a sign in each.
+
+    Parameters
+    ----------
+    cells
+        By row and column; an absent cell stays empty.
+    """
+    above, width = 5.0 * max(map(len, columns)) + TOP, NAMES + COLUMN * len(columns) + RIGHT
+    drawing, panel = _rows([(name, "ink") for name in rows], width + above, above)
+    panel.set_xlim(0.0, (width + above - NAMES - RIGHT) / COLUMN)
+    panel.set_xticks(np.arange(len(columns)) + 0.5, columns, rotation=40, ha="left", rotation_mode="anchor")
+    panel.tick_params(axis="x", top=False, bottom=False, labeltop=True, labelbottom=False)
+    panel.spines[:].set_visible(False)
+    at = {name: k for k, name in enumerate(columns)}
+    for k, name in enumerate(rows):
+        for other, cell in ((c, cells[name, c]) for c in columns if (name, c) in cells):
+            place = at[other] + 0.03, k - 0.46
+            panel.add_patch(Rectangle(place, 0.94, 0.92, color=COLOURS["band"]))
+            sign = SIGNS[cell] if isinstance(cell, str) else "named" if math.isnan(cell) else f"{cell:.0f} %"
+            if not isinstance(cell, str):
+                share = 0.0 if math.isnan(cell) else min(max(cell, 0.0), WHOLE) / WHOLE
+                panel.add_patch(
+                    Rectangle(place, 0.94, 0.92, color=COLOURS["extended"], alpha=PALEST + (1.0 - PALEST) * share)
+                )
+            panel.text(at[other] + 0.5, k, sign, ha="center", va="center", fontsize=9, color=COLOURS["measured"])
+    known = [(n, c, value if isinstance(value, str) else f"{value:.4g}") for (n, c), value in cells.items() if c in at]
+    words = "; ".join(f"{n}: {c} {value}" for n, c, value in known)
+    return Drawing(
+        svg(drawing, f"Studies by causes, percent: {words}."), rows_csv(("study", "cause", "percent"), known)
+    )
+
+
+def _rows(names: Sequence[tuple[str, str]], width: float = WIDE, top: float = TOP) -> tuple[Figure, Axes]:
     """A figure of one panel, with a row for each name in the colour of its stage."""
-    drawing, ((panel,),) = panels([ROW * len(names)], left=NAMES)
+    drawing, ((panel,),) = panels([ROW * len(names)], width, NAMES, top=top)
     panel.set_yticks(range(len(names)), [_cut(name) for name, _ in names], parse_math=False)
     panel.set_ylim(len(names) - 0.5, -0.5)
     panel.tick_params(axis="y", length=0.0)
