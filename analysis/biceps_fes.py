@@ -160,7 +160,7 @@ for colour, (group, count) in groups.items():
     axes[2].bar_label(bars, fmt="%.2f", fontsize=7, padding=2)
 axes[2].legend(fontsize=7, loc="lower right", title="error of", title_fontsize=7)
 axes[2].invert_yaxis()
-axes[2].set(xlabel="root mean squared error, N", title="error, whole trains and after 0.3 s", xlim=(0, 5.2))
+axes[2].set(xlabel="root mean squared error, N", title="error, whole trains and after 0.3 s", xlim=(0, 8.4))
 axes[2].tick_params(axis="y", labelsize=7)
 figure.tight_layout()
 OUT.mkdir(exist_ok=True)

@@ -22,6 +22,7 @@ from fes_pin.models.effects import effect_named
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.simulate import simulate
 from fes_pin.paper.equation_1 import static_torque_nm
+from fes_pin.view.style import label
 
 OUT = Path("out")
 OUT.mkdir(exist_ok=True)
@@ -161,7 +162,9 @@ for name, y in said.items():
     near.plot(trial.time, y, color=colours[name], lw=2.5, label=f"predicted with a {words[name]}")
 near.plot(trial.time, trial[column], "k.", ms=5, label=f"measured; true: {words[true]}")
 window = np.abs(trial.time - most) < 0.04
-near.set(xlim=(most - 0.04, most + 0.04), xlabel="time (s)", ylabel=column, title="at one of its edges (grey above)")
+near.set(
+    xlim=(most - 0.04, most + 0.04), xlabel="time (s)", ylabel=label(column), title="at one of its edges (grey above)"
+)
 near.set_ylim(trial[column][window].min() - 1.0, trial[column][window].max() + 1.0)
 near.legend(fontsize=10)
 false = LAG if true == DELAY else DELAY

@@ -247,6 +247,7 @@ for k, (name, values) in enumerate(vertical.items()):
     axes[1, 0].bar(place + 0.16 * k, values, 0.15, label=name)
 axes[1, 0].set_xticks(place + 0.32, ["forward", "left", "up"])
 axes[1, 0].set_ylabel("measured - required, N rms")
+axes[1, 0].set_ylim(0.0, 36.0)  # room for the legend
 axes[1, 0].legend(frameon=False, fontsize=7.5)
 i = int(shown[0])
 axes[1, 1].plot(rooted.time, full[:, i], color="#17191c", label="full equations")

@@ -12,6 +12,8 @@ ROOT = Path(__file__).parents[1]
 WRITTEN_BY_OTHERS = {"CHANGELOG.md", "accuracy.md"}
 """A record of what was said, and a page that a script writes."""
 PACKAGE = ROOT / "fes_pin"
+STORIES = sorted((ROOT / "analysis").rglob("*.py"))
+"""Scripts that draw the pictures of the manual."""
 ROOMS = sorted({path.relative_to(PACKAGE).parts[0] for path in PACKAGE.rglob("*.py")})
 PAGES = [ROOT / "README.md", *(p for p in sorted((ROOT / "docs").glob("*.md")) if p.name not in WRITTEN_BY_OTHERS)]
 
@@ -124,6 +126,12 @@ def test_a_page_uses_the_terms_of_the_field(page):
 @pytest.mark.parametrize("room", ROOMS)
 def test_docstrings_comments_and_messages_use_the_terms_of_the_field(room):
     assert [one for path in files_of(room) for one in uses_in_code(path, KEPT)] == []
+
+
+@pytest.mark.parametrize("story", STORIES, ids=name)
+def test_stories_and_their_pictures_use_the_terms_of_the_field(story):
+    """What a picture says is a string of its script."""
+    assert uses_in_code(story, KEPT) == []
 
 
 @pytest.mark.parametrize("room", ROOMS)

@@ -1,18 +1,24 @@
 """A cohort: every study once, whatever fails or is killed; nothing done twice when it goes on."""
 
 import csv
+import html
+import io
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
+from urllib.parse import unquote
 
 import pytest
-from cohort.fakes import calls, quick, studies
+from cohort.fakes import calls, quick, record, studies
 
-from fes_pin.cohort.run import HEADS, find_studies, run_cohort
+from fes_pin.cohort.one import Kept
+from fes_pin.cohort.run import HEADS, Cohort, find_studies, run_cohort
+from fes_pin.cohort.tables import cohort_html, tables_of
 from fes_pin.data.errors import InputError
 
 DEMO = Path(__file__).parents[2] / "analysis/studies/ankle_demo"
@@ -44,7 +50,38 @@ def test_one_bad_study_and_one_that_kills_its_process_stop_no_other(tmp_path):
     assert by_parameter["torque_nm"]["studies"] == 2 and by_parameter["gain"]["studies"] == 4
     assert all(n in rows(tmp_path / "out/studies.csv")[0] for n in HEADS["studies"])
     page = (tmp_path / "out/cohort.html").read_text()
-    assert "Coulomb friction in 2 of 4 studies" in page and 'href="studies/f1/report.html"' in page
+    assert "6 studies: 2 explained, 2 adequate, 2 failed" in page and "coulomb friction in 2 of 4" in page
+    assert 'href="studies/f1/report.html"' in page
+
+
+def test_a_cohort_says_which_causes_tie_which_studies_lack_something_and_what_to_do():
+    """A cause of a study where the data cannot distinguish it is said with its equivalents, wherever it is counted."""
+    kept = [Kept(n, record(n, 1.0 + k)) for k, n in enumerate(("f1", "f2", "f3", "a4"))]
+    kept[0].record["causes"][0]["equivalents"] = ["load_error", "fatigue"]
+    kept[1].record["remainder"]["unexplained"] = True
+    kept[3].record["absorbed"] = ["fatigue"]
+    tables = tables_of(kept, 30)
+    made, page = Cohort(**tables), cohort_html(tables, 0)
+    assert repr(made) == "4 studies: 2 explained, 1 partly explained, 1 adequate"
+    assert made.as_table()[2] == [("coulomb_friction", "3 of 4 (ties with fatigue and load_error in 1)", "75 %")]
+    advice = "record the trial that separates equivalent causes in f1; read which sensor or condition is missed most"
+    assert advice in page and advice in str(made)
+    (pooled,) = (r for r in made.pooled if r["parameter"] == "torque_nm")
+    forest, heat = (behind(page, n) for n in ("coulomb_friction_torque_nm", "studies_by_causes"))
+    assert [r["name"] for r in forest] == ["f1", "f2", "f3", "pooled  3 studies"]
+    assert [float(r["low"]) for r in forest[:3]] == pytest.approx([k - 0.196 for k in (1, 2, 3)], abs=1e-4)
+    assert [float(forest[3][n]) for n in ("low", "high")] == pytest.approx([pooled["low"], pooled["high"]], rel=1e-5)
+    assert {(r["study"], r["cause"]): r["percent"] for r in heat} == {
+        **{(n, "coulomb_friction"): "79" for n in ("f1", "f2", "f3")},
+        **{("f1", n): "equivalent" for n in ("load_error", "fatigue")},
+        ("a4", "fatigue"): "not testable",
+    }
+
+
+def behind(page, name):
+    """Rows of the data behind a figure."""
+    data = re.search(f'download="{name}.csv" href="data:text/csv,([^"]*)"', page)[1]
+    return list(csv.DictReader(io.StringIO(unquote(html.unescape(data)))))
 
 
 def test_nothing_is_said_of_what_was_not_computed(tmp_path):
@@ -159,7 +196,8 @@ def test_the_command_diagnoses_a_study_and_says_what_failed(tmp_path):
         text=True,
         check=True,
     )
-    assert "1 of 2 studies diagnosed" in done.stdout
+    assert "2 studies: 1 stopped, 1 failed" in done.stdout
+    assert "next: correct the files of broken; diagnose again" in " ".join(done.stdout.split())
     assert "failed: broken: " in done.stderr and "study.toml" in done.stderr
     assert {p.name for p in (tmp_path / "out/studies/ankle_demo").iterdir()} == {
         *("diagnosis.json", "model.toml", "report.html", "state.json", ".fes_pin.json")

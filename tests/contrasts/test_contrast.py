@@ -13,9 +13,11 @@ from contrast_pairs.twitch import twitch_pair
 from data import studies
 
 import fes_pin as fp
+from fes_pin.contrasts.changes import not_changed, ranges
 from fes_pin.contrasts.fits import GroupedFits
 from fes_pin.contrasts.groups import in_groups
 from fes_pin.contrasts.models import ContrastModels
+from fes_pin.contrasts.replay import EVERY, errors_by_group, replayed_groups
 from fes_pin.data.errors import InputError
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
@@ -80,6 +82,39 @@ def test_one_change_is_named_alone_with_its_size(tmp_path):
     for name in (*found.excluded, *found.unchanged):
         assert any("would have been seen in 95 of 100" in line for line in found.explain(name))
     assert found.explain("nonsense")[0].startswith("nonsense: not fitted; candidates were ")
+    assert_the_page_shows_both_groups(found)
+
+
+def assert_the_page_shows_both_groups(found):
+    """Trials of both groups are drawn, with the models of both, and the error of each is in a table."""
+    page, errors = report_html(found), errors_by_group(replayed_groups(found))
+    for words in ("measured, before", "measured, after", "model of before", "model of after", "force (N)"):
+        assert f">{words}</text>" in page, words
+    assert errors["after"]["after"] < 0.1 * errors["after"]["before"]
+    removed = 100.0 * (1.0 - errors["after"]["after"] / errors["after"]["before"])
+    assert f"instead of that of before, removes {removed:.0f} % of the squared error" in page
+    assert "before absent, after" in page and "after none" not in page and "held" not in found.changes[0].row()[2]
+
+
+def test_groups_without_a_change_share_one_model(tmp_path):
+    found = fp.contrast(free_pair("muscle", (), 80.0, 3, tmp_path))
+    assert all(list(one.models) == [EVERY] for one in replayed_groups(found))
+    assert f">model of {EVERY}</text>" in report_html(found)
+
+
+def test_no_size_beyond_the_range_of_the_data_is_excluded(tmp_path):
+    """A hum of more than all that was read is none that these data bound."""
+    study = free_pair("muscle", (), 80.0, 3, tmp_path)
+    known = ranges(study.trials, revolute=True)
+    assert known["N"] == max(float(np.ptp(t["force_n"])) for t in study.trials) and known["us"] > known["N"]
+    found = fp.contrast(study)
+    assert found.excluded["mains_hum"].value < known["N"]
+    best = found.fit
+    models = ContrastModels(GroupedFits(nominal_model(study), in_groups(study.trials), False))
+    models.fits[()], models.family = best, models.screen.family(best, 0)
+    still = replace(best, trials=tuple(t.with_columns(force_n=1e-6 * t["force_n"]) for t in best.trials))
+    _, excluded, untestable = not_changed(models, still)
+    assert "mains_hum" in untestable and "mains_hum" not in excluded and "electromechanical_delay" in excluded
 
 
 def test_the_certainty_of_a_change_is_that_of_the_difference_between_groups(tmp_path):

@@ -79,7 +79,7 @@ def test_errors_of_a_fitted_trial_start_from_its_fitted_state(tmp_path):
     assert [c.name for c in found.causes] == ["quadratic_damping"]
     assert found.causes[0].gain_held_out.low > 50.0
     assert found.extended_error[0] == pytest.approx(misfit_percent(found.extended), rel=0.05)
-    assert replayed_trials(found)[0].extended_error == pytest.approx(found.extended_error[0], rel=0.05)
+    assert replayed_trials(found)[0].errors["extended"] == pytest.approx(found.extended_error[0], rel=0.05)
 
 
 @pytest.mark.shared

@@ -74,4 +74,4 @@ def test_a_replay_has_every_trial_in_order():
     diagnosis = ankle_diagnosis()
     replays = replayed_trials(diagnosis)
     assert [r.measured.name for r in replays] == [t.name for t in diagnosis.study.trials]
-    assert all(r.extended_error < r.nominal_error for r in replays[:1])
+    assert all(r.errors["extended"] < r.errors["nominal"] for r in replays[:1])

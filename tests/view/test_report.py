@@ -12,6 +12,7 @@ import time
 from dataclasses import replace
 from functools import cache
 from html.parser import HTMLParser
+from types import SimpleNamespace
 from urllib.parse import unquote
 
 import pytest
@@ -20,12 +21,15 @@ from view.reported import NASTY, ankle_diagnosis, ankle_study, diagnosed, joint_
 
 import fes_pin as fp
 from fes_pin.diagnosis.errors_ahead import Ahead, AheadErrors, RandomPart
+from fes_pin.diagnosis.replay import replayed_trials
 from fes_pin.infer.result import STOPPED
 from fes_pin.infer.text import rounded
 from fes_pin.models.describe import equation
 from fes_pin.models.effects import effect_named
 from fes_pin.models.predictor import StateSpaceNoise
+from fes_pin.view.drawing import panels, svg
 from fes_pin.view.mathml import equations_mathml
+from fes_pin.view.plots import heat_drawing, trial_drawing
 from fes_pin.view.report import report_html
 from fes_pin.view.report_trials import got_worse
 from fes_pin.view.sections import UNIT_IN_NAME
@@ -217,11 +221,59 @@ def test_every_trial_is_drawn_and_those_that_got_worse_are_said():
     assert "9 of 9 trials got worse" in Page(found).text
 
 
-def test_what_got_worse_is_more_than_rounding():
-    class One:
-        has_cause, nominal_error, extended_error = True, 1.0, 1.005
+@pytest.mark.parametrize(
+    ("errors", "worse"),
+    [
+        ({"nominal": 1.0, "extended": 1.005}, False),
+        ({"nominal": 1.0, "extended": 1.02}, True),
+        ({"nominal": 1.0}, False),
+    ],
+)
+def test_what_got_worse_is_more_than_rounding(errors, worse):
+    assert got_worse(SimpleNamespace(errors=errors)) is worse
 
-    assert not got_worse(One) and setattr(One, "extended_error", 1.02) is None and got_worse(One)
+
+def texts(svg: str) -> list[str]:
+    """Every text of a figure."""
+    return [html.unescape(words) for words in re.findall(r"<text[^>]*>([^<]*)</text>", svg)]
+
+
+def test_a_figure_of_a_trial_has_a_legend_and_its_inputs_are_named_in_full(tmp_path):
+    shown = texts(report_html(diagnosis_of(tmp_path, 310.0)))
+    for words in ("measured", "nominal model, fitted", "extended model", "effort (N m)", "angle (rad)"):
+        assert words in shown, words
+
+
+def test_what_was_measured_is_in_front_of_the_models():
+    diagnosis = ankle_diagnosis()
+    colours = re.findall(
+        r"stroke: var\(--(measured|nominal|extended)", trial_drawing(replayed_trials(diagnosis)[0]).svg
+    )
+    first = list(dict.fromkeys(colours))
+    assert first == ["extended", "nominal", "measured"]
+
+
+def test_numbers_of_an_axis_keep_their_digits():
+    drawing, ((panel,),) = panels([50.0])
+    panel.plot([0.0, 1.0], [0.001, 0.004])
+    panel.set_yticks([0.001, 0.0025, 0.004])
+    assert {"0.0010", "0.0025", "0.0040"} <= set(texts(svg(drawing, "")))
+
+
+def test_words_in_backticks_are_code_on_a_page_and_no_backtick_is_left():
+    page = report_html(replace(ankle_diagnosis(), warnings=("`diagnose` says <what>",)))
+    assert "<code>diagnose</code> says &lt;what&gt;" in page and "`" not in Page(page).text
+
+
+def test_a_heat_map_says_each_cell_in_words_and_in_its_data():
+    cells = {("a", "fatigue"): 79.4, ("b", "fatigue"): "equivalent", ("b", "sensor_offset"): "not testable"}
+    drawn = heat_drawing(["a", "b"], ["fatigue", "sensor_offset"], cells)
+    assert list(csv.reader(io.StringIO(drawn.csv)))[1:] == [
+        ["a", "fatigue", "79.4"],
+        ["b", "fatigue", "equivalent"],
+        ["b", "sensor_offset", "not testable"],
+    ]
+    assert {"a", "b", "fatigue", "sensor_offset", "79 %", "=", "x"} == set(texts(drawn.svg))
 
 
 def test_no_chance_is_zero_and_no_floor_is_a_tiny_number():

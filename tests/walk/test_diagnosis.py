@@ -106,6 +106,12 @@ def test_the_data_of_the_ground_reaction_stand_behind_its_figure(heavy):
     assert rows[:, head.index("vertical_force_measured")] == pytest.approx(trial.measured[near, 2], rel=1e-4, abs=1e-3)
 
 
+def test_the_ground_reaction_has_residuals_and_a_legend_that_names_the_model(heavy):
+    shown = re.findall(r"<text[^>]*>([^<]*)</text>", report_html(heavy))
+    assert {"measured", "required, nominal body", "required, extended body"} <= set(shown)
+    assert shown.count("residual") == 6 * len(heavy.study.trials)
+
+
 def test_one_question_for_every_study_and_its_limit_of_time_holds(heavy, tmp_path):
     """`fp.diagnose` answers for a body as for a rig; with no time it says what it could not do, and names nothing."""
     study = heavy.study
