@@ -110,7 +110,9 @@ def test_no_size_beyond_the_range_of_the_data_is_excluded(tmp_path):
     found = fp.contrast(study)
     assert found.excluded["mains_hum"].value < known["N"]
     best = found.fit
-    models = ContrastModels(GroupedFits(nominal_model(study), in_groups(study.trials), False))
+    nominal = nominal_model(study)
+    effects = found.catalogue.effects_for(nominal.rig)
+    models = ContrastModels(GroupedFits(nominal, in_groups(study.trials), False, effects))
     models.fits[()], models.family = best, models.screen.family(best, 0)
     still = replace(best, trials=tuple(t.with_columns(force_n=1e-6 * t["force_n"]) for t in best.trials))
     _, excluded, untestable = not_changed(models, still)
