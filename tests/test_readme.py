@@ -56,3 +56,9 @@ def test_every_page_passes_a_strict_type_checker(tmp_path):
 def test_the_first_one_leaves_a_model_and_a_report(names):
     assert names["README.md"]["diagnosis"].verdict == "causes_found"
     assert all(Path(file).stat().st_size > 100 for file in ("model.toml", "report.html"))
+
+
+def test_the_first_picture_says_what_each_curve_is():
+    picture = (ROOT / "analysis/figures/verdict.svg").read_text()
+    for words in ("measured", "nominal model, fitted", "extended model", "angle (rad)", "pulse width (µs)"):
+        assert f">{words}</text>" in picture, words
