@@ -15,29 +15,28 @@ from fes_pin.infer.family import least_seen
 from fes_pin.infer.keys import Key
 from fes_pin.infer.levels import CLAIM_LEVEL, IDENTIFIABLE_SHARE
 from fes_pin.infer.result import Change, Evidence, ParameterEstimate
-from fes_pin.models.catalogue import Catalogue
+from fes_pin.models.describe import fitted_equation
 
 
-def change_of(
-    models: ContrastModels, found: Found, item: Key, catalogue: Catalogue, evidence: Evidence | None
-) -> Change:
+def change_of(models: ContrastModels, found: Found, item: Key, evidence: Evidence | None) -> Change:
     """Return one change of the result: its size in each group, in words, and its equivalents."""
     best, model, groups = found.best, found.best.grouped, tuple(found.best.grouped.models)
     wider = math.sqrt(max(1.0, models.spread(best, *models.under_noise_of(best, [found.without[str(item)]])).phi))
-    nominal = item.name in found.nominal.grouped.free
     parameters = _by_group(best, item, wider)
     first = next(iter(parameters.values()))
     one, two = sorted((item.group, next(g for g in groups if g != item.group)), key=groups.index)
-    if nominal:
+    effect = next((e for e in model.models[item.group].effects if e.name == item.name), None)
+    if effect is None:
         words = of_nominal(model.rig, item.name, first[one].value, first[two].value, first[one].unit)
     else:
         there = item.name in (e.name for e in model.models[one].effects)
-        words = of_cause(catalogue.effect(item.name), first[one].value, first[two].value, first[one].unit, there)
+        words = of_cause(model.rig, effect, first[one].value, first[two].value, first[one].unit, there)
     return Change(
         name=item.name,
-        kind="nominal" if nominal else "effect",
+        kind="effect" if effect else "nominal",
         group=item.group,
         words=f"{words} (from {one} to {two})",
+        equation=fitted_equation(effect, model.rig) if effect else "",
         parameters=parameters,
         equivalents=_equivalents(models, found, item),
         p_value=found.p_values[str(item)],
@@ -49,10 +48,11 @@ def _by_group(best: Grouped, item: Key, wider: float) -> dict[str, dict[str, Par
     """Return each parameter of a change in each group, with widened deviations; its null where a group has none."""
     model = best.grouped
     own = model.models[item.group]
+    unused = own.unused_parameters()
     parameters: dict[str, dict[str, ParameterEstimate]] = {}
     for path in [n for n in own.parameters() if n.partition(".")[0] == item.name]:
         here = own.parameter_info()[path]
-        if here.optional:
+        if path in unused:
             continue
         parameters[path.removeprefix(f"{item.name}.")] = values = {}
         for group in model.models:

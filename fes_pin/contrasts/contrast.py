@@ -186,7 +186,7 @@ class _Work:
         state = ContrastVerdict(search).of(answer.found)
         models, found, best, left = search.models, state.found, state.found.best, state.weighed.lack_of_fit
         evidence = state.weighed.evidence
-        changes = [change_of(models, found, i, self.catalogue, evidence.get(str(i))) for i in best.changes]
+        changes = [change_of(models, found, i, evidence.get(str(i))) for i in best.changes]
         changes += [misread_change(models, made.misread)] if made is not None else []
         unchanged, excluded, untestable = not_changed(models, best)
         smoothed = max(best.weights.noise.values(), key=lambda n: n.correlation_s)

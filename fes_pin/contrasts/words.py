@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from fes_pin.models.describe import sentence
+from fes_pin.models.describe import fitted_sentence
 from fes_pin.models.rigs.base import Rig
 from fes_pin.models.stage import Effect
 
@@ -50,9 +50,9 @@ def of_nominal(rig: Rig, name: str, before: float, after: float, unit: str) -> s
     return f"{happened}, {size:.3g} {unit}".strip()
 
 
-def of_cause(kind: type[Effect], before: float, after: float, unit: str, there_before: bool) -> str:
+def of_cause(rig: Rig, effect: Effect, before: float, after: float, unit: str, there_before: bool) -> str:
     """Return the change of a cause in words, by its first parameter."""
-    cause = sentence(kind).removesuffix(".")
+    cause = fitted_sentence(effect, rig).removesuffix(".")
     if not there_before:
         return f"new: {cause}, {after:.3g} {unit}".strip()
     return f"changed: {cause}, {before:.3g} -> {after:.3g} {unit}".strip()

@@ -25,6 +25,7 @@ from fes_pin.infer.result import CROSS_VALIDATED, FITTED, HELD_OUT, STOPPED, Cau
 from fes_pin.infer.scatter import as_wide_as_estimates_differ, as_wide_as_trials_differ, with_honest_intervals
 from fes_pin.infer.verdict import ADEQUATE, word_of
 from fes_pin.infer.why import why_of
+from fes_pin.models.describe import fitted_equation, fitted_sentence
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
 from fes_pin.search.likelihood_fits import LikelihoodFits
@@ -146,6 +147,8 @@ def _cause(verdict: RigVerdict, state: RigState, one: Effect, best: LikelihoodFi
     alike = state.search.models.alike(found, name)
     return Cause(
         name=name,
+        words=fitted_sentence(one, best.model.rig),
+        equation=fitted_equation(one, best.model.rig),
         stage=str(one.stage),
         parameters=estimates(best, name),
         equivalents=alike[1:],

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, TypeVar
 from fes_pin.infer.family import SMALLEST_P
 from fes_pin.infer.levels import CONFIDENCE_95, MOST_PERCENT, NOTHING_PERCENT
 from fes_pin.infer.optimum import Optimum
-from fes_pin.infer.text import percent, probability, quantity
+from fes_pin.infer.text import percent, plain_name, probability, quantity
 
 CELLS = ("value", "std", "unit", "low", "high", "at_bound")
 """Columns of tables of estimates; `low` and `high` are the ends of the 95 % interval."""
@@ -354,7 +354,9 @@ class Named:
     trial
         The only trial that it concerns, if it does not concern all.
     words
-        The change in words, where the name alone does not state it.
+        The cause or change in one sentence, with its form as fitted.
+    equation
+        The equation of a cause with its form as fitted; a fitted parameter has its name without a unit in it.
     evidence
         Its evidence in held-out data; None where the model has a lack of fit.
     """
@@ -366,6 +368,7 @@ class Named:
     site: str = ""
     trial: str | None = None
     words: str = ""
+    equation: str = ""
     evidence: Evidence | None = None
     PLACE: ClassVar[tuple[str, ...]] = ("stage", "site")
     """Attribute that says where it acts."""
@@ -385,6 +388,10 @@ class Named:
     def tested(self) -> str:
         """Return its p-value and the gain by which it is named, in words."""
         return probability(self.p_value) + (f", {self.judged.measure} {self.judged}" if self.judged else "")
+
+    def label(self, name: str, one: ParameterEstimate) -> str:
+        """Return the name of a parameter as printed: in words, but for one of a site, which may be that of a trial."""
+        return name if self.site else plain_name(name, one.unit)
 
     def estimates(self) -> list[tuple[tuple[str, ...], ParameterEstimate]]:
         """Return every estimate of it, with its cells of `CELL`."""
@@ -417,7 +424,7 @@ class Named:
 
     def record(self) -> dict[str, Any]:
         """As JSON files have it."""
-        place = {n: value for n in (*self.PLACE, "trial", "words") if (value := getattr(self, n))}
+        place = {n: value for n in (*self.PLACE, "trial", "words", "equation") if (value := getattr(self, n))}
         own = {"parameters": self._parameters(), "equivalents": list(self.equivalents)}
         return {"name": self.name, **place, **own, "p_value": p_shown(self.p_value), **self._gains()}
 
@@ -475,7 +482,7 @@ class Cause(Named):
 
     def row(self) -> tuple[str, ...]:
         """Return name, site, values, gain and equivalents."""
-        values = "\n".join(f"{n} {one}" for n, one in self.parameters.items())
+        values = "\n".join(f"{self.label(n, one)} {one}" for n, one in self.parameters.items())
         where = f"trial {self.trial}" if self.trial is not None else self.site or self.stage
         test = probability(self.p_value).removeprefix("p = ").removeprefix("p ")
         return self.name, where, values, str(self.gain_held_out), test, ", ".join(self.equivalents) or "-"
@@ -536,7 +543,8 @@ class Change(Named):
     def row(self) -> tuple[str, ...]:
         """Return name, kind of change, values by group, p-value and equivalents."""
         lines = [
-            f"{name}: " + ", ".join(f"{g} {one if one.std else ABSENT}" for g, one in groups.items())
+            f"{self.label(name, groups[self.group])}: "
+            + ", ".join(f"{g} {one if one.std else ABSENT}" for g, one in groups.items())
             for name, groups in self.parameters.items()
         ]
         return self.name, self.words, "\n".join(lines), probability(self.p_value), ", ".join(self.equivalents) or "-"

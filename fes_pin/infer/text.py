@@ -1,6 +1,7 @@
 """Numbers in words: p-values, percentages and estimates as they are printed everywhere."""
 
 import math
+import re
 
 LEAST_P, LEAST_PERCENT = 1e-12, 1e-3
 """Least p-value and percentage that are printed; smaller ones are printed as below these."""
@@ -8,6 +9,20 @@ WHOLE = 100.0
 """A whole in percent: from it on no decimals are printed."""
 LARGE, DIGITS = 1e5, 6
 """Larger values, and values with more decimals, are printed with a power of ten."""
+
+UNIT_IN_NAME = re.compile(r"(?<=.)(_(kgm2|nms|nm|us|s|hz|n|kg|rad))?(_per_(rad[23]?|s))?$")
+"""Unit in a parameter's name; for a slide it is another than the parameter has."""
+ON_A_SLIDE = {"torque": "force", "angle": "position"}
+"""Words for quantities of a joint that turns, and for those of a slide."""
+
+
+def plain_name(name: str, unit: str) -> str:
+    """Return the name of a parameter in words, without a unit, which is printed next to its value.
+
+    A torque in newtons is a force, and an angle in metres a position.
+    """
+    words = UNIT_IN_NAME.sub("", name).split("_")
+    return " ".join(ON_A_SLIDE.get(w, w) if unit in ("N", "m") else w for w in words)
 
 
 def probability(value: float) -> str:

@@ -49,6 +49,8 @@ class ParameterInfo:
         The rigs on which a refinement is tried; empty for all of its effect's.
     times
         The amplitude that a shape is a factor of: what acts is linear in the amplitude and in their product.
+    words
+        What the sentence of a cause says of it in addition where its value is not the null; or a function of the value.
     """
 
     unit: str = ""
@@ -61,6 +63,7 @@ class ParameterInfo:
     optional: bool = False
     rigs: tuple[str, ...] = ()
     times: str = ""
+    words: str | Callable[[float], str] = ""
 
     def __repr__(self) -> str:
         rotary, sliding = (self.in_units(units).unit or "a pure number" for units in (ROTARY, SLIDING))
@@ -72,6 +75,10 @@ class ParameterInfo:
         """Whether a value is within the bounds, or beyond one by no more than rounding, as a fit may end at it."""
         bound = self.nearest(value)
         return value == bound or math.isclose(value, bound, rel_tol=ROUNDING, abs_tol=ROUNDING * self.scale)
+
+    def said(self, value: float) -> str:
+        """What the sentence of a cause says of the parameter at a value other than its null."""
+        return self.words(value) if callable(self.words) else self.words
 
     def nearest(self, value: float) -> float:
         """The value within the bounds that is nearest to one."""

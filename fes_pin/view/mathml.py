@@ -1,8 +1,6 @@
 """Equations of docstrings as MathML, which browsers set as mathematics; what cannot be parsed stays as it is written.
 
-The notation: products by a space, quotients by /, powers by ^, calls by a bracket that follows at once, v' and v'' for
-derivatives, b+ for the next value, x_y for an index of a letter, -> for "becomes". Three spaces separate an equation
-from a remark on it. It is rewritten as an expression of Python, which Python's own parser reads.
+`models.notation` reads them. Three spaces separate an equation from a remark on it.
 
 Source: MathML Core, W3C.
 """
@@ -11,6 +9,7 @@ import ast
 import html
 import re
 
+from fes_pin.models.notation import NEXT, PRIME, read_equation
 from fes_pin.view.page import Markup
 
 GREEK = {
@@ -21,19 +20,6 @@ WORDS = set(
     ["where", "replaced", "by", "replaces", "shortens", "the", "muscle", "from", "up", "for", "at", "if", "else", "and"]
 )
 """Words of a sentence, which are no names of quantities."""
-PRIME, NEXT = "ʹ", "ᐩ"
-"""Letters of Python's names that mean a prime and the plus of a next value."""
-AS_PYTHON = {
-    r"([^\W\d]\w*)\+(?=\s*(?:=|$))": rf"\1{NEXT}",
-    "'": PRIME,
-    r"\b[^\W\d]": r"_\g<0>",  # no name is a keyword
-    r"\^": "**",
-    r"(?<![<>])=": "==",
-    "->": ">>",
-    r"\|([^|]*)\|": r"abs(\1)",
-    r"(?<=[\w)])\s+(?=[\w(])": "@",  # a product
-}
-"""The notation, and what Python has for it; in this order."""
 SIGNS: dict[type[ast.AST], str] = {
     **{ast.Add: "+", ast.UAdd: "+", ast.Sub: "−", ast.USub: "−", ast.Mult: "·", ast.RShift: "→"},
     **{ast.Eq: "=", ast.Lt: "&lt;", ast.Gt: "&gt;", ast.LtE: "≤", ast.GtE: "≥"},
@@ -64,10 +50,7 @@ def _line(line: str) -> str:
 
 def _math(text: str) -> str:
     """Equations; a comma may end them."""
-    written = text.removesuffix(",")
-    for pattern, instead in AS_PYTHON.items():
-        written = re.sub(pattern, instead, written)
-    made = _drawn(ast.parse(written, mode="eval").body)
+    made = _drawn(read_equation(text.removesuffix(",")))
     return f"<math><mrow>{made}{'<mo>,</mo>' * text.endswith(',')}</mrow></math>"
 
 

@@ -15,7 +15,7 @@ from fes_pin.models.describe import equation, remark, sentence
 from fes_pin.view.mathml import equations_mathml
 from fes_pin.view.page import Content, Markup, document, element, figure, folded, html_table, section, unit_text
 from fes_pin.view.plots import intervals_drawing, rivals_drawing
-from fes_pin.view.sections import UNIT_IN_NAME, Parts, header, provenance_parts, stage_mark, value_and_interval
+from fes_pin.view.sections import Parts, header, provenance_parts, stage_mark, value_and_interval
 
 OWN = {"Diagnosis": "report_rig", "WalkDiagnosis": "report_walk", "Contrast": "report_groups"}
 """Modules that hold what each front end adds, as `PARTS`."""
@@ -92,8 +92,9 @@ def _sizes(one: Named) -> list[str]:
     sizes = []
     for (name, *group), estimate in one.estimates():
         if estimate.std != 0.0 or not group:
-            words = [UNIT_IN_NAME.sub("", name).replace("_", " "), *group]
-            sizes.append(" ".join([*words, str(replace(estimate, unit=unit_text(estimate.unit)))]))
+            sizes.append(
+                " ".join([one.label(name, estimate), *group, str(replace(estimate, unit=unit_text(estimate.unit)))])
+            )
     return sizes
 
 
@@ -135,9 +136,12 @@ def _named(result: Result) -> list[Markup]:
 def _card(result: Result, one: Named) -> Markup:
     """Return the card of a cause or a change, in a frame in the colour of its stage."""
     kind, stage = result.effect(one.name), getattr(one, "stage", "")
-    values = [(cell, _value(one, estimate)) for cell, estimate in one.estimates()]
-    rows: list[list[Content]] = [[*(element("code", n) for n in cell), *printed] for cell, printed in values]
-    about = [equations_mathml(equation(kind)), element("p", f"Tell-tale: {remark(kind, 'Tell-tale:')}")] if kind else []
+    rows: list[list[Content]] = [
+        [element("code", one.label(n, estimate)), *(element("code", g) for g in group), *_value(one, estimate)]
+        for (n, *group), estimate in one.estimates()
+    ]
+    told = element("p", f"Tell-tale: {remark(kind, 'Tell-tale:')}") if kind else Markup("")
+    about = [equations_mathml(one.equation or equation(kind)), told] if kind else []
     table = html_table((*one.CELL, "value", "unit", "95 % interval"), rows, (len(one.CELL), len(one.CELL) + 2))
     drawn = [table, _by_group(one) if isinstance(one, Change) else _rivals(result, one)]
     return element("article", element("div", element("h3", _heading(one)), *about, *drawn), class_=f"cause {stage}")
@@ -173,6 +177,7 @@ def _by_group(change: Change) -> Markup:
     name, groups = next(iter(change.parameters.items()))
     rows = [(g, e.value, *e.interval, "") for g, e in groups.items()]
     unit = unit_text(next(iter(groups.values())).unit)
+    name = change.label(name, groups[change.group])
     drawn = intervals_drawing(rows, f"{name} ({unit})" if unit else name)
     return figure(drawn, f"{name} in each group.", "narrow", change.name)
 

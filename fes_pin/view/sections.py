@@ -1,6 +1,5 @@
 """Parts of pages that several of them show."""
 
-import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -11,9 +10,6 @@ from fes_pin.infer.result import ParameterEstimate
 from fes_pin.infer.text import estimated
 from fes_pin.models.describe import sentence
 from fes_pin.view.page import Content, Markup, element, folded, html_table, joined, section, unit_text
-
-UNIT_IN_NAME = re.compile(r"(?<=.)(_(nms|nm|us|s|hz|n|kg|rad))?(_per_(rad[23]?|s))?$")
-"""Unit in a parameter's name, which is printed next to the value: for a slide it is another."""
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ import fes_pin as fp
 from fes_pin.diagnosis.errors_ahead import Ahead, AheadErrors, RandomPart
 from fes_pin.diagnosis.replay import replayed_trials
 from fes_pin.infer.result import STOPPED
-from fes_pin.infer.text import rounded
+from fes_pin.infer.text import plain_name, rounded
 from fes_pin.models.describe import equation
 from fes_pin.models.effects import effect_named
 from fes_pin.models.predictor import StateSpaceNoise
@@ -32,7 +32,6 @@ from fes_pin.view.mathml import equations_mathml
 from fes_pin.view.plots import heat_drawing, trial_drawing
 from fes_pin.view.report import report_html
 from fes_pin.view.report_trials import got_worse
-from fes_pin.view.sections import UNIT_IN_NAME
 
 VOID = {"meta", "br", "hr", "img", "input", "link"}
 
@@ -366,14 +365,14 @@ def test_the_page_renders_in_chromium_without_asking_for_anything(tmp_path):
         ("rate_us_per_s", "rate"),
         ("slope_s_per_rad", "slope"),
         ("skew_per_rad3", "skew"),
-        ("rest_angle_rad", "rest_angle"),
+        ("rest_angle_rad", "rest angle"),
         ("second_s", "second"),
-        ("half_width", "half_width"),
-        ("creep_speed", "creep_speed"),
+        ("half_width", "half width"),
+        ("creep_speed", "creep speed"),
     ],
 )
 def test_words_of_a_size_are_without_its_unit(name, words):
-    assert UNIT_IN_NAME.sub("", name) == words
+    assert plain_name(name, "") == words
 
 
 def test_a_bound_at_nothing_is_no_row_of_noughts():

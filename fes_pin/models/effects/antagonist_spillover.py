@@ -11,7 +11,8 @@ class AntagonistSpillover(Effect):
     """Above some pulse width the stimulus also recruits the antagonist.
 
         r_s     = clip((w - onset) / (saturation - onset), 0, 1)
-        lag b'  = r_s - b
+        lag b'  = r_s - b                         with lag_s
+        b       = r_s                             without lag_s
         F_net   = F_M - share K F_ref b
 
     Tell-tale: the strongest stimuli move the joint less than weaker ones predict, though the muscle alone pulls as
@@ -24,7 +25,7 @@ class AntagonistSpillover(Effect):
     onset_us: float = parameter(
         600.0, unit="us", lower=0.0, upper=2000.0, scale=50.0, grid=(300.0, 450.0, 600.0, 750.0, 900.0)
     )
-    lag_s: float = refinement(0.0, unit="s", lower=0.0, upper=0.5, scale=0.02, grid=(0.05,))
+    lag_s: float = refinement(0.0, unit="s", lower=0.0, upper=0.5, scale=0.02, grid=(0.05,), words="which answers late")
 
     name, stage, signal, rigs = "antagonist_spillover", Stage.NERVE, "net_force", ("ankle",)
     states = ("act",)

@@ -32,7 +32,9 @@ class Cogging(Effect):
     in_phase: float = parameter(0.01, unit="{effort}", null=0.0, lower=-1e6, upper=1e6, scale=0.01)
     quadrature: float = parameter(0.0, unit="{effort}", null=0.0, lower=-1e6, upper=1e6, scale=0.01)
     waves: float = parameter(12.0, unit="1/{q}", lower=0.0, upper=1e5, scale=1.0)
-    second: float = refinement(0.0, unit="{effort}", lower=0.0, upper=1e6, scale=0.01, grid=(0.005,))
+    second: float = refinement(
+        0.0, unit="{effort}", lower=0.0, upper=1e6, scale=0.01, grid=(0.005,), words="with a second harmonic"
+    )
     phase_rad: float = parameter(
         0.0, unit="rad", lower=-TURN, upper=TURN, scale=0.5, optional=True, grid=(0.0, TURN / 4, TURN / 2, -TURN / 4)
     )

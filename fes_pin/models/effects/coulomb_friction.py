@@ -31,36 +31,39 @@ UNLOADED = 1e-3
 """Load below which its sign no longer shows, in units of the weight at rest: it keeps derivatives finite."""
 
 
+def _by_load(exponent: float) -> str:
+    return "in proportion to the load" + f" to the power {exponent:.3g}" * (exponent != 1.0)
+
+
 @dataclass(frozen=True)
 class CoulombFriction(Effect):
-    """Dry friction at the joint, with or without more of it at rest (Stribeck), under load or one way.
+    """Dry friction at the joint.
 
-        torque - T clip(x)
-        T = torque_nm |load|^load_exponent (1 + stiction exp(-(v / stribeck_speed)^2)) (1 + one_way)
-        x = y / max(1, |y|)^2 + k v / S,   y = torque / S,   S = T + k creep_speed,   k = STIFFEST J / h
+        effort - T sat(x, softness)                                              without presliding
+        effort - T z,   presliding z' = |v| (sat(x, softness) - z)               with presliding
+        T = torque |load|^load_exponent (1 + stiction exp(-(v / stribeck_speed)^2)) (1 + asymmetry sign(x))
+        x = y / max(1, |y|)^2 + k v / S,   y = effort / S,   S = T + creep_speed k                     without stretch
+        x = (q - a) / stretch + k v / S,   S = T + k sqrt(creep_speed^2 + T stretch / (4 J))           with stretch
+        a+ = clip(a, q - stretch, q + stretch)      once per sample                                    with stretch
+        k = STIFFEST J / h
 
-    with clip(x) from -1 to 1, its corners rounded over `softness` of the friction as ln cosh is, and h the integration
+    with sat(x, w) from -1 to 1, its corners rounded over w of the friction as ln cosh is, and h the integration
     step, 0 where the motion is imposed. It is T sign(v) in motion, and what holds the joint at rest: there x is
-    torque / S, and k v brings the joint there within a step. A torque beyond T only turns the motion: y falls out of x
+    effort / S, and k v brings the joint there within a step. A torque beyond T only turns the motion: y falls out of x
     then, and friction changes its sign where the velocity does. Under a torque below T the joint still creeps, at most
     by `creep_speed`: 0.2 degrees a second, until data show another. In the limit of small steps x = v / creep_speed.
     Far from its corners friction is T but for what falls exponentially: a slower approach would pass for damping. Wide
     corners make it T tanh(v / speed), the commonest smooth form. `load` is the bearing's: see the rig.
-    one_way = asymmetry sign(x), x without it.
+    The sign of the asymmetry is that of x without it.
     Where the motion is an estimate, friction is near its mean over what x may be by it: corners are rounded over
     sqrt(pi / 2) of that deviation as well. T sign(v) becomes T tanh(v / (sqrt(pi / 2) v_std)), which has the slope of
     the mean for a Gaussian. The slope at one velocity says nothing of friction at those next to it.
     A contact stretches before it slips. On a joint that is free, with `stretch` of it, what holds the joint at rest is
-    a spring to an anchor a that it drags along, and not the torque itself:
-
-        x = (q - a) / stretch + k v / S,   a+ = clip(a, q - stretch, q + stretch), once per sample
-        S = T + k sqrt(creep_speed^2 + T stretch / (4 J))
-
-    so that it comes to rest within the stretch of where it stopped. T over the stretch is the spring's stiffness, no
-    more than integration steps resolve, and its damping is critical, as bristles' is chosen to be, or less where data
-    show a larger `creep_speed`. Where the motion is imposed, friction
-    may build up over a way `presliding` as exponentials do: a share z acts, presliding z' = |v| (clip(x) - z). The
-    velocity is known there; noise in one that is estimated would wear z away while the joint stands.
+    a spring to an anchor a that it drags along, and not the torque itself, so that it comes to rest within the stretch
+    of where it stopped. T over the stretch is the spring's stiffness, no more than integration steps resolve, and its
+    damping is critical, as bristles' is chosen to be, or less where data show a larger `creep_speed`. Where the motion
+    is imposed, friction may build up over a way `presliding` as exponentials do: a share z acts. The velocity is known
+    there; noise in one that is estimated would wear z away while the joint stands.
     Sliding contacts lose in proportion to the load; rolling ones by elastic hysteresis, the load times the width of the
     contact: to the power 4/3 for balls, 3/2 for rollers. Friction that differs by the direction is, moving and at rest,
     symmetric friction together with a constant torque: a joint has `effort_offset` for that, and no asymmetry.
@@ -81,16 +84,30 @@ class CoulombFriction(Effect):
     """
 
     torque_nm: float = parameter(0.01, unit="{effort}", null=0.0, lower=0.0, upper=1e6, scale=0.01)
-    stiction: float = refinement(0.0, lower=0.0, upper=10.0, scale=0.1, grid=(0.05, 0.3))
+    stiction: float = refinement(
+        0.0, lower=0.0, upper=10.0, scale=0.1, grid=(0.05, 0.3), words="with more of it at rest (Stribeck)"
+    )
     stribeck_speed: float = parameter(
         1.0, unit="{q}/s", lower=1e-4, upper=1e4, scale=0.5, optional=True, grid=(1.0, 0.2, 4.0)
     )
-    creep_speed: float = refinement(CREEP, unit="{q}/s", lower=1e-5, upper=0.5, scale=0.002, grid=(0.02,))
-    softness: float = refinement(CORNER, lower=1e-3, upper=50.0, scale=0.1, grid=(0.5,))
-    load_exponent: float = refinement(0.0, lower=0.0, upper=2.0, scale=1.0, fitted=False, grid=(1.0, 4.0 / 3.0, 1.5))
-    asymmetry: float = refinement(0.0, lower=-1.0, upper=1.0, scale=0.1, grid=(0.3, -0.3), rigs=("ankle",))
-    presliding: float = refinement(0.0, unit="{q}", lower=0.0, scale=0.01)
-    stretch: float = refinement(0.0, unit="{q}", lower=0.0, scale=0.001, rigs=("joint",))
+    creep_speed: float = refinement(
+        CREEP, unit="{q}/s", lower=1e-5, upper=0.5, scale=0.002, grid=(0.02,), words="under which the joint creeps"
+    )
+    softness: float = refinement(
+        CORNER, lower=1e-3, upper=50.0, scale=0.1, grid=(0.5,), words="which changes its sign smoothly with the speed"
+    )
+    load_exponent: float = refinement(
+        0.0, lower=0.0, upper=2.0, scale=1.0, fitted=False, grid=(1.0, 4.0 / 3.0, 1.5), words=_by_load
+    )
+    asymmetry: float = refinement(
+        0.0, lower=-1.0, upper=1.0, scale=0.1, grid=(0.3, -0.3), rigs=("ankle",), words="with more of it one way"
+    )
+    presliding: float = refinement(
+        0.0, unit="{q}", lower=0.0, scale=0.01, words="which builds up over a way (presliding)"
+    )
+    stretch: float = refinement(
+        0.0, unit="{q}", lower=0.0, scale=0.001, rigs=("joint",), words="at a contact that stretches before it slips"
+    )
 
     name, stage, signal, rigs = "coulomb_friction", Stage.JOINT, "friction", ("ankle", "joint")
     states, memories, of_form = ("share",), ("anchor",), {"share": "presliding", "anchor": "stretch"}

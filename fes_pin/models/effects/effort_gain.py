@@ -1,4 +1,4 @@
-"""The effort is scaled, or has the wrong sign."""
+"""The effort is scaled."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,7 @@ from fes_pin.models.stage import Effect, Scalar, Signals, Stage, parameter
 
 @dataclass(frozen=True)
 class EffortGain(Effect):
-    """The effort is scaled, or has the wrong sign.
+    """The effort is scaled.
 
         (1 + error) effort
 
@@ -20,7 +20,15 @@ class EffortGain(Effect):
     calibrates.
     """
 
-    error: float = parameter(0.1, null=0.0, lower=-11.0, upper=9.0, scale=0.05, grid=(-2.0,))
+    error: float = parameter(
+        0.1,
+        null=0.0,
+        lower=-11.0,
+        upper=9.0,
+        scale=0.05,
+        grid=(-2.0,),
+        words=lambda v: "with the wrong sign" * (v < -1.0),
+    )
 
     name, stage, signal, rigs = "effort_gain", Stage.RIG, "effort", ("joint",)
     of_record = True

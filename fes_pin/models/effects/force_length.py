@@ -22,7 +22,9 @@ class ForceLength(Effect):
 
     slope_per_rad: float = parameter(0.2, unit="1/{q}", null=0.0, lower=-1e4, upper=1e4, scale=0.1)
     curvature_per_rad2: float = parameter(0.2, unit="1/{q}2", null=0.0, lower=-1e6, upper=1e7, scale=0.2)
-    skew_per_rad3: float = refinement(0.0, unit="1/{q}3", lower=-1e9, upper=1e9, scale=0.2, rigs=("muscle",))
+    skew_per_rad3: float = refinement(
+        0.0, unit="1/{q}3", lower=-1e9, upper=1e9, scale=0.2, rigs=("muscle",), words="steeper on one side"
+    )
 
     name, stage, signal, rigs = "force_length", Stage.MUSCLE, "fibres", ("ankle", "muscle")
 

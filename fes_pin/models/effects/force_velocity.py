@@ -16,9 +16,10 @@ SMALL = 1e-30
 class ForceVelocity(Effect):
     """Force depends on the shortening velocity, in proportion to activation.
 
-        F = F_M (1 - x + bend x^2),   x = slope v,   v > 0 shortens the muscle                   a joint that is free
-        F = F_M (1 - x / (1 + hill)) / (1 + hill x / (1 + hill)),   x > 0                        imposed motion
-        F = F_M (1 - x / (1 - plateau x)),   x < 0
+        F = F_M (1 - x + bend x^2)      a joint that is free, on ankle
+        F = F_M (1 - x / (1 + hill)) / (1 + hill x / (1 + hill)),   x > 0      imposed motion
+        F = F_M (1 - x / (1 - plateau x)),   x < 0      imposed motion
+        x = slope v,   v > 0 shortens the muscle
 
     Hill's hyperbola with the slope at rest as its measure: it ends at the speed (1 + hill) / slope, and a muscle that
     is stretched comes to bear 1 + 1 / plateau of its isometric force. Each branch is a straight line at 0.
@@ -29,9 +30,13 @@ class ForceVelocity(Effect):
     """
 
     slope_s_per_rad: float = parameter(0.05, unit="s/{q}", null=0.0, lower=-100.0, upper=1e4, scale=0.05)
-    bend: float = refinement(0.0, lower=-20.0, upper=20.0, scale=0.5, grid=(0.5,), rigs=("ankle",))
-    hill: float = refinement(0.0, lower=0.0, upper=20.0, scale=1.0)
-    plateau: float = refinement(PLATEAU, lower=0.0, upper=20.0, scale=1.0)
+    bend: float = refinement(
+        0.0, lower=-20.0, upper=20.0, scale=0.5, grid=(0.5,), rigs=("ankle",), words="along a curve"
+    )
+    hill: float = refinement(0.0, lower=0.0, upper=20.0, scale=1.0, words="along Hill's hyperbola")
+    plateau: float = refinement(
+        PLATEAU, lower=0.0, upper=20.0, scale=1.0, words="with another limit where the muscle is stretched"
+    )
 
     name, stage, signal, rigs = "force_velocity", Stage.MUSCLE, "fibres", ("ankle", "muscle")
 

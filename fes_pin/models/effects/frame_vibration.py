@@ -12,6 +12,7 @@ class FrameVibration(Effect):
 
         phi'' = -omega^2 phi - 2 zeta omega phi' - coupling torque / J
         q''   = torque / J - phi''
+        omega = 2 pi frequency,   zeta = damping_ratio
 
     Tell-tale: after each sudden change the angle rings at one frequency of its own, whatever the load.
     A mode damped more than any joined frame, which is a fifth of critical at most, does not ring: it was mistaken for

@@ -1,4 +1,4 @@
-"""A stiff limit beyond an angle that the motion reaches."""
+"""A stiff limit that the motion reaches."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ from fes_pin.models.stage import Bounds, Effect, Grids, Measured, Scalar, Signal
 
 @dataclass(frozen=True)
 class JointStop(Effect):
-    """A stiff limit beyond an angle that the motion reaches.
+    """A stiff limit that the motion reaches.
 
         torque - side stiffness ramp(side (q - angle))
 

@@ -18,7 +18,9 @@ class LoadInertia(Effect):
     """
 
     share: float = parameter(0.5, null=0.0, lower=0.0, upper=3.0, scale=0.1)
-    wheel: float = refinement(0.0, lower=0.0, upper=1.0, scale=1.0, fitted=False, grid=(1.0,))
+    wheel: float = refinement(
+        0.0, lower=0.0, upper=1.0, scale=1.0, fitted=False, grid=(1.0,), words="which runs on a wheel"
+    )
 
     name, stage, signal, rigs = "load_inertia", Stage.JOINT, "driving", ("ankle",)
 

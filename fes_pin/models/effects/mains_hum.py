@@ -12,7 +12,7 @@ from fes_pin.models.stage import Effect, Grids, Measured, Scalar, Signals, Stage
 class MainsHum(Effect):
     """A sinusoid at the mains frequency in the measured output.
 
-        y + in_phase sin(2 pi f t) + quadrature cos(2 pi f t)
+        y + in_phase sin(2 pi frequency t) + quadrature cos(2 pi frequency t)
 
     Tell-tale: a steady ripple at 50 or 60 Hz (or where sampling folds it to) that is there at rest as well.
     Source: capacitive pick-up from the mains; the frequency is 50 or 60 Hz by country. Trials cut from one recording

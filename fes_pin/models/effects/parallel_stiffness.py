@@ -1,4 +1,4 @@
-"""An extra spring across the joint."""
+"""An extra passive spring."""
 
 from dataclasses import dataclass
 
@@ -13,10 +13,13 @@ FLAT = 1e-6
 
 @dataclass(frozen=True)
 class ParallelStiffness(Effect):
-    """An extra spring across the joint.
+    """An extra passive spring.
 
-        torque - stiffness x (1 + hardening x^2),   x = q - rest_angle                a joint
-        force + stiffness (exp(a x) - 1) / a,   a = sqrt(6 hardening),   x > 0        a muscle on a lever
+        torque - stiffness x (1 + hardening x^2)                      on ankle or joint
+        force + stiffness x,   x > 0                                  on muscle, without hardening_per_rad2
+        force + stiffness (exp(a x) - 1) / a,   x > 0                 on muscle, with hardening_per_rad2
+        a = sqrt(6 hardening)                                         on muscle, with hardening_per_rad2
+        x = q - rest_angle
 
     It pulls back: what pushes a joint away from an angle is gravity, or a muscle.
 
@@ -27,7 +30,9 @@ class ParallelStiffness(Effect):
 
     stiffness_nm_per_rad: float = parameter(0.05, unit="{effort}/{q}", null=0.0, lower=0.0, upper=1e8, scale=0.05)
     rest_angle_rad: float = parameter(1.6, unit="{q}", scale=0.1, times="stiffness_nm_per_rad")
-    hardening_per_rad2: float = refinement(0.0, unit="1/{q}2", lower=0.0, upper=1e7, scale=1.0, grid=(1.0,))
+    hardening_per_rad2: float = refinement(
+        0.0, unit="1/{q}2", lower=0.0, upper=1e7, scale=1.0, grid=(1.0,), words="which hardens"
+    )
 
     name, stage, signal, rigs = "parallel_stiffness", Stage.JOINT, "torque", ("ankle", "joint", "muscle")
 

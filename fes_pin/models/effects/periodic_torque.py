@@ -15,7 +15,7 @@ FASTEST_HZ = 0.8
 class PeriodicTorque(Effect):
     """A slow periodic external torque, as of breathing.
 
-        torque + in_phase sin(2 pi f t) + quadrature cos(2 pi f t)
+        torque + in_phase sin(2 pi frequency t) + quadrature cos(2 pi frequency t)
 
     Tell-tale: the rest angle sways in time with nothing that was commanded.
     Source: a Fourier component at the breathing rate: at rest 12 to 20 a minute in people, 10 to 35 in dogs, and up

@@ -20,7 +20,9 @@ class SensorDrift(Effect):
     """
 
     rate_per_s: float = parameter(0.001, unit="{y}/s", null=0.0, scale=0.0005)
-    settling_per_s: float = refinement(0.0, unit="1/s", lower=0.0, upper=10.0, scale=0.1, grid=(0.2,))
+    settling_per_s: float = refinement(
+        0.0, unit="1/s", lower=0.0, upper=10.0, scale=0.1, grid=(0.2,), words="which levels off"
+    )
 
     name, stage, signal, rigs = "sensor_drift", Stage.SENSOR, "reading", ("ankle", "joint", "muscle")
 

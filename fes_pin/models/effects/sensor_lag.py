@@ -1,4 +1,4 @@
-"""A low pass, or a time shift, between the output and its reading."""
+"""The output is read late."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ from fes_pin.models.stage import ByName, Effect, Measured, Scalar, Signals, Stag
 
 @dataclass(frozen=True)
 class SensorLag(Effect):
-    """A low pass, or a time shift, between the output and its reading.
+    """The output is read late.
 
         b z' = y - z,   y replaced by z + shift (z - y),   b = lag / (1 + shift)
 
@@ -21,7 +21,9 @@ class SensorLag(Effect):
     """
 
     lag_s: float = parameter(0.005, unit="s", null=0.0, lower=0.0, upper=0.5, scale=0.005)
-    shift: float = refinement(0.0, lower=0.0, upper=1.0, scale=1.0, fitted=False, grid=(1.0,), rigs=("joint",))
+    shift: float = refinement(
+        0.0, lower=0.0, upper=1.0, scale=1.0, fitted=False, grid=(1.0,), rigs=("joint",), words="by a shift in time"
+    )
 
     name, stage, signal, rigs = "sensor_lag", Stage.SENSOR, "reading", ("ankle", "joint", "muscle")
     states = ("filtered",)

@@ -21,7 +21,14 @@ class SensorNonlinearity(FromAPlace):
     curvature: float = parameter(0.1, unit="1/{y}", null=0.0, lower=-20.0, upper=20.0, scale=0.05)
     place: float = parameter(0.0, lower=0.0, upper=2.0, grid=(0.0, 1.0, 2.0), fitted=False)
     skew_per_rad: float = refinement(
-        0.0, unit="1/{y}", lower=-20.0, upper=20.0, scale=0.5, grid=(0.5, -0.5), times="curvature"
+        0.0,
+        unit="1/{y}",
+        lower=-20.0,
+        upper=20.0,
+        scale=0.5,
+        grid=(0.5, -0.5),
+        times="curvature",
+        words="not alike both ways",
     )
 
     name, stage, signal, rigs = "sensor_nonlinearity", Stage.SENSOR, "reading", ("ankle", "joint")

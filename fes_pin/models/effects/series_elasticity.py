@@ -28,7 +28,9 @@ class SeriesElasticity(Effect):
     """
 
     compliance: float = parameter(1e-4, unit="m/N", null=0.0, lower=0.0, upper=1.0, scale=1e-4)
-    toe: float = refinement(0.0, unit="m", lower=0.0, upper=0.1, scale=1e-4)
+    toe: float = refinement(
+        0.0, unit="m", lower=0.0, upper=0.1, scale=1e-4, words="most at small forces (the toe region)"
+    )
     toe_force: float = parameter(1.0, unit="N", lower=1e-3, upper=1e4, scale=1.0, optional=True)
 
     name, stage, signal, rigs = "series_elasticity", Stage.MUSCLE, "fibre", ("muscle",)

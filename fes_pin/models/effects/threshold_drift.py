@@ -18,7 +18,9 @@ class ThresholdDrift(Effect):
     """
 
     rate_us_per_s: float = parameter(2.0, unit="us/s", null=0.0, lower=-100.0, upper=100.0, scale=2.0)
-    settling_per_s: float = refinement(0.0, unit="1/s", lower=0.0, upper=10.0, scale=0.1, grid=(0.2,))
+    settling_per_s: float = refinement(
+        0.0, unit="1/s", lower=0.0, upper=10.0, scale=0.1, grid=(0.2,), words="ever more slowly"
+    )
 
     name, stage, signal, rigs = "threshold_drift", Stage.NERVE, "pulse_width", ("ankle", "muscle")
 

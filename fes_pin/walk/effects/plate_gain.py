@@ -10,9 +10,11 @@ from fes_pin.walk.walk_trial import WalkTrial
 
 
 class PlateGain(WalkEffect):
-    """A force plate reads off by a factor, in all of its channels or in one axis of the force.
+    """A force plate reads off by a factor.
 
         read = (1 + share) true
+
+    in all of its channels, or in one axis of the force.
 
     Tell-tale: the residual is a copy of one foot's reaction; weight is off while that foot stands.
     Source: amplifier gain, calibration matrix.

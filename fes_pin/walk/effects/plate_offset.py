@@ -15,7 +15,7 @@ before calibration (A. Cappello et al., Gait Posture 33:724, 2011)."""
 
 
 class PlateOffset(WalkEffect):
-    """A force plate reads a constant off: a force, a moment, or the place of its centre of pressure.
+    """A force plate reads a constant off.
 
         read = true + constant, always or only while the foot is on it; or centre of pressure = true + constant
 
