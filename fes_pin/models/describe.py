@@ -3,7 +3,7 @@
 import inspect
 import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from typing import Any
 
 from fes_pin.infer.text import ON_A_SLIDE, UNIT_IN_NAME, plain_name
@@ -17,21 +17,37 @@ CONDITION = re.compile(r",? ?\b(on|with|without) (\w+(?: or \w+)*)$")
 """Behind an equation: the rigs that it is of, or the refinements with or without which it holds."""
 
 
-def sentence(effect: type[Effect]) -> str:
+def sentence(effect: type) -> str:
     """What the effect is, in one sentence."""
     return inspect.cleandoc(effect.__doc__ or "").split("\n", 1)[0]
 
 
-def equation(effect: type[Effect]) -> str:
-    """The equation of an effect, as its docstring has it: the first indented block."""
+def equation(effect: type, here: Set[str] | None = None) -> str:
+    """The equation of an effect, as its docstring has it: the first indented block.
+
+    Parameters
+    ----------
+    here
+        A rig and refinements, or the words of a site: only lines that hold for these, without their conditions.
+    """
     lines = inspect.cleandoc(effect.__doc__ or "").split("\n")[1:]
     start = next((i for i, line in enumerate(lines) if line.startswith("    ")), len(lines))
     block = []
     for line in lines[start:]:
         if line.strip() and not line.startswith("    "):
             break
-        block.append(line[4:])
-    return "\n".join(block).strip("\n").rstrip()
+        block.append(line[4:] if here is None else _applicable(line[4:], here))
+    kept = block if here is None else filter(None, block)
+    return "\n".join(kept).strip("\n").rstrip()
+
+
+def _applicable(line: str, here: Set[str]) -> str:
+    """A line of an equation without its conditions; empty if one does not hold for a rig and refinements."""
+    while found := CONDITION.search(line):
+        if here.isdisjoint(found[2].split(" or ")) == (found[1] != "without"):
+            return ""
+        line = line[: found.start()].rstrip()
+    return line
 
 
 def fitted_sentence(effect: Effect, rig: Rig) -> str:
@@ -60,20 +76,15 @@ def fitted_equation(effect: Effect, rig: Rig) -> str:
         fitted = name in (*effect.fitted_parameters(), *effect.unknowns())
         printed = plain_name(name, info.in_units(rig.units()).unit).replace(" ", "_")
         known |= dict.fromkeys((name, UNIT_IN_NAME.sub("", name)), printed if fitted else float(getattr(effect, name)))
+    lines = equation(type(effect), {rig.name, *effect.refined()}).split("\n")
     try:
-        lines = [_line(line, effect, rig, known) for line in equation(type(effect)).split("\n")]
+        return "\n".join(_line(line, known) for line in lines)
     except (SyntaxError, ValueError, RecursionError):
-        return equation(type(effect))
-    return "\n".join(filter(None, lines))
+        return "\n".join(lines)
 
 
-def _line(line: str, effect: Effect, rig: Rig, known: Mapping[str, float | str]) -> str:
-    """A line of an equation as it is on a rig; empty if it is of other rigs, or of another form."""
-    here = {"on": {rig.name}, "with": (refined := set(effect.refined())), "without": refined}
-    while found := CONDITION.search(line):
-        if bool(here[found[1]] & set(found[2].split(" or "))) == (found[1] == "without"):
-            return ""
-        line = line[: found.start()].rstrip()
+def _line(line: str, known: Mapping[str, float | str]) -> str:
+    """A line of an equation with names replaced; remarks on it stand behind three spaces."""
     pieces = re.split(r"(\s{3,})(?=\w)", re.sub(r"\s+(?==|->)", " ", line))
     for k, piece in enumerate(pieces):
         if re.search(r"[=+*/^<>|-]", piece):

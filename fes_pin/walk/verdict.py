@@ -1,5 +1,6 @@
 """The verdict on causes of a walk: those that are named, with their size, significance and equivalents."""
 
+import re
 from dataclasses import replace
 from functools import cache, partial
 
@@ -10,8 +11,10 @@ from fes_pin.infer.result import FITTED, NO_GAIN, Cause, Evidence, ParameterEsti
 from fes_pin.infer.search import SearchResult
 from fes_pin.infer.text import listed
 from fes_pin.infer.verdict import State, Verdict, Weighed
+from fes_pin.models.describe import equation, sentence
 from fes_pin.walk.designs import Designs
 from fes_pin.walk.effect import STAGE
+from fes_pin.walk.effects import EFFECTS
 from fes_pin.walk.effects.stated_mass import StatedMass
 from fes_pin.walk.judge import StrideErrors, lack_of_fit, other_leg
 from fes_pin.walk.models import WalkFit, WalkModels, WalkSearch
@@ -70,7 +73,8 @@ class WalkVerdict(Verdict[WalkFit, WalkModels, Weighed]):
         near = self.models.near_rivals(found, name)
         instead = [forms[n] for r in near for n in r.names if n not in best.names]
         values, stds = self.models.sizes(best)[name].tolist(), self.models.deviations(best)[name].tolist()
-        each, words = [*zip(form.parameters, values, stds, form.units, strict=True)], ""
+        each = [*zip(form.parameters, values, stds, form.units, strict=True)]
+        words, equation_here = _as_fitted(form.cause, form.site)
         if form.cause == StatedMass.name:
             body, (share,), (std,) = self.models.designs.stated.body_kg, values, stds
             each = [(form.site, body * (1.0 + share), body * std, "kg")]
@@ -89,8 +93,15 @@ class WalkVerdict(Verdict[WalkFit, WalkModels, Weighed]):
             gain_held_out=gain if many else replace(gain, on=FITTED),
             evidence=weighed.evidence.get(name) or replace(Evidence.of(gained), on=FITTED),
             words=words,
+            equation=equation_here,
             further={"other_leg": self.other_leg(name)},
         )
+
+
+def _as_fitted(name: str, site: str) -> tuple[str, str]:
+    """Return the sentence of a cause, and its equation at a site."""
+    kind = next(one for one in EFFECTS if one.name == name)
+    return sentence(kind), equation(kind, set(re.findall(r"\w+", site)))
 
 
 def _on_other_leg(models: WalkModels, name: str) -> float | None:
@@ -112,6 +123,7 @@ def marker_noise(designs: Designs) -> tuple[Correction, Cause] | None:
     beyond = normal_tail((level - ORDINARY_MM) / std) if level > ORDINARY_MM else 1.0
     words = f"white noise of {level:.2g} mm on the coordinates"
     fault = Correction("marker_noise", beyond, CLAIM_LEVEL, words, saved - PARAMETER_PENALTY, SEPARABLE)
+    said, equation_here = _as_fitted(fault.name, "white")
     cause = Cause(
         name=fault.name,
         stage=STAGE,
@@ -123,5 +135,7 @@ def marker_noise(designs: Designs) -> tuple[Correction, Cause] | None:
         gain_held_out=NO_GAIN,
         evidence=replace(Evidence.of(saved), on=FITTED),
         further={"other_leg": None},
+        words=said,
+        equation=equation_here,
     )
     return fault, cause

@@ -17,7 +17,9 @@ before calibration (A. Cappello et al., Gait Posture 33:724, 2011)."""
 class PlateOffset(WalkEffect):
     """A force plate reads a constant off.
 
-        read = true + constant, always or only while the foot is on it; or centre of pressure = true + constant
+        read = true + constant                                 on always
+        read = true + constant   while the foot is on it       on loaded
+        centre of pressure = true + constant                   on pressure
 
     Tell-tale: steps in the residual when the foot comes and goes; with a displaced centre of pressure a moment as the
     load.
