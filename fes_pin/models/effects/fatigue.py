@@ -14,7 +14,7 @@ class Fatigue(Effect):
     """Force capacity falls with use and recovers with rest.
 
         c'  = (1 - c) / recovery - rate act (c - FLOOR)
-        F   = c F_M,   c = 1 at the start of the session
+        F   = c F_M,   c = 1   at the start of the session
 
     Where trials say when they began, c runs on through them and the pauses between; else it is 1 at the start of each.
 

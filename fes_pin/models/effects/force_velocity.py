@@ -19,7 +19,7 @@ class ForceVelocity(Effect):
         F = F_M (1 - x + bend x^2)      a joint that is free, on ankle
         F = F_M (1 - x / (1 + hill)) / (1 + hill x / (1 + hill)),   x > 0      imposed motion
         F = F_M (1 - x / (1 - plateau x)),   x < 0      imposed motion
-        x = slope v,   v > 0 shortens the muscle
+        x = slope v,   v > 0   shortens the muscle
 
     Hill's hyperbola with the slope at rest as its measure: it ends at the speed (1 + hill) / slope, and a muscle that
     is stretched comes to bear 1 + 1 / plateau of its isometric force. Each branch is a straight line at 0.

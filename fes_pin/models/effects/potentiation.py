@@ -11,7 +11,7 @@ class Potentiation(Effect):
     """Force capacity rises with recent use and decays.
 
         decay p'  = act - p
-        F         = (1 + gain p) F_M,   p = 0 at the start of the session
+        F         = (1 + gain p) F_M,   p = 0   at the start of the session
 
     Where trials say when they began, p runs on through them and the pauses between; else it is 0 at the start of each.
 
