@@ -282,7 +282,7 @@ class Result(Saveable):
         for one in self.errors():
             values = " -> ".join(dict.fromkeys([percent(one.nominal), percent(one.extended)]))
             errors.setdefault(f"error E {ON[one.on]}", []).append(f"{one.what} {values}")
-        said = [(one.name, one.words) for one in self.causes if one.words and isinstance(one, Cause)]
+        said = [(one.name, one.sentence.removesuffix(".")) for one in self.causes if one.sentence and not one.words]
         lines = said + [(topic, ", ".join(many)) for topic, many in errors.items()] + self.notes()
         title, rows = f"{self.study.name}: {self.headline()}", [one.row() for one in self.causes]
         return title, self.head(), rows, [f"{topic}: {words}" for topic, words in lines]

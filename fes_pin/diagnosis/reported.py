@@ -147,7 +147,7 @@ def _cause(verdict: RigVerdict, state: RigState, one: Effect, best: LikelihoodFi
     alike = state.search.models.alike(found, name)
     return Cause(
         name=name,
-        words=fitted_sentence(one, best.model.rig),
+        sentence=fitted_sentence(one, best.model.rig),
         equation=fitted_equation(one, best.model.rig),
         stage=str(one.stage),
         parameters=estimates(best, name),

@@ -354,9 +354,9 @@ class Named:
     trial
         The only trial that it concerns, if it does not concern all.
     words
-        The cause or change in one sentence, with its form as fitted.
-    equation
-        The equation of a cause with its form as fitted; a fitted parameter has its name without a unit in it.
+        The change in words, where the name alone does not state it.
+    sentence, equation
+        Of a cause, in its form as fitted; a parameter has its name without a unit in the equation.
     evidence
         Its evidence in held-out data; None where the model has a lack of fit.
     """
@@ -368,6 +368,7 @@ class Named:
     site: str = ""
     trial: str | None = None
     words: str = ""
+    sentence: str = ""
     equation: str = ""
     evidence: Evidence | None = None
     PLACE: ClassVar[tuple[str, ...]] = ("stage", "site")
@@ -424,7 +425,9 @@ class Named:
 
     def record(self) -> dict[str, Any]:
         """As JSON files have it."""
-        place = {n: value for n in (*self.PLACE, "trial", "words", "equation") if (value := getattr(self, n))}
+        place = {
+            n: value for n in (*self.PLACE, "trial", "words", "sentence", "equation") if (value := getattr(self, n))
+        }
         own = {"parameters": self._parameters(), "equivalents": list(self.equivalents)}
         return {"name": self.name, **place, **own, "p_value": p_shown(self.p_value), **self._gains()}
 

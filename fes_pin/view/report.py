@@ -82,7 +82,7 @@ def _heading(one: Named) -> Markup:
 def _answer(result: Result, one: Named) -> Content:
     """Return a sentence on a cause or change: what it is, its size and its significance."""
     kind = result.effect(one.name)
-    what = one.words or (sentence(kind) if kind else one.name)
+    what = one.words or one.sentence or (sentence(kind) if kind else one.name)
     where = f" At {one.site}." if one.site else ""
     return f"{_upper(what).removesuffix('.')}.{where} Size: {', '.join(_sizes(one))}. {distinguished(one)}"
 

@@ -74,7 +74,7 @@ class WalkVerdict(Verdict[WalkFit, WalkModels, Weighed]):
         instead = [forms[n] for r in near for n in r.names if n not in best.names]
         values, stds = self.models.sizes(best)[name].tolist(), self.models.deviations(best)[name].tolist()
         each = [*zip(form.parameters, values, stds, form.units, strict=True)]
-        words, equation_here = _as_fitted(form.cause, form.site)
+        (said, equation_here), words = _as_fitted(form.cause, form.site), ""
         if form.cause == StatedMass.name:
             body, (share,), (std,) = self.models.designs.stated.body_kg, values, stds
             each = [(form.site, body * (1.0 + share), body * std, "kg")]
@@ -93,6 +93,7 @@ class WalkVerdict(Verdict[WalkFit, WalkModels, Weighed]):
             gain_held_out=gain if many else replace(gain, on=FITTED),
             evidence=weighed.evidence.get(name) or replace(Evidence.of(gained), on=FITTED),
             words=words,
+            sentence=said,
             equation=equation_here,
             further={"other_leg": self.other_leg(name)},
         )
@@ -135,7 +136,7 @@ def marker_noise(designs: Designs) -> tuple[Correction, Cause] | None:
         gain_held_out=NO_GAIN,
         evidence=replace(Evidence.of(saved), on=FITTED),
         further={"other_leg": None},
-        words=said,
+        sentence=said,
         equation=equation_here,
     )
     return fault, cause

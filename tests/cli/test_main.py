@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 import tomllib
@@ -157,7 +158,20 @@ def test_the_record_is_as_the_contract_says(made):
         *("ceiling_percent", "next_experiment", "horizon_s", "why", "warnings", "wall_s", "provenance", *SAVED),
     ]
     (cause,) = found["causes"]
-    assert list(cause) == ["name", "stage", "parameters", "equivalents", "p_value", "gain_percent", "judged_by"]
+    keys = [
+        "name",
+        "stage",
+        "sentence",
+        "equation",
+        "parameters",
+        "equivalents",
+        "p_value",
+        "gain_percent",
+        "judged_by",
+    ]
+    assert list(cause) == keys
+    assert cause["sentence"] == "Dry friction at the joint." and "T = torque\n" in cause["equation"]
+    assert not re.search("stiction|stribeck|load|STIFFEST|one_way", cause["equation"])
     assert cause["name"] == "coulomb_friction" and cause["stage"] == "joint"
     assert set(cause["parameters"]["torque_nm"]) == {"value", "std", "low", "high"}
     assert set(cause["gain_percent"]) == {"fit", "held_out", "ci95"}

@@ -12,6 +12,7 @@ from fes_pin.diagnosis.experiment import NextExperiment
 from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.identify.fit import fit
 from fes_pin.infer.result import CROSS_VALIDATED, Cause, Gain, ParameterEstimate, Ranked, Remainder
+from fes_pin.models.describe import fitted_equation, fitted_sentence
 from fes_pin.models.effects import effect_named
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.simulate import simulated_trial
@@ -108,16 +109,18 @@ def diagnosed(
 
 
 def _cause(extended, name: str, rivals: tuple[str, ...]) -> Cause:
-    kind = effect_named(name)
+    kind, (one,) = effect_named(name), (e for e in extended.model.effects if e.name == name)
     info, values = extended.model.parameter_info(), extended.values
     estimates = {
         n: ParameterEstimate(values[f"{name}.{n}"], 0.1, info[f"{name}.{n}"].unit)
-        for n, one in kind.parameters().items()
-        if not one.optional
+        for n, i in kind.parameters().items()
+        if not i.optional
     }
     return Cause(
         name=name,
         stage=str(kind.stage),
+        sentence=fitted_sentence(one, extended.model.rig),
+        equation=fitted_equation(one, extended.model.rig),
         parameters=estimates,
         equivalents=rivals,
         p_value=1e-9,

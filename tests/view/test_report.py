@@ -24,8 +24,6 @@ from fes_pin.diagnosis.errors_ahead import Ahead, AheadErrors, RandomPart
 from fes_pin.diagnosis.replay import replayed_trials
 from fes_pin.infer.result import STOPPED
 from fes_pin.infer.text import plain_name, rounded
-from fes_pin.models.describe import equation
-from fes_pin.models.effects import effect_named
 from fes_pin.models.predictor import StateSpaceNoise
 from fes_pin.view.drawing import panels, svg
 from fes_pin.view.mathml import equations_mathml
@@ -106,7 +104,7 @@ def test_a_report_says_what_the_diagnosis_found():
         "sensor_offset",
     ):
         assert words in text
-    assert equations_mathml(equation(effect_named("coulomb_friction"))).text in ankle_page()
+    assert equations_mathml(ankle_diagnosis().causes[0].equation).text in ankle_page()
     assert "--set load_kg" in text
     assert "next_trial.csv" in text
 
@@ -157,7 +155,11 @@ def test_pulses_of_a_muscle_are_drawn():
 
 @pytest.mark.parametrize(("kind", "label"), [("revolute", "angle (rad)"), ("prismatic", "position (m)")])
 def test_a_joint_with_velocity_has_the_units_of_its_kind(tmp_path, kind, label):
-    text = checked(diagnosed(joint_study(tmp_path, kind), ("coulomb_friction",)))
+    found = diagnosed(joint_study(tmp_path, kind), ("coulomb_friction",))
+    text, sized = checked(found), "torque" if kind == "revolute" else "force"
+    assert f"{sized} 0." in str(found) and "coulomb_friction: Dry friction at the joint\n" in str(found)
+    assert f"Dry friction at the joint. Size: {sized} 0." in text and f"T = {sized} x =" in text
+    assert not re.search("stiction|STIFFEST|load_exponent|softness", text)
     assert label in text and "held out" in text
     assert ("angle (rad)" in text) == (kind == "revolute")
 
