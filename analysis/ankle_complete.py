@@ -13,9 +13,9 @@ from paper_ankle.ratios import RatioProblem, ankle_of, error_percent, least_erro
 from paper_ankle.twin import RunningTwin, staircase
 
 from fes_pin.diagnosis.diagnosis import diagnose_joint
-from fes_pin.identify.fit import fit
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.simulate import simulate
+from fes_pin.search.fit import fit
 
 OUT = Path("out")
 OUT.mkdir(exist_ok=True)

@@ -14,11 +14,11 @@ from paper_ankle.regression import RegressionFilter
 from paper_ankle.twin import record, staircase
 
 import fes_pin as fp
-from fes_pin.identify.fit import fit
 from fes_pin.infer.noise import Noise
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.simulate import simulate
 from fes_pin.paper.kalman import StraightRecruitment, history_of
+from fes_pin.search.fit import fit
 
 OUT = Path("out")
 OUT.mkdir(exist_ok=True)

@@ -17,11 +17,11 @@ from scipy.optimize import brentq
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.diagnosis import diagnose_joint
-from fes_pin.identify.fit import fit
 from fes_pin.models.effects import effect_named
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.simulate import simulate
 from fes_pin.paper.equation_1 import static_torque_nm
+from fes_pin.search.fit import fit
 from fes_pin.view.style import label
 
 OUT = Path("out")

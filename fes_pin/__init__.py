@@ -51,7 +51,6 @@ if TYPE_CHECKING:  # every public name with its module: it is imported from ther
     from fes_pin.data.trial import write_trial as write_trial
     from fes_pin.diagnosis.result import Diagnosis as Diagnosis
     from fes_pin.identify.fit import Fit as Fit
-    from fes_pin.identify.fit import fit as fit
     from fes_pin.models import effects as effects
     from fes_pin.models import rigs as rigs
     from fes_pin.models.catalogue import Catalogue as Catalogue
@@ -75,6 +74,7 @@ if TYPE_CHECKING:  # every public name with its module: it is imported from ther
     from fes_pin.paper.antagonist import fit_antagonist as fit_antagonist
     from fes_pin.paper.kalman import GainFilter as GainFilter
     from fes_pin.paper.kalman import track_gain as track_gain
+    from fes_pin.search.fit import fit as fit
     from fes_pin.verdict.ask import check as check
     from fes_pin.verdict.ask import diagnose as diagnose
     from fes_pin.view.report import report as report

@@ -13,7 +13,6 @@ from threadpoolctl import threadpool_info, threadpool_limits
 from fes_pin import workers
 from fes_pin.body.build import Body
 from fes_pin.body.linearize import linearize
-from fes_pin.identify.fit import fit
 from fes_pin.models.compile import machine, program
 from fes_pin.models.compile.native import NativeProgram
 from fes_pin.models.compile.program import VirtualProgram
@@ -23,6 +22,7 @@ from fes_pin.models.model import Model
 from fes_pin.models.predictor import Predictor, StateSpaceNoise
 from fes_pin.models.simulate import Simulator, simulated_trial
 from fes_pin.muscles.nerves import Nerves
+from fes_pin.search.fit import fit
 from fes_pin.workers import in_parallel, one_thread_each
 
 THREADS = 8

@@ -4,11 +4,12 @@ import math
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from fes_pin.comparison.held_out import Parting, left_out_errors, partings, spread_noise
+from fes_pin.comparison.held_out import Parting, left_out_errors, partings
 from fes_pin.comparison.literature import NOMINAL, RIGS, Published, possible, published_model
 from fes_pin.comparison.result import Apart, Compared, Comparison, apart_from
 from fes_pin.data.asked import asked
@@ -17,15 +18,14 @@ from fes_pin.data.numbers import instance, number
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.identify.ahead import default_horizon
-from fes_pin.identify.fit import fit_multistart, rough_noise
-from fes_pin.identify.problem import Problem
+from fes_pin.identify.likelihood_fit import LikelihoodFit, refit
 from fes_pin.infer.held_out import percent_of_spread
-from fes_pin.infer.noise import Noise, NoiseModel
 from fes_pin.models.catalogue import Source
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.store import load_model
 from fes_pin.prepare.measured import measured_study, split
+from fes_pin.search.fit import fitted_alone
 from fes_pin.workers import Progress, in_parallel, one_thread_each
 
 FEW = "too few trials to estimate how trials differ: the first seconds of a trial do not predict its others"
@@ -39,9 +39,12 @@ def compare(
     horizon_s: float | None = None,
     given_s: float | None = None,
     library: Source | Sequence[Source] | None = None,
+    least_squares: bool = False,
     progress: Progress | None = None,
 ) -> Comparison:
     """Rank models by their errors on held-out trials.
+
+    Models are fitted by the estimator of `fit` and `diagnose`, and E is measured in the noise of the likeliest model.
 
     Parameters
     ----------
@@ -59,6 +62,8 @@ def compare(
         Also predict each trial after its first `given_s` seconds from those seconds.
     library
         Where causes of `extended` come from that are not written here.
+    least_squares
+        Whether models are fitted by least squares of free simulations; see `fit`.
     progress
         Called with a share done and a few words.
 
@@ -88,12 +93,16 @@ def compare(
     chosen = _chosen(models, extended, nominal, every, library)
     noted = measured.odd()
     parts = partings(fitted, held)
-    white, floor = spread_noise(nominal, every), rough_noise(nominal, every)
-    compared = []
+    fits = []
     with one_thread_each():
         for k, (about, model) in enumerate(chosen):
             tell(k / len(chosen), about.name)
-            compared.append(_compared(about, model, parts, fitted, white, floor, horizon, given_s))
+            whole = fitted_alone(model, fitted, least_squares)
+            again = partial(refit, whole)
+            fits.append((whole, [whole] if held else in_parallel(again, [p.fitted for p in parts])))
+        _, units = min(fits, key=lambda one: one[0].criterion)
+        each = zip(chosen, fits, strict=True)
+        compared = [_compared(about, *own, parts, units, horizon, given_s) for (about, _), own in each]
     tell(1.0, "done")
     ranked = sorted(compared, key=lambda m: m.percent["free"])
     return Comparison(
@@ -137,21 +146,19 @@ def _chosen(
 
 def _compared(
     about: Published,
-    model: Model,
+    whole: LikelihoodFit,
+    fits: Sequence[LikelihoodFit],
     parts: Sequence[Parting],
-    fitted: Sequence[Trial],
-    white: Mapping[str, Noise],
-    floor: NoiseModel,
+    units: Sequence[LikelihoodFit],
     horizon_s: float,
     given_s: float | None,
 ) -> Compared:
-    """A model with its errors; `white` weighs the columns in its fits, `floor` in E."""
-    fits = in_parallel(lambda p: fit_multistart(Problem(model, p.fitted, white)), parts)
+    """Return a model with its errors; the noise of `units`, the fits of one model to the same parts, weighs E."""
     kinds = left_out_errors(fits, parts, horizon_s, given_s)
-    whole = fits[0] if len(parts) == 1 else fit_multistart(Problem(model, fitted, white))
-    trials = [t for p in parts for t in p.held]
+    model, trials = whole.model, [t for p in parts for t in p.held]
     columns = np.array([model.rig.output(t.kind) for t in trials])
-    weight = np.array([np.isfinite(t[c]).sum() / floor[c].std ** 2 for t, c in zip(trials, columns, strict=True)])
+    stds = [one.noise.white[model.rig.output(t.kind)] for p, one in zip(parts, units, strict=True) for t in p.held]
+    weight = np.array([np.isfinite(t[c]).sum() for t, c in zip(trials, columns, strict=True)]) / np.square(stds)
     around = weight * kinds.pop("around")
     squares = {n: len(trials) * 100.0 * weight * e / around.sum() for n, e in kinds.items()}
     rows = {str(c): columns == c for c in dict.fromkeys(columns)}

@@ -12,18 +12,19 @@ estimated from its first samples alone. Laird and Ware, Biometrics 38 (1982).
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from fes_pin.data.trial import Trial
-from fes_pin.identify.ahead import forecast, free_residuals
+from fes_pin.identify.ahead import forecast, free_residuals, over_horizon
 from fes_pin.identify.fit import Fit, noise_of
+from fes_pin.identify.likelihood import is_simulated
+from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.problem import Problem
 from fes_pin.infer.held_out import within
 from fes_pin.infer.levels import RUNAWAY
 from fes_pin.infer.noise import Noise, noise_step, thinning
-from fes_pin.models.model import Model
 from fes_pin.prepare.measured import folds_of
 from fes_pin.workers import in_parallel
 
@@ -52,17 +53,8 @@ def partings(fitted: Sequence[Trial], held: Sequence[Trial]) -> list[Parting]:
     return [Parting([t for i, t in enumerate(every) if i not in out], [every[i] for i in out]) for out in folds]
 
 
-def spread_noise(model: Model, trials: Sequence[Trial]) -> dict[str, Noise]:
-    """White noise as large as each measured column varies about the mean of all trials: what weighs the columns."""
-    columns: dict[str, list[np.ndarray]] = {}
-    for trial in trials:
-        columns.setdefault(model.rig.output(trial.kind), []).append(trial[model.rig.output(trial.kind)])
-    stds = {n: max(float(np.nanstd(np.concatenate(v))), 1e-12) for n, v in columns.items()}
-    return {n: Noise(std, (), std) for n, std in stds.items()}
-
-
 def left_out_errors(
-    fits: Sequence[Fit], parts: Sequence[Parting], horizon_s: float, given_s: float | None
+    fits: Sequence[LikelihoodFit], parts: Sequence[Parting], horizon_s: float, given_s: float | None
 ) -> dict[str, np.ndarray]:
     """Mean squared errors of one model on every held-out trial, in the unit of its column, squared.
 
@@ -78,12 +70,16 @@ def left_out_errors(
     return {n: np.concatenate([m[n] for m in many]) for n in many[0] if all(n in m for m in many)}
 
 
-def _of_parting(fitted: Fit, part: Parting, horizon_s: float, given_s: float | None) -> dict[str, np.ndarray]:
-    noise, rows = noise_of(fitted) if math.isfinite(fitted.sse) else fitted.noise, []
+def _of_parting(fitted: LikelihoodFit, part: Parting, horizon_s: float, given_s: float | None) -> dict[str, np.ndarray]:
+    is_white = not fitted.noise.ar and is_simulated(fitted.noise, part.held) and math.isfinite(fitted.sse)
+    noise, rows = noise_of(fitted) if is_white else fitted.noise, []
     for trial in part.held:
         name = fitted.model.rig.output(trial.kind)
         left = free_residuals(fitted.model, trial, fitted.noise)[name]
-        ahead = left - forecast(np.nan_to_num(left), noise[name], trial.dt, horizon_s)
+        if is_simulated(fitted.noise, [trial]):
+            ahead = left - forecast(np.nan_to_num(left), noise[name], trial.dt, horizon_s)
+        else:
+            ahead = trial[name] - over_horizon(fitted.model, trial, fitted.noise, horizon_s)[name]
         rows.append([np.nanmean(left**2), np.nanmean(ahead**2), np.nanvar(trial[name])])
     begun = {} if given_s is None else _begun(fitted, part, given_s)
     return {**dict(zip(("free", "horizon", "around"), np.transpose(rows), strict=True)), **begun}
@@ -135,9 +131,9 @@ class OwnPart:
 
 
 def pairs_of(fitted: Fit, trials: Sequence[Trial]) -> list[Pair]:
-    """Residuals and sensitivities of trials at a fit, at the time step of noise, the channels weighed as in the fit."""
+    """Residuals and sensitivities of trials at a fit, at the time step of noise, channels in units of their noise."""
     step = noise_step([t.dt for t in trials])
-    problem = Problem(fitted.model, trials, {n: replace(one, step_s=step) for n, one in fitted.noise.items()})
+    problem = Problem(fitted.model, trials, {n: Noise(one.std, (), one.std, step) for n, one in fitted.noise.items()})
     return [(p.residual, p.jacobian) for p in problem.linearize(fitted.values, problem.start_unknowns())]
 
 

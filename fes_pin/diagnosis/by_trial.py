@@ -17,11 +17,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.held_out import Again, Fold, Found, gains_of, make_folds, refit
+from fes_pin.diagnosis.held_out import Again, Fold, Found, gains_of, make_folds
 from fes_pin.diagnosis.likelihood_models import LikelihoodSearch
 from fes_pin.diagnosis.restate import Made, with_first
 from fes_pin.diagnosis.result import Diagnosis
-from fes_pin.identify.likelihood_fit import LikelihoodFit, at_noise, maximum_from
+from fes_pin.identify.likelihood_fit import LikelihoodFit, at_noise, maximum_from, refit
 from fes_pin.identify.per_trial import as_parameters, cross_fitted_unknowns, halves, pieces
 from fes_pin.infer.corrected import Correction, lead_of
 from fes_pin.infer.distributions import chi2_quantile, chi2_tail

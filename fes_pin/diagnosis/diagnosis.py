@@ -11,7 +11,6 @@ import numpy as np
 from fes_pin.data.asked import asked
 from fes_pin.data.log import EFFORT, Log
 from fes_pin.data.provenance import provenance_now
-from fes_pin.data.schema import IMPOSED
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.by_trial import Ask, Ran, with_fault, with_faults
@@ -29,16 +28,15 @@ from fes_pin.diagnosis.restate import StudyConditions, with_misread
 from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.diagnosis.testable import given_away
 from fes_pin.faults.misread import restated_trials
-from fes_pin.identify.feedback import is_fed_back, is_stimulus_fed_back
+from fes_pin.identify.feedback import is_answered
 from fes_pin.infer.corrected import Correction
 from fes_pin.infer.held_out import FOLDS
 from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
-from fes_pin.models.rigs.base import Rig
 from fes_pin.prepare.long_records import in_parts, searched_part
 from fes_pin.prepare.measured import measured_study, split
-from fes_pin.search.likelihood_fits import MEASUREMENT, PROCESS
+from fes_pin.search.likelihood_fits import first_noise
 from fes_pin.workers import Progress, noting_stops, one_thread_each, time_limit
 
 LOOKED = 0.1
@@ -130,7 +128,7 @@ class _Work:
     def diagnosis_of_log(self, study: Study) -> Diagnosis:
         """Return the diagnosis of a study as recorded, with the faults of its log corrected where that is possible."""
         nominal, (train, _) = nominal_model(study), split(study)
-        driven = _is_answered(nominal.rig, train)
+        driven = is_answered(nominal.rig, train)
         logged = driven and all(EFFORT in nominal.rig.input_columns(t) for t in study.trials)
         faults = LogFaults(study.trials, lambda trials: _searched(study, trials, driven), self.end)
         answer = self._logged(study, Log(effort_noise=faults.of_nominal(nominal)) if logged else Log())
@@ -152,7 +150,7 @@ class _Work:
         """Search the causes of one study, judge them, and return the diagnosis."""
         nominal = nominal_model(study)
         train, test = split(study)
-        answered = _is_answered(nominal.rig, train)
+        answered = is_answered(nominal.rig, train)
         train, spared, said = searched_part(train, study.schema, answered)
         test = test or spared
         effects = self.catalogue.effects_for(nominal.rig)
@@ -163,8 +161,7 @@ class _Work:
             known = [e for e in effects if e.name not in {one.name for one in model.effects}]
 
             def run(trials: Sequence[Trial]) -> tuple[LikelihoodSearch, Found]:
-                noise = PROCESS if answered or any(t.kind == IMPOSED for t in trials) else MEASUREMENT
-                own = (known, answered, self.seed, study.horizon_s, noise)
+                own = (known, answered, self.seed, study.horizon_s, first_noise(trials, answered))
                 parts = trials if model.effects else in_parts(model.rig, trials, answered)
                 ran.append(LikelihoodSearch(LikelihoodModels(model, parts, *own), self.tell))
                 return ran[-1], ran[-1].run()
@@ -198,11 +195,6 @@ class _Work:
         if again is not None:
             diagnosis = with_misread(diagnosis, again, stated, test, self.seed)
         return with_tests(diagnosis, self.tests)
-
-
-def _is_answered(rig: Rig, trials: Sequence[Trial]) -> bool:
-    """Return whether a rig is driven in closed loop: noise comes back as an input."""
-    return is_fed_back(rig, trials) or is_stimulus_fed_back(rig, trials)
 
 
 def _searched(study: Study, trials: Sequence[Trial], driven: bool) -> list[Trial]:

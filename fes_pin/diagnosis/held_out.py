@@ -7,14 +7,13 @@ import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.errors_ahead import squared_errors
-from fes_pin.identify.likelihood import LikelihoodProblem
-from fes_pin.identify.likelihood_fit import LikelihoodFit, fit_of, maximise
+from fes_pin.identify.likelihood_fit import LikelihoodFit, fit_of, problem_on
 from fes_pin.infer.covariance import covariance_of
 from fes_pin.infer.held_out import Errors, held_out_gain, marginal_cost
 from fes_pin.infer.levels import IDENTIFIABLE_SHARE
 from fes_pin.infer.maximise import together
 from fes_pin.infer.optimum import minimise
-from fes_pin.infer.problem import Unknowns, normal_equations
+from fes_pin.infer.problem import normal_equations
 from fes_pin.infer.result import CROSS_VALIDATED, FITTED, Evidence, Gain
 from fes_pin.infer.search import SearchResult
 from fes_pin.prepare.measured import folds_of
@@ -104,25 +103,12 @@ def identified_folds(fitted: LikelihoodFit) -> list[list[int]]:
     return [out for out in folds if np.all(IDENTIFIABLE_SHARE * deviations(out)[known] <= whole[known])]
 
 
-def refit(fitted: LikelihoodFit, trials: Sequence[Trial]) -> LikelihoodFit:
-    """Return the fit of the same model to other trials, with the noise of these."""
-    problem, unknowns = _problem(fitted, trials)
-    return maximise(problem, unknowns, near=True)
-
-
 def as_random_as_in_all(fitted: LikelihoodFit, trials: Sequence[Trial]) -> LikelihoodFit:
     """Return the fit of the same model to other trials, with the noise of its own trials."""
-    problem, unknowns = _problem(fitted, trials)
+    problem, unknowns = problem_on(fitted, trials)
     if problem.is_simulated:
         return fit_of(problem, minimise(problem, fitted.values, unknowns))
     return fit_of(problem, together(problem, fitted.values, unknowns, with_noise=False))
-
-
-def _problem(fitted: LikelihoodFit, trials: Sequence[Trial]) -> tuple[LikelihoodProblem, Unknowns]:
-    """Return the problem of a fit's model on other trials, and start values of their unknowns."""
-    known = {id(t): u for t, u in zip(fitted.trials, fitted.unknowns, strict=True)}
-    problem = LikelihoodProblem(fitted.model, trials, fitted.noise)
-    return problem, [known.get(id(t), u) for t, u in zip(trials, problem.start_unknowns(), strict=True)]
 
 
 def evidence_of(folds: Sequence[Fold], found: Found, alike: Again) -> dict[str, Evidence]:

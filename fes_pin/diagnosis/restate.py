@@ -7,13 +7,13 @@ import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.errors_ahead import errors_ahead, free_errors
-from fes_pin.diagnosis.held_out import Again, make_folds, refit
+from fes_pin.diagnosis.held_out import Again, make_folds
 from fes_pin.diagnosis.likelihood_models import Found, LikelihoodModels, LikelihoodSearch
 from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.faults.conditions import Conditions, Restated
 from fes_pin.faults.misread import NAME, Misread, find_misread
 from fes_pin.identify.fit import rough_fit
-from fes_pin.identify.likelihood_fit import LikelihoodFit, maximum_from
+from fes_pin.identify.likelihood_fit import LikelihoodFit, maximum_from, refit
 from fes_pin.identify.per_trial import halves
 from fes_pin.infer.held_out import Errors, held_out_gain
 from fes_pin.infer.result import Cause

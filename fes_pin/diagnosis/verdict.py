@@ -21,11 +21,11 @@ from fes_pin.diagnosis.errors_ahead import (
     random_parts,
     squared_errors,
 )
-from fes_pin.diagnosis.held_out import Again, Fold, as_random_as_in_all, evidence_of, gains_of, make_folds, refit
+from fes_pin.diagnosis.held_out import Again, Fold, as_random_as_in_all, evidence_of, gains_of, make_folds
 from fes_pin.diagnosis.likelihood_models import Found, LikelihoodModels, LikelihoodSearch
 from fes_pin.diagnosis.rejected import is_moved_by_what_is_recorded, no_noise, with_rejected_causes
 from fes_pin.identify.error_measures import FREE
-from fes_pin.identify.likelihood_fit import LikelihoodFit
+from fes_pin.identify.likelihood_fit import LikelihoodFit, refit
 from fes_pin.identify.per_trial import falls
 from fes_pin.infer.held_out import Errors
 from fes_pin.infer.result import FITTED, Gain, Remainder

@@ -25,6 +25,11 @@ OF_STIMULUS = 2
 """The same of a stimulus, which has few pulses (`tests/driven/test_stimulated.py`)."""
 
 
+def is_answered(rig: Rig, trials: Sequence[Trial]) -> bool:
+    """Return whether a rig is driven in closed loop: noise comes back as an input."""
+    return is_fed_back(rig, trials) or is_stimulus_fed_back(rig, trials)
+
+
 def is_fed_back(rig: Rig, trials: Sequence[Trial]) -> bool:
     """Return whether the effort of a rig follows its reading, by Granger's test of causality.
 

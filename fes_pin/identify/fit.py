@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any, TypeVar
@@ -13,11 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fes_pin.data.errors import InputError, fault_at
-from fes_pin.data.numbers import as_number, instance, number, whole
 from fes_pin.data.results import Saveable
 from fes_pin.data.schema import IMPOSED, check_known
 from fes_pin.data.show import by_columns
-from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.identify.problem import Problem
 from fes_pin.infer.noise import ORDERS, Noise, NoiseModel, estimate_noise, noise_step, thin, thinning
@@ -27,11 +25,8 @@ from fes_pin.infer.profile import profile_interval
 from fes_pin.infer.result import shown
 from fes_pin.infer.scoring import LITTLE
 from fes_pin.infer.text import quantity
-from fes_pin.models.accepted import accepted_trials
 from fes_pin.models.model import Model
-from fes_pin.models.plausibility import warn_of_odd_numbers
 from fes_pin.models.predictor import StateSpaceNoise, measured_outputs
-from fes_pin.models.simulate import simulated_trial
 from fes_pin.workers import one_thread_each
 
 GROWTH = (1 / 8, 1 / 4, 1 / 2)
@@ -280,89 +275,6 @@ def ended(model: Model, found: Optimum) -> dict[str, Any]:
     """Return the attributes of a fit at the optimum of a model's problem, without trials and noise."""
     fitted = model.with_parameters(found.values)
     return {**vars(found), "model": fitted, "parameters": fitted.parameters()}
-
-
-def fit(
-    model: Model,
-    trials: Study | Trial | Iterable[Trial],
-    noise: NoiseModel | None = None,
-    max_iterations: int = MAX_ITERATIONS,
-    *,
-    fixed: Iterable[str] | Mapping[str, float] = (),
-    bounds: Mapping[str, tuple[float, float]] | None = None,
-) -> Fit:
-    """Fit a model's parameters to trials, from the model's own values.
-
-    Parameters
-    ----------
-    model
-        The model, whose values are the start values.
-    trials
-        Measured trials; of a study those whose role is not "held_out".
-    noise
-        Noise by output column. By default the model is fitted with white noise, the noise is estimated from the
-        residuals, and the fit is repeated with that.
-    max_iterations
-        Most steps; a fit that has not converged by then says so in `converged`.
-    fixed
-        Names of parameters that are not fitted, or values that they are held at by name: `("gain",)`,
-        `{"gain": 0.65}`.
-    bounds
-        Lower and upper bounds of fitted parameters by name, within those that they have: `{"damping": (0.0, 1.0)}`.
-
-    Returns
-    -------
-    Fit
-
-    Raises
-    ------
-    InputError
-        No trials to fit, trials that are not of the model's rig or were not measured, names of no fitted parameter,
-        values or bounds that cannot be.
-
-    Warns
-    -----
-    InputWarning
-        Of numbers that are odd, as `check` finds them: a unit or a sign may be wrong.
-    """
-    chosen = trials.to_fit() if isinstance(trials, Study) else trials
-    measured = accepted_trials(model, chosen, inputs_only=False)
-    max_iterations = whole(max_iterations, "max_iterations", least=1)
-    if noise is not None:
-        instance(noise, Mapping, "noise")
-    if isinstance(fixed, Mapping):
-        model = model.with_parameters({n: number(v, f"fixed.{n}") for n, v in fixed.items()})
-    names = [fixed] if isinstance(fixed, str) else list(instance(fixed, Iterable, "fixed"))
-    free, narrower = _chosen(model, names, instance({} if bounds is None else bounds, Mapping, "bounds"))
-    warn_of_odd_numbers(model, measured, simulated_trial)
-
-    problem = Problem(model, measured, rough_noise(model, measured) if noise is None else noise, free)
-    problem.limits |= narrower
-    with one_thread_each():  # products this small are slower on several threads
-        found = fit_multistart(problem, MAX_ITERATIONS if noise is None else max_iterations)
-        found = replace(found, bounds=narrower)
-        if noise is None and math.isfinite(found.sse):  # else the simulation runs away wherever the fit began
-            found = under_own_noise(found, max_iterations=max_iterations)
-    return found
-
-
-def _chosen(
-    model: Model, fixed: Sequence[str], bounds: Mapping[str, tuple[float, float]]
-) -> tuple[tuple[str, ...], dict[str, tuple[float, float]]]:
-    """Return the parameters that are fitted where some are fixed, and the bounds that were asked for."""
-    fitted, info, narrower = model.fitted_parameters(), model.parameter_info(), dict[str, tuple[float, float]]()
-    free = tuple(n for n in fitted if n not in map(str, fixed))
-    check_known(map(str, fixed), fitted, fault_at("fixed"))
-    check_known(map(str, bounds), free, fault_at("bounds"))
-    for name, ends in ((str(n), ends) for n, ends in bounds.items()):
-        least, most = info[name].lower, info[name].upper
-        pair = [as_number(end) for end in ends] if isinstance(ends, tuple | list) else []
-        low, high = [end for end in pair if end is not None] if len(pair) == 2 and None not in pair else (1.0, 0.0)
-        narrower[name] = (max(low, least), min(high, most))
-        if not narrower[name][0] < narrower[name][1]:
-            message = f"expected (lower, upper) of {name} within {least:g} to {most:g}, found {ends!r}"
-            raise InputError(message, column="bounds")
-    return free, narrower
 
 
 def rough_noise(model: Model, trials: Sequence[Trial], correlation_s: float = 0.0) -> dict[str, Noise]:

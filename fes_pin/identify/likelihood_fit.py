@@ -92,6 +92,19 @@ def maximum_from(
     return maximise(problem, fitted.unknowns, rounds, fitted.together)
 
 
+def refit(fitted: LikelihoodFit, trials: Sequence[Trial]) -> LikelihoodFit:
+    """Return the fit of the same model to other trials, with the noise of these."""
+    problem, unknowns = problem_on(fitted, trials)
+    return maximise(problem, unknowns, near=True)
+
+
+def problem_on(fitted: LikelihoodFit, trials: Sequence[Trial]) -> tuple[LikelihoodProblem, Unknowns]:
+    """Return the problem of a fit's model on other trials, and start values of their unknowns."""
+    known = {id(t): u for t, u in zip(fitted.trials, fitted.unknowns, strict=True)}
+    problem = LikelihoodProblem(fitted.model, trials, fitted.noise)
+    return problem, [known.get(id(t), u) for t, u in zip(trials, problem.start_unknowns(), strict=True)]
+
+
 def with_white_process_noise(fitted: LikelihoodFit) -> LikelihoodFit:
     """Fit the same model to the same trials with white process noise.
 

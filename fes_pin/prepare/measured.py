@@ -6,6 +6,7 @@ from functools import partial
 
 from fes_pin.data.derived import without_derived
 from fes_pin.data.errors import InputError
+from fes_pin.data.schema import RigSchema
 from fes_pin.data.spikes import without_spikes
 from fes_pin.data.stuck import without_stuck
 from fes_pin.data.study import Study
@@ -76,9 +77,12 @@ def split(study: Study) -> tuple[list[Trial], list[Trial]]:
 
     Free motion is fitted at the rate that its noise is modelled at, since no input is faster.
     """
-    schema = study.schema
-    train = [t if set(schema.inputs) & set(t.columns) else thinned(t, schema) for t in study.to_fit()]
-    return train, [t for t in study.trials if t.role == "held_out"]
+    return at_noise_rate(study.to_fit(), study.schema), [t for t in study.trials if t.role == "held_out"]
+
+
+def at_noise_rate(trials: Sequence[Trial], schema: RigSchema) -> list[Trial]:
+    """Return trials, those of free motion at the rate that their noise is modelled at."""
+    return [t if set(schema.inputs) & set(t.columns) else thinned(t, schema) for t in trials]
 
 
 def folds_of(trials: Sequence[Trial], groups: Sequence[str] | None = None, count: int = FOLDS) -> list[list[int]]:

@@ -60,6 +60,12 @@ NEAREST, FITTED = 3, 8
 MORE = 2.0
 """Ratio of the errors E of two fits above which one is farther from the data."""
 
+
+def first_noise(trials: Sequence[Trial], answered: bool) -> str:
+    """Return the noise of the first fits to trials: with process noise in closed loop, and of imposed motion."""
+    return PROCESS if answered or any(t.kind == IMPOSED for t in trials) else MEASUREMENT
+
+
 Starts = list[Scored]
 """Shapes of a cause by which a set is extended, with their linear estimates, best first."""
 

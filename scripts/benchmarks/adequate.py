@@ -23,9 +23,9 @@ from confusion_matrix.noise import FAMILIES
 from confusion_matrix.plan import Item
 
 from fes_pin.diagnosis.rejected import slowness
-from fes_pin.identify.fit import fit
 from fes_pin.infer.levels import SMALL_SHARE
 from fes_pin.models.nominal import nominal_model
+from fes_pin.search.fit import fit
 
 
 def ratios(rig: str, noise: str, count: int, seed: int) -> np.ndarray:

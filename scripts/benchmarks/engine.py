@@ -18,12 +18,12 @@ import scipy.optimize
 
 from fes_pin.data.study import read_study
 from fes_pin.data.trial import Trial
-from fes_pin.identify.fit import fit
 from fes_pin.models.compile.layout import WIDE, WIDTH
 from fes_pin.models.model import Model
 from fes_pin.models.rigs import Ankle
 from fes_pin.models.simulate import Simulator
 from fes_pin.paper.equation_1 import static_torque_nm
+from fes_pin.search.fit import fit
 
 KNOWN = {
     "foot_mass_kg": 0.12,

@@ -8,7 +8,7 @@ from diagnosis.hidden import study_of
 from identify.rigs import as_likely
 
 from fes_pin.diagnosis.decide.chosen_again import ChosenAgain, share_of
-from fes_pin.identify.fit import fit, fit_problem
+from fes_pin.identify.fit import fit_problem
 from fes_pin.identify.problem import Problem
 from fes_pin.infer.distributions import chi2_tail
 from fes_pin.infer.left_out import LeftOut
@@ -18,6 +18,7 @@ from fes_pin.models.effects import effect_named
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.predictor import StateSpaceNoise
 from fes_pin.prepare.measured import folds_of
+from fes_pin.search.fit import fit
 
 NAMES = ("coulomb_friction", "effort_offset", "quadratic_damping")
 

@@ -9,11 +9,11 @@ from identify.rigs import as_likely
 
 from fes_pin.diagnosis import errors_ahead
 from fes_pin.diagnosis.errors_ahead import free_errors
-from fes_pin.identify.fit import fit
 from fes_pin.infer.held_out import Errors, held_out_gain
 from fes_pin.infer.levels import RUNAWAY
 from fes_pin.models.effects import effect_named
 from fes_pin.models.nominal import nominal_model
+from fes_pin.search.fit import fit
 
 
 def test_a_prediction_that_runs_away_counts_as_a_large_error():

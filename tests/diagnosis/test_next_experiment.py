@@ -15,11 +15,11 @@ from fes_pin.cli import main
 from fes_pin.data.study import write_study
 from fes_pin.data.trial import read_trial, trial_csv
 from fes_pin.diagnosis.experiment import ROOM, candidates, discriminations, near_measured, next_experiment
-from fes_pin.identify.fit import fit
 from fes_pin.identify.problem import measured_columns
 from fes_pin.models.effects import effect_named
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.predict import predict
+from fes_pin.search.fit import fit
 
 DELAY, LAG = "electromechanical_delay", "second_order_activation"
 

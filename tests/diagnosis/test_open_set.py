@@ -11,7 +11,7 @@ from diagnosis.hidden import study_of
 from identify.rigs import trials_of
 
 from fes_pin.data.trial import Trial
-from fes_pin.identify.fit import fit, under_own_noise
+from fes_pin.identify.fit import under_own_noise
 from fes_pin.infer.levels import CLAIM_LEVEL, FULL_NOISE
 from fes_pin.infer.noise import Noise, estimate_noise
 from fes_pin.infer.projection import Projection
@@ -27,6 +27,7 @@ from fes_pin.remainder.lines import line_p_value
 from fes_pin.remainder.play import play_p_value
 from fes_pin.remainder.repeated import repeated_p_value
 from fes_pin.remainder.slips import slip_p_value
+from fes_pin.search.fit import fit
 from fes_pin.search.likelihood_fits import LikelihoodFits
 
 DT = 0.005

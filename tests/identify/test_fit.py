@@ -10,7 +10,7 @@ from identify.rigs import SIZE, WHITE, by_scipy, measured, off, trials_of
 from models.cases import JOINT, RIGS, trial
 
 from fes_pin.data.trial import Trial
-from fes_pin.identify.fit import GROSS, fit, fit_multistart, fit_problem
+from fes_pin.identify.fit import GROSS, fit_multistart, fit_problem
 from fes_pin.identify.problem import Problem
 from fes_pin.infer.noise import Noise, thinning
 from fes_pin.infer.optimize import TOLERANCE
@@ -20,6 +20,7 @@ from fes_pin.models.model import Model
 from fes_pin.models.parameters import parameter
 from fes_pin.models.rigs import Joint
 from fes_pin.models.stage import Effect, Stage
+from fes_pin.search.fit import fit
 
 
 @pytest.mark.parametrize(("rig", "velocity"), [("ankle", False), ("joint", False), ("joint", True), ("muscle", False)])

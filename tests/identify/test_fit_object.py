@@ -13,10 +13,10 @@ from models.cases import RIGS, trial
 
 import fes_pin as fp
 from fes_pin.data.trial import Trial
-from fes_pin.identify.fit import fit
 from fes_pin.models.effects import CoulombFriction, SensorOffset
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import StateSpaceNoise
+from fes_pin.search.fit import fit
 
 RISE, RISE_AT_A_BOUND = 3.8414588, 2.7055435
 COPIES = [lambda x: x, copy.copy, copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x))]

@@ -8,11 +8,11 @@ import pytest
 from models.cases import ANKLE, CASES, JOINT, MUSCLE, RIGS, name_of, trial
 
 from fes_pin.data.study import read_study, write_study
-from fes_pin.identify.fit import fit
 from fes_pin.models.effects import effect_named
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.simulate import Simulator
+from fes_pin.search.fit import fit
 
 CONSTANTS = {"ankle": ANKLE, "joint": JOINT, "muscle": MUSCLE}
 ANGLE_RAD, FORCE_N = 1e-5, 3e-4

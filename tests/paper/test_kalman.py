@@ -8,10 +8,10 @@ from paper_ankle.regression import RegressionFilter
 from paper_ankle.twin import record
 
 from fes_pin.data.errors import InputError
-from fes_pin.identify.fit import fit
 from fes_pin.infer.noise import Noise
 from fes_pin.models.nominal import nominal_model
 from fes_pin.paper.kalman import GainFilter, StraightRecruitment, history_of, track_gain
+from fes_pin.search.fit import fit
 
 TWIN = paper_twin("3-23")
 CONSTANTS = TWIN.constants()

@@ -10,12 +10,12 @@ from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.experiment import NextExperiment
 from fes_pin.diagnosis.result import Diagnosis
-from fes_pin.identify.fit import fit
 from fes_pin.infer.result import CROSS_VALIDATED, Cause, Gain, ParameterEstimate, Ranked, Remainder
 from fes_pin.models.describe import fitted_equation, fitted_sentence
 from fes_pin.models.effects import effect_named
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.simulate import simulated_trial
+from fes_pin.search.fit import fit
 
 NASTY = '<script>alert("x")</script> & $a_b$'
 ANKLE = {

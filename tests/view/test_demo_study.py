@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 
 from fes_pin.data.study import read_study
-from fes_pin.identify.fit import fit
 from fes_pin.models.effects import effect_named
 from fes_pin.models.nominal import nominal_model
+from fes_pin.search.fit import fit
 
 FOLDER = Path(__file__).parents[2] / "analysis" / "studies" / "ankle_demo"
 
