@@ -4,7 +4,6 @@ import math
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -18,8 +17,10 @@ from fes_pin.data.numbers import instance, number
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.identify.ahead import default_horizon
-from fes_pin.identify.likelihood_fit import LikelihoodFit, refit
+from fes_pin.identify.fit import rough_noise
+from fes_pin.identify.likelihood_fit import refit
 from fes_pin.infer.held_out import percent_of_spread
+from fes_pin.infer.noise import NoiseModel
 from fes_pin.models.catalogue import Source
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
@@ -39,12 +40,12 @@ def compare(
     horizon_s: float | None = None,
     given_s: float | None = None,
     library: Source | Sequence[Source] | None = None,
-    least_squares: bool = False,
     progress: Progress | None = None,
 ) -> Comparison:
     """Rank models by their errors on held-out trials.
 
-    Models are fitted by the estimator of `fit` and `diagnose`, and E is measured in the noise of the likeliest model.
+    Models are fitted by least squares of free simulations, as by `fit` with `least_squares`: the criterion of a fit is
+    the error that models are ranked by. The likelihood of `diagnose` takes slow errors of a wrong model for noise.
 
     Parameters
     ----------
@@ -62,8 +63,6 @@ def compare(
         Also predict each trial after its first `given_s` seconds from those seconds.
     library
         Where causes of `extended` come from that are not written here.
-    least_squares
-        Whether models are fitted by least squares of free simulations; see `fit`.
     progress
         Called with a share done and a few words.
 
@@ -93,16 +92,12 @@ def compare(
     chosen = _chosen(models, extended, nominal, every, library)
     noted = measured.odd()
     parts = partings(fitted, held)
-    fits = []
+    floor = rough_noise(nominal, every)
+    compared = []
     with one_thread_each():
         for k, (about, model) in enumerate(chosen):
             tell(k / len(chosen), about.name)
-            whole = fitted_alone(model, fitted, least_squares)
-            again = partial(refit, whole)
-            fits.append((whole, [whole] if held else in_parallel(again, [p.fitted for p in parts])))
-        _, units = min(fits, key=lambda one: one[0].criterion)
-        each = zip(chosen, fits, strict=True)
-        compared = [_compared(about, *own, parts, units, horizon, given_s) for (about, _), own in each]
+            compared.append(_compared(about, model, parts, fitted, floor, horizon, given_s))
     tell(1.0, "done")
     ranked = sorted(compared, key=lambda m: m.percent["free"])
     return Comparison(
@@ -146,19 +141,20 @@ def _chosen(
 
 def _compared(
     about: Published,
-    whole: LikelihoodFit,
-    fits: Sequence[LikelihoodFit],
+    model: Model,
     parts: Sequence[Parting],
-    units: Sequence[LikelihoodFit],
+    fitted: Sequence[Trial],
+    floor: NoiseModel,
     horizon_s: float,
     given_s: float | None,
 ) -> Compared:
-    """Return a model with its errors; the noise of `units`, the fits of one model to the same parts, weighs E."""
+    """Return a model with its errors; `floor` weighs the columns in E."""
+    whole = fitted_alone(model, fitted, least_squares=True)
+    fits = [whole] if len(parts) == 1 else in_parallel(lambda p: refit(whole, p.fitted), parts)
     kinds = left_out_errors(fits, parts, horizon_s, given_s)
-    model, trials = whole.model, [t for p in parts for t in p.held]
+    trials = [t for p in parts for t in p.held]
     columns = np.array([model.rig.output(t.kind) for t in trials])
-    stds = [one.noise.white[model.rig.output(t.kind)] for p, one in zip(parts, units, strict=True) for t in p.held]
-    weight = np.array([np.isfinite(t[c]).sum() for t, c in zip(trials, columns, strict=True)]) / np.square(stds)
+    weight = np.array([np.isfinite(t[c]).sum() / floor[c].std ** 2 for t, c in zip(trials, columns, strict=True)])
     around = weight * kinds.pop("around")
     squares = {n: len(trials) * 100.0 * weight * e / around.sum() for n, e in kinds.items()}
     rows = {str(c): columns == c for c in dict.fromkeys(columns)}

@@ -12,19 +12,17 @@ estimated from its first samples alone. Laird and Ware, Biometrics 38 (1982).
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fes_pin.data.trial import Trial
-from fes_pin.identify.ahead import forecast, free_residuals, over_horizon
+from fes_pin.identify.ahead import forecast, free_residuals
 from fes_pin.identify.fit import Fit, noise_of
-from fes_pin.identify.likelihood import is_simulated
-from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.problem import Problem
 from fes_pin.infer.held_out import within
 from fes_pin.infer.levels import RUNAWAY
-from fes_pin.infer.noise import Noise, noise_step, thinning
+from fes_pin.infer.noise import noise_step, thinning
 from fes_pin.prepare.measured import folds_of
 from fes_pin.workers import in_parallel
 
@@ -54,7 +52,7 @@ def partings(fitted: Sequence[Trial], held: Sequence[Trial]) -> list[Parting]:
 
 
 def left_out_errors(
-    fits: Sequence[LikelihoodFit], parts: Sequence[Parting], horizon_s: float, given_s: float | None
+    fits: Sequence[Fit], parts: Sequence[Parting], horizon_s: float, given_s: float | None
 ) -> dict[str, np.ndarray]:
     """Mean squared errors of one model on every held-out trial, in the unit of its column, squared.
 
@@ -70,16 +68,12 @@ def left_out_errors(
     return {n: np.concatenate([m[n] for m in many]) for n in many[0] if all(n in m for m in many)}
 
 
-def _of_parting(fitted: LikelihoodFit, part: Parting, horizon_s: float, given_s: float | None) -> dict[str, np.ndarray]:
-    is_white = not fitted.noise.ar and is_simulated(fitted.noise, part.held) and math.isfinite(fitted.sse)
-    noise, rows = noise_of(fitted) if is_white else fitted.noise, []
+def _of_parting(fitted: Fit, part: Parting, horizon_s: float, given_s: float | None) -> dict[str, np.ndarray]:
+    noise, rows = noise_of(fitted) if math.isfinite(fitted.sse) else fitted.noise, []
     for trial in part.held:
         name = fitted.model.rig.output(trial.kind)
         left = free_residuals(fitted.model, trial, fitted.noise)[name]
-        if is_simulated(fitted.noise, [trial]):
-            ahead = left - forecast(np.nan_to_num(left), noise[name], trial.dt, horizon_s)
-        else:
-            ahead = trial[name] - over_horizon(fitted.model, trial, fitted.noise, horizon_s)[name]
+        ahead = left - forecast(np.nan_to_num(left), noise[name], trial.dt, horizon_s)
         rows.append([np.nanmean(left**2), np.nanmean(ahead**2), np.nanvar(trial[name])])
     begun = {} if given_s is None else _begun(fitted, part, given_s)
     return {**dict(zip(("free", "horizon", "around"), np.transpose(rows), strict=True)), **begun}
@@ -131,9 +125,9 @@ class OwnPart:
 
 
 def pairs_of(fitted: Fit, trials: Sequence[Trial]) -> list[Pair]:
-    """Residuals and sensitivities of trials at a fit, at the time step of noise, channels in units of their noise."""
+    """Residuals and sensitivities of trials at a fit, at the time step of noise, the channels weighed as in the fit."""
     step = noise_step([t.dt for t in trials])
-    problem = Problem(fitted.model, trials, {n: Noise(one.std, (), one.std, step) for n, one in fitted.noise.items()})
+    problem = Problem(fitted.model, trials, {n: replace(one, step_s=step) for n, one in fitted.noise.items()})
     return [(p.residual, p.jacobian) for p in problem.linearize(fitted.values, problem.start_unknowns())]
 
 

@@ -15,6 +15,7 @@ from fes_pin.data.units import own_unit
 from fes_pin.identify.fit import Fit
 from fes_pin.infer.levels import UNUSUAL_LEVEL
 from fes_pin.infer.result import shown
+from fes_pin.search.likelihood_fits import ESTIMATORS, WHITE
 
 
 @dataclass(frozen=True)
@@ -147,6 +148,7 @@ class Comparison(Saveable):
         """`compare.json` as a dictionary, without the text and the table that a saved result has as well."""
         return {
             "study": self.study.name,
+            "estimator": ESTIMATORS[WHITE],
             "held_out": {"by": self.by, "trials": list(self.held_out)},
             "horizon_s": shown(self.horizon_s),
             "given_s": None if self.given_s is None else shown(self.given_s),
@@ -233,6 +235,7 @@ def notes(found: Comparison) -> list[str]:
     """Return the notes under the table."""
     how = "each trial by fits without it" if found.by == "folds" else "trials that the study holds out"
     lines = [f"root mean squared error on whole trials left out ({how}); in brackets the error E of eq. (2)"]
+    lines.append(f"estimator: {ESTIMATORS[WHITE]}")
     for one in found.models:
         if one.words:
             less = f"; not felt here: {', '.join(one.unfelt)}" if one.unfelt else ""
