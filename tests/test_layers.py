@@ -21,7 +21,7 @@ ALLOWED = {
     "models": {"data"},
     "identify": {"models", "data"},
     "remainder": {"identify", "models", "data"},
-    "search": {"prepare", "identify", "models", "data"},
+    "search": {"prepare", "remainder", "identify", "models", "data"},
     "prepare": {"identify", "models", "data"},
     "faults": {"search", "prepare", "identify", "models", "data"},
     "diagnosis": {"faults", "prepare", "search", "remainder", "identify", "models", "data"},

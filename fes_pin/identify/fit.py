@@ -17,6 +17,7 @@ from fes_pin.data.results import Saveable
 from fes_pin.data.schema import IMPOSED, check_known
 from fes_pin.data.show import by_columns
 from fes_pin.data.trial import Trial
+from fes_pin.data.units import own_unit
 from fes_pin.identify.problem import Problem
 from fes_pin.infer.noise import ORDERS, Noise, NoiseModel, estimate_noise, noise_step, thin, thinning
 from fes_pin.infer.optimum import MAX_ITERATIONS, Optimum, minimise
@@ -33,6 +34,8 @@ GROWTH = (1 / 8, 1 / 4, 1 / 2)
 """Shares of every trial to which a fit from afar is made, one after another."""
 SHORTEST = 50
 """Least number of samples of a trial that is fitted by itself."""
+HIGH_CORRELATION = 0.9
+"""Absolute correlation of two estimates above which the printed table lists the pair."""
 GROSS = 10.0
 """Reduced chi-square from which a fit may have ended far from the optimum."""
 
@@ -54,6 +57,8 @@ class Fit(Optimum, Saveable):
         Noise by output column, as assumed in the fit; for a fit by the likelihood, its process noise as well.
     bounds
         Bounds by name, where narrower ones were asked for than the parameters have.
+    start
+        Start values by name, of a fit by `fit`.
     free, parameters, covariance, at_bound, sse, converged, gradient_norm, unknowns, parts, together
         Of every `Optimum`; read-only.
     """
@@ -62,6 +67,7 @@ class Fit(Optimum, Saveable):
     trials: tuple[Trial, ...]
     noise: NoiseModel
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    start: Mapping[str, float] = field(default_factory=dict)
 
     def _freeze(self) -> None:
         super()._freeze()
@@ -94,8 +100,9 @@ class Fit(Optimum, Saveable):
             Of the parameter.
         method
             "wald": value +- 1.96 std. "profile": where twice the log-likelihood, all other parameters fitted again,
-            falls by 3.84; see `infer.profile`. The fits of a diagnosis of driven rigs, and of a contrast, have no
-            such profile: their intervals at a bound are those of the parabola that the fit ended on.
+            falls by 3.84; see `infer.profile`. Estimated noise is held. Fits with process noise, and of a contrast,
+            have no such profile. The interval of an estimate with estimated noise at a bound is that of the parabola
+            that the fit ended on, but for "profile".
 
         Raises
         ------
@@ -105,20 +112,26 @@ class Fit(Optimum, Saveable):
         self.place(name)
         if method not in ("wald", "profile"):
             raise InputError(f"expected wald or profile, found {method!r}", column="method")
-        has_profile = type(self) is Fit
-        if method == "profile" and not has_profile:
+        if method == "profile" and not self._has_profile:
             raise InputError("expected wald: this fit is of random processes or of groups", column="method")
-        if has_profile and (method == "profile" or name in self.at_bound):
+        if method == "profile" or (type(self) is Fit and name in self.at_bound):
             return self._one_sided[name] if name in self.at_bound else self._profile(name)
         info = self.model.parameter_info()[name]
         return self.within(name, *self.bounds.get(name, (info.lower, info.upper)))
+
+    @property
+    def _has_profile(self) -> bool:
+        return type(self) is Fit
+
+    def _problem(self) -> Problem:
+        return problem_of(self, self.noise)
 
     @cached_property
     def _one_sided(self) -> dict[str, tuple[float, float]]:
         return {n: self._profile(n) for n in self.at_bound}
 
     def _profile(self, name: str) -> tuple[float, float]:
-        problem = problem_of(self, self.noise)
+        problem = self._problem()
         if not math.isfinite(reach := self.reach(name)):
             return problem.limits[name]
         with one_thread_each():
@@ -151,22 +164,34 @@ class Fit(Optimum, Saveable):
     def as_table(self) -> tuple[str, Sequence[str], Sequence[Sequence[str]], Sequence[str]]:
         """Return title, head, rows and notes of the printed table."""
         rows = [
-            (n, f"{value:.5g}", f"[{low:.5g}, {high:.5g}]", unit or "-", note)
-            for n, value, _, low, high, unit, note in zip(*self.columns().values(), strict=True)
+            (n, f"{start:.5g}", f"{value:.5g}", f"[{low:.5g}, {high:.5g}]", unit or "-", note)
+            for n, value, _, low, high, unit, note, start in zip(*self.columns().values(), strict=True)
         ]
-        notes = [] if self.is_optimal() else ["The fit did not end at an optimum."]
-        title = f"{' + '.join(self.model.structure())}: {self.samples} samples, reduced chi2 {self.reduced:.3f}"
-        return title, ("parameter", "value", "95 % interval", "unit", ""), rows, notes
+        title = f"{' + '.join(self.model.structure())}: {self.samples} samples, {self._quality()}"
+        return title, ("parameter", "start", "value", "95 % interval", "unit", ""), rows, self._notes()
+
+    def _quality(self) -> str:
+        known = f"reduced chi2 {self.reduced:.3f}, " if type(self) is Fit else ""  # else 1, as the noise is estimated
+        return f"{known}log-likelihood {self.loglikelihood:.6g}, AIC {self.aic:.6g}, BIC {self.bic:.6g}"
+
+    def _notes(self) -> list[str]:
+        """Return the notes under the printed table."""
+        noise = (f"{n} {one.std:.3g} {own_unit(n)} (AR {len(one.ar)})" for n, one in self.noise.items())
+        lines = [f"noise, standard deviation (order of autoregression): {', '.join(noise)}"]
+        at = np.argwhere(np.triu(np.abs(np.nan_to_num(self.correlations)) > HIGH_CORRELATION, 1))
+        pairs = (f"{self.free[i]}, {self.free[k]} {self.correlations[i, k]:.3f}" for i, k in at)
+        lines += [f"correlations above {HIGH_CORRELATION:g}: {'; '.join(pairs)}"] * bool(len(at))
+        return lines + ["The fit did not end at an optimum."] * (not self.is_optimal())
 
     def columns(self) -> dict[str, list[Any]]:
-        """Return the fitted parameters with standard deviations, 95 % intervals and units.
+        """Return the fitted parameters with standard deviations, 95 % intervals, units and start values.
 
         `std` is NaN and `note` is "at its bound" where a value is at its bound; `note` is "not identified" where a
-        parameter is not identifiable.
+        parameter is not identifiable. `start` is NaN where it is not known.
         """
-        head, info = ("parameter", "value", "std", "low", "high", "unit", "note"), self.model.parameter_info()
-        rows = [(n, self.values[n], self.std(n), *self.interval(n), info[n].unit, self._note(n)) for n in self.free]
-        return by_columns(head, rows)
+        head, info = ("parameter", "value", "std", "low", "high", "unit", "note", "start"), self.model.parameter_info()
+        own = ((n, self.values[n], self.std(n), *self.interval(n), info[n].unit, self._note(n)) for n in self.free)
+        return by_columns(head, [(*row, self.start.get(row[0], math.nan)) for row in own])
 
     def record(self) -> dict[str, Any]:
         """Return the fit as JSON holds it: see `fes_pin.data.results`."""
@@ -177,6 +202,9 @@ class Fit(Optimum, Saveable):
             "parameters": {one: {n: column[k] for n, column in cells.items()} for k, one in enumerate(names)},
             "samples": self.samples,
             "reduced_chi2": shown(self.reduced),
+            "loglikelihood": shown(self.loglikelihood),
+            "aic": shown(self.aic),
+            "bic": shown(self.bic),
             "converged": self.converged,
         }
 
@@ -189,6 +217,43 @@ class Fit(Optimum, Saveable):
         """Sum of squares over degrees of freedom: 1 where the noise model is right and the model adequate."""
         squares = sum(float(p.residual @ p.residual) for p in self.parts) if math.isfinite(self.sse) else math.inf
         return squares / max(self.samples - self.degrees, 1)
+
+    @cached_property
+    def loglikelihood(self) -> float:
+        """Natural logarithm of the likelihood of all readings, at the known or estimated noise."""
+        return -0.5 * (self._cost() + self.samples * math.log(2.0 * math.pi))
+
+    def _cost(self) -> float:
+        """Return twice the negative log-likelihood without n log(2 pi)."""
+        return sum(one.cost() for one in self._problem().innovations(self.values, self.unknowns))
+
+    @property
+    def noise_degrees(self) -> int:
+        """Number of estimated parameters of the noise; 0 of noise that is known."""
+        return 0
+
+    @property
+    def aic(self) -> float:
+        """Akaike's information criterion, 2 k - 2 log L, with k = `degrees` + `noise_degrees`.
+
+        Source: Akaike, IEEE Transactions on Automatic Control 19 (1974) 716.
+        """
+        return 2.0 * (self.degrees + self.noise_degrees - self.loglikelihood)
+
+    @property
+    def bic(self) -> float:
+        """Bayesian information criterion, k log n - 2 log L, of n samples.
+
+        Source: Schwarz, Annals of Statistics 6 (1978) 461.
+        """
+        return (self.degrees + self.noise_degrees) * math.log(self.samples) - 2.0 * self.loglikelihood
+
+    @cached_property
+    def correlations(self) -> NDArray[np.float64]:
+        """Correlations of the estimates, shape (free, free); NaN at a bound and where a parameter is not identified."""
+        with np.errstate(all="ignore"):
+            std = np.sqrt(np.diag(self.covariance))
+            return np.asarray(self.covariance / np.outer(std, std), dtype=np.float64)
 
     @property
     def degrees(self) -> int:

@@ -27,6 +27,25 @@ class LikelihoodFit(Fit):
     noise: StateSpaceNoise
 
     @property
+    def _has_profile(self) -> bool:
+        return is_simulated(self.noise, self.trials)
+
+    def _problem(self) -> LikelihoodProblem:
+        problem = LikelihoodProblem(self.model, self.trials, self.noise, self.free)
+        problem.limits |= self.bounds
+        return problem
+
+    def _cost(self) -> float:
+        return self.sse
+
+    @property
+    def noise_degrees(self) -> int:
+        """Number of estimated parameters of the noise: of each output and process, and of autoregressions."""
+        known = [f"{part}.{n}" for part in ("std", "time") for n in self.noise.still]
+        known += [f"time.{n}" for n in self.noise.timed]
+        return len(self.noise.parameters().keys() - known) + sum(map(len, self.noise.ar.values()))
+
+    @property
     def criterion(self) -> float:
         """Twice the negative log-likelihood, with a penalty for each degree of freedom and for process noise."""
         return self.sse + PARAMETER_PENALTY * (self.degrees + 2 * len(self.noise.acting))

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
@@ -18,14 +19,31 @@ from fes_pin.identify.likelihood_fit import LikelihoodFit, maximise, maximum_fro
 from fes_pin.identify.problem import Problem
 from fes_pin.infer.noise import NoiseModel
 from fes_pin.infer.optimum import MAX_ITERATIONS
+from fes_pin.infer.result import Remainder
 from fes_pin.models.accepted import accepted_trials
 from fes_pin.models.model import Model
 from fes_pin.models.plausibility import warn_of_odd_numbers
 from fes_pin.models.simulate import simulated_trial
 from fes_pin.prepare.long_records import in_parts, searched_part
 from fes_pin.prepare.measured import at_noise_rate, measured_study
+from fes_pin.remainder.lack_of_fit import lack_of_fit
 from fes_pin.search.likelihood_fits import WHITE, LikelihoodFits, first_noise
 from fes_pin.workers import one_thread_each
+
+
+class TestedFit(LikelihoodFit):
+    """A fit by the likelihood, with the test of its lack of fit, which is made when it is asked for."""
+
+    @cached_property
+    def lack_of_fit(self) -> Remainder:
+        """Whether residuals of the model are more than noise; see `remainder.lack_of_fit`."""
+        with one_thread_each():
+            return lack_of_fit(self)
+
+    def _notes(self) -> list[str]:
+        left = self.lack_of_fit
+        found = "the model leaves more than noise" if left.unexplained else "none found"
+        return [*super()._notes(), f"lack of fit: {found} ({left.tested()})"]
 
 
 def fit(
@@ -66,6 +84,7 @@ def fit(
     Returns
     -------
     Fit
+        Of a fit by the likelihood, its `lack_of_fit` is tested when it is asked for or printed.
 
     Raises
     ------
@@ -93,13 +112,14 @@ def fit(
         if noise is not None:
             problem = Problem(model, measured, noise, free)
             problem.limits |= narrower
-            return replace(fit_multistart(problem, max_iterations), bounds=narrower)
+            return replace(fit_multistart(problem, max_iterations), bounds=narrower, start=model.parameters())
         if isinstance(trials, Study):
             measured = measured_study(trials).study.to_fit()
         found = fitted_alone(model, at_noise_rate(measured, model.rig.schema), least_squares)
-        if free == found.free and not narrower:
-            return found
-        return _restricted(found, model, free, narrower)
+        if free != found.free or narrower:
+            found = _restricted(found, model, free, narrower)
+        made = LikelihoodFit if least_squares else TestedFit
+        return made(**{**vars(found), "start": model.parameters()})
 
 
 def fitted_alone(model: Model, trials: Sequence[Trial], least_squares: bool = False) -> LikelihoodFit:
