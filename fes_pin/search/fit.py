@@ -43,7 +43,10 @@ class TestedFit(LikelihoodFit):
     def _notes(self) -> list[str]:
         left = self.lack_of_fit
         found = "the model leaves more than noise" if left.unexplained else "none found"
-        return [*super()._notes(), f"lack of fit: {found} ({left.tested()})"]
+        noise = self.noise
+        random = [f"{n} {noise.std[n]:.3g}, time constant {noise.time[n]:.3g} s" for n in noise.acting]
+        lines = [f"process noise, standard deviation: {'; '.join(random)}"] * bool(random)
+        return [*super()._notes(), *lines, f"lack of fit: {found} ({left.tested()})"]
 
 
 def fit(
@@ -79,7 +82,7 @@ def fit(
         Lower and upper bounds of fitted parameters by name, within those that they have: `{"damping": (0.0, 1.0)}`.
     least_squares
         Whether the estimator is least squares of free simulations, with white noise of each column estimated. Where a
-        model is wrong, this fit predicts best from the inputs alone.
+        model is wrong, this fit predicts best from the inputs alone; its intervals take its residuals for white.
 
     Returns
     -------
