@@ -6,17 +6,27 @@ from typing import Annotated
 import typer
 
 from fes_pin.cli.group import python_names
-from fes_pin.cli.options import Exclude, Force, Libraries, Trials, output, study_of
+from fes_pin.cli.options import Exclude, Force, Libraries, Trials, offered_lists, output, study_of
 from fes_pin.cli.progress import catalogue_with, print_result, progress, say_whose_code
 
 FILE = "compare.json"
+
+
+def _names() -> list[str]:
+    from fes_pin.comparison.literature import LITERATURE
+
+    return [one.name for one in LITERATURE]
 
 
 @python_names(horizon_s="--horizon", given_s="--given", library="--library")
 def compare(
     study: Annotated[Path, typer.Argument(help="Folder of a study of a muscle or an ankle, or its study.toml.")],
     models: Annotated[
-        str | None, typer.Option(help="Names with commas between them: nominal,ding2003,hill ... [default: all]")
+        str | None,
+        typer.Option(
+            help="Names with commas between them: nominal,ding2003,hill ... [default: all]",
+            autocompletion=offered_lists(_names),
+        ),
     ] = None,
     model: Annotated[
         list[Path] | None, typer.Option("--model", help="model.toml of a diagnosis, too; may be repeated.")

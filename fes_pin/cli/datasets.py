@@ -6,13 +6,21 @@ from typing import Annotated
 import typer
 
 from fes_pin.cli.group import needs, python_names
-from fes_pin.cli.options import Force, output
+from fes_pin.cli.options import Force, offered, output
+
+
+def _names() -> list[str]:
+    from fes_pin.data.datasets import DATASETS
+
+    return list(DATASETS)
 
 
 @needs(out="names", unverified="names", force="names")
 @python_names(**{"unverified=True": "--unverified"})
 def datasets(
-    names: Annotated[list[str] | None, typer.Argument(help="To fetch. [default: list them]")] = None,
+    names: Annotated[
+        list[str] | None, typer.Argument(help="To fetch. [default: list them]", autocompletion=offered(_names))
+    ] = None,
     out: Annotated[Path | None, output("Folder to fetch into. [default: FES_PIN_DATA, or the user's cache]")] = None,
     unverified: Annotated[
         bool, typer.Option("--unverified", help="Keep what no checksum is known of and converts to other numbers.")

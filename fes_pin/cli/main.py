@@ -29,11 +29,12 @@ from fes_pin.cli.out import pulses, urdf
 from fes_pin.cli.own import check, new_study
 from fes_pin.cli.predict import predict
 from fes_pin.cli.progress import catalogue_with, print_result, progress, say_whose_code
+from fes_pin.cli.verify import verify
 from fes_pin.data.errors import InputError
 
 app = App(pretty_exceptions_enable=False)
 app.add_typer(body, name="body")
-for command in (allocate, new_study, check, urdf, datasets, pulses, cohort, contrast, compare, predict):
+for command in (allocate, new_study, check, urdf, datasets, pulses, cohort, contrast, compare, predict, verify):
     app.command()(command)
 
 DIAGNOSING = 0.8

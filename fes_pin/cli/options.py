@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
 from functools import partial
@@ -18,6 +18,29 @@ from fes_pin.data.schema import one_of
 if TYPE_CHECKING:
     from fes_pin.data.study import Study
     from fes_pin.models.catalogue import Catalogue
+
+
+def offered(names: Callable[[], Iterable[str]]) -> Callable[[str], list[str]]:
+    """Return what completes a word: those of some names that begin as it does."""
+    return lambda incomplete: [name for name in names() if name.startswith(incomplete)]
+
+
+def offered_lists(names: Callable[[], Iterable[str]]) -> Callable[[str], list[str]]:
+    """Return what completes the last of several names with commas between them."""
+
+    def complete(incomplete: str) -> list[str]:
+        before, comma, last = incomplete.rpartition(",")
+        return [before + comma + name for name in offered(names)(last)]
+
+    return complete
+
+
+def _causes() -> list[str]:
+    from fes_pin.models.catalogue import catalogue_of
+    from fes_pin.walk.effects import EFFECTS
+
+    return [*(one.name for one in catalogue_of(None).effects), *(one.name for one in EFFECTS)]
+
 
 Libraries = Annotated[
     list[str] | None,
@@ -37,9 +60,17 @@ def _verdicts(words: list[str] | None) -> list[str] | None:
 
 FailOn = Annotated[
     list[str] | None,
-    typer.Option("--fail-on", help="A verdict with exit code 1; may be repeated.", callback=_verdicts),
+    typer.Option(
+        "--fail-on",
+        help="A verdict with exit code 1; may be repeated.",
+        callback=_verdicts,
+        autocompletion=offered(lambda: VERDICTS),
+    ),
 ]
-Why = Annotated[list[str] | None, typer.Option("--why", help="A cause: print why it is named, or is not.")]
+Why = Annotated[
+    list[str] | None,
+    typer.Option("--why", help="A cause: print why it is named, or is not.", autocompletion=offered(_causes)),
+]
 
 Trials = Annotated[str | None, typer.Option("--trials", help="Only these trials: a,b, or a* for all that begin so.")]
 Exclude = Annotated[str | None, typer.Option("--exclude", help="All trials but these: a,b, or a*.")]

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from fes_pin.cli.group import needs, release_output
-from fes_pin.cli.options import Exclude, Libraries, Trials, output, pairs, study_of
+from fes_pin.cli.options import Exclude, Libraries, Trials, offered, output, pairs, study_of
 from fes_pin.cli.progress import catalogue_with
 from fes_pin.data.as_read import HeldFile
 from fes_pin.data.errors import InputError
@@ -37,7 +37,11 @@ if TYPE_CHECKING:
 def new_study(
     files: Annotated[list[Path] | None, typer.Argument(help="Recordings, one a trial.")] = None,
     rig: Annotated[
-        str | None, typer.Option(help="ankle, body, joint, muscle, or a rig of your own. [default: joint]")
+        str | None,
+        typer.Option(
+            help="ankle, body, joint, muscle, or a rig of your own. [default: joint]",
+            autocompletion=offered(known_rigs),
+        ),
     ] = None,
     urdf: Annotated[Path | None, typer.Option(help="Of a joint: the rig as it is believed to be.")] = None,
     pendulum: Annotated[

@@ -1,4 +1,4 @@
-"""Noise and log of a saved model: the tables `random` and `log` of a `model.toml`.
+"""Noise, ranges and log of a saved model: the tables `random`, `range` and `log` of a `model.toml`.
 
 Noise of each output column, autoregressive where it is coloured, and first-order random processes. Models that older
 versions saved of rigs that are simulated freely have autoregressive noise by output column, `noise`.
@@ -9,6 +9,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from fes_pin.data.log import Log
 from fes_pin.data.schema import NumberKey
 from fes_pin.data.toml import Document, read_toml
@@ -18,6 +20,7 @@ from fes_pin.models.predictor import StateSpaceNoise
 
 KEY = "random"
 LOG_KEY = "log"
+RANGE_KEY = "range"
 _PARTS = ("white", "std", "time")
 _LAG = ("correlation_s", "lasts_s")
 """Key of the correlation time of measurement noise, and its name in models that version 0.1 saved."""
@@ -32,8 +35,12 @@ _NOISE = {"std": NumberKey(""), "innovation_std": NumberKey(""), "step_s": Numbe
 
 
 def stored_tables(fitted: LikelihoodFit, log: Log) -> dict[str, dict[str, Any]]:
-    """Return the tables of a fit's noise and of its log, for `model_toml`."""
-    return {KEY: _random_table(fitted.noise), **({LOG_KEY: log_table(log)} if log != Log() else {})}
+    """Return the tables of a fit's noise, of the range of each column of its trials, and of its log."""
+    names = dict.fromkeys(n for t in fitted.trials for n in t.columns)
+    ends = {n: [(np.nanmin(t[n]), np.nanmax(t[n])) for t in fitted.trials if n in t] for n in names}
+    ranges = {n: [float(np.min(v)), float(np.max(v))] for n, v in ends.items()}
+    tables = {KEY: _random_table(fitted.noise), RANGE_KEY: ranges}
+    return {**tables, **({LOG_KEY: log_table(log)} if log != Log() else {})}
 
 
 def log_table(log: Log) -> dict[str, float]:
@@ -51,6 +58,23 @@ def load_log(path: str | Path) -> Log:
     """
     document = read_toml(path)
     return Log(**document.numbers(LOG_KEY, document.table(LOG_KEY), _LOG))
+
+
+def load_range(path: str | Path) -> dict[str, tuple[float, float]]:
+    """Read the range of each column of the trials that a model was fitted to; none of a model saved without it.
+
+    Raises
+    ------
+    InputError
+        For a table that is not as `stored_tables` writes it: names the row and the key.
+    """
+    document, ranges = read_toml(path), dict[str, tuple[float, float]]()
+    for name, ends in document.table(RANGE_KEY).items():
+        both = _coefficients(document, f"{RANGE_KEY}.{name}", ends)
+        if len(both) != 2:
+            raise document.error(f"{RANGE_KEY}.{name}", "expected [lowest, highest]")
+        ranges[name] = (both[0], both[1])
+    return ranges
 
 
 def _random_table(noise: StateSpaceNoise) -> dict[str, Any]:
