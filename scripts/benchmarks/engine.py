@@ -134,8 +134,8 @@ def _motions() -> tuple[str, dict[str, float], dict[str, float], list[Trial]]:
 def _fits() -> list[Row]:
     name, known, start, trials = _motions()
     model = Model(Ankle(constants=known, **start))
-    fit(model, trials)
-    ours = _median(lambda: fit(model, trials), 7)
+    fit(model, trials, least_squares=True)
+    ours = _median(lambda: fit(model, trials, least_squares=True), 7)
     names = list(start)
 
     def residual(x: np.ndarray) -> np.ndarray:
@@ -145,7 +145,7 @@ def _fits() -> list[Row]:
     began = time.perf_counter()
     found = scipy.optimize.least_squares(residual, list(start.values()), x_scale=list(start.values()), diff_step=1e-4)
     theirs = time.perf_counter() - began
-    mine = fit(model, trials).values
+    mine = fit(model, trials, least_squares=True).values
     apart = max(abs(found.x[k] / mine[n] - 1.0) for k, n in enumerate(names))
     return [
         (f"fit of the nominal ankle to {name} ({len(trials)} motion trials)", 1e3 * ours, None, "ms"),

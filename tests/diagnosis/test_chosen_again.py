@@ -8,11 +8,12 @@ from diagnosis.hidden import study_of
 from identify.rigs import as_likely
 
 from fes_pin.diagnosis.decide.chosen_again import ChosenAgain, share_of
-from fes_pin.identify.fit import fit_problem
+from fes_pin.identify.fit import fit_problem, rough_fit, under_own_noise
 from fes_pin.identify.problem import Problem
 from fes_pin.infer.distributions import chi2_tail
 from fes_pin.infer.left_out import LeftOut
 from fes_pin.infer.levels import PARAMETER_PENALTY
+from fes_pin.infer.optimum import MAX_ITERATIONS
 from fes_pin.infer.problem import normal_equations
 from fes_pin.models.effects import effect_named
 from fes_pin.models.nominal import nominal_model
@@ -31,7 +32,7 @@ def improves(larger, smaller, gain, _explained):
 def fits():
     """The nominal model and single causes on a joint that hides dry friction."""
     study = study_of("joint", ("coulomb_friction",))
-    nominal = fit(nominal_model(study), study.trials)
+    nominal = under_own_noise(rough_fit(nominal_model(study), study.trials), max_iterations=MAX_ITERATIONS)
     others = {(n,): fit(nominal.model + effect_named(n)(), study.trials, nominal.noise) for n in NAMES}
     return {(): nominal, **others}
 

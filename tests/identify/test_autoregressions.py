@@ -84,7 +84,7 @@ def test_noise_of_much_power_at_low_frequencies_is_white_beside_what_is_found(st
 def test_what_noise_foretells_of_itself_is_stored_and_read_back(study, tmp_path):
     model, trials = nominal_model(study), moved(study)
     noise = replace(first_guess(model, trials), ar={"angle_rad": AR})
-    fitted = SimpleNamespace(model=model, noise=noise)
+    fitted = SimpleNamespace(model=model, noise=noise, trials=trials)
     path = tmp_path / "model.toml"
     path.write_text(model_toml(model, stored_tables(fitted, Log())), encoding="utf-8")
     assert load_random(path) == noise

@@ -10,6 +10,8 @@ from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.experiment import NextExperiment
 from fes_pin.diagnosis.result import Diagnosis
+from fes_pin.identify.fit import rough_fit, under_own_noise
+from fes_pin.infer.optimum import MAX_ITERATIONS
 from fes_pin.infer.result import CROSS_VALIDATED, Cause, Gain, ParameterEstimate, Ranked, Remainder
 from fes_pin.models.describe import fitted_equation, fitted_sentence
 from fes_pin.models.effects import effect_named
@@ -82,7 +84,7 @@ def diagnosed(
     """A diagnosis that claims these causes, whatever the data say."""
     data = measured(study, names)
     train = [t for t in data.trials if t.role != "held_out"]
-    nominal = fit(nominal_model(data), train)
+    nominal = under_own_noise(rough_fit(nominal_model(data), train), max_iterations=MAX_ITERATIONS)
     extended = fit(_extended(data, names), train, nominal.noise) if names else nominal
     causes = tuple(_cause(extended, n, rivals) for n in names)
     plan = None
