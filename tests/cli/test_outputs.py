@@ -124,7 +124,7 @@ FOLDERS = {  # words, what the command writes into its folder
     "cohort": (("cohort", "it"), ("studies.csv", "causes.csv", "pooled.csv", "prevalence.csv", "cohort.html")),
     "new-study": (("new-study", "it/b.csv", "--urdf", "it/study.toml"), ("study.toml",)),
 }
-READING = {"allocate", "check", "effects", "body modes"}
+READING = {"allocate", "check", "effects", "body modes", "verify"}
 
 
 def commands(one, before=""):

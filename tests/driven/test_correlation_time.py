@@ -79,7 +79,7 @@ def test_what_is_random_is_kept_with_a_model(correlation_s, tmp_path):
     model = nominal_model(study)
     noise = replace(first_guess(model, study.trials), correlation_s=correlation_s)
     path = tmp_path / "model.toml"
-    path.write_text(model_toml(model, stored_tables(SimpleNamespace(noise=noise), Log())))
+    path.write_text(model_toml(model, stored_tables(SimpleNamespace(noise=noise, trials=()), Log())))
     assert load_random(path) == noise
     assert ("correlation_s" in path.read_text()) == bool(correlation_s)
 
@@ -88,7 +88,7 @@ def test_a_model_with_the_old_name_of_the_correlation_time_is_read_and_says_so(t
     noise = StateSpaceNoise({"position": 2e-3}, {"effort": 0.8}, {"effort": 0.12}, 0.008)
     path = tmp_path / "model.toml"
     rig = Joint(constants={"inertia": 0.05, "gravity_cos": 0.0, "gravity_sin": 1.0, "revolute": 1.0})
-    written = model_toml(Model(rig), stored_tables(SimpleNamespace(noise=noise), Log()))
+    written = model_toml(Model(rig), stored_tables(SimpleNamespace(noise=noise, trials=()), Log()))
     path.write_text(written.replace("correlation_s = ", "lasts_s = "))
     with pytest.warns(DeprecationWarning, match="lasts_s"):
         assert load_random(path) == noise
