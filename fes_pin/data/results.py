@@ -221,10 +221,15 @@ class Result(Saveable):
         if self.next_experiment is not None and self.causes:
             return f"to separate {listed(list(self.next_experiment.separates))}: {self.next_experiment.why}"
         if self.causes:
-            return "use the extended model" + (", with care: it lacks something" if self.remainder.unexplained else "")
+            care = ", with care: it lacks something" if self.remainder.unexplained else ""
+            return f"use the extended model{self.use_for()}{care}"
         if self.remainder.unexplained:
             return "check the sensors and conditions of what is missed most, or write a cause of your own"
         return "keep the model; to look for causes that these data cannot show, record other ones"
+
+    def use_for(self) -> str:
+        """Return what an extended model may be used for, in words; empty where nothing restricts it."""
+        return ""
 
     def explain(self, name: str) -> list[str]:
         """Return why a cause is named or is not, a line for each place or group in which it was tried."""

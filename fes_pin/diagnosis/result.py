@@ -105,6 +105,14 @@ class Diagnosis(ModelResult):
                 out.append(Explained(FREE, on[k], free, extended, self.ceiling_percent))
         return out
 
+    def use_for(self) -> str:
+        """See `Result.use_for`: a rig that is driven is predicted over a horizon, and may leave it when simulated."""
+        if (ahead := self.over_horizon) is None:
+            return ""
+        free = (ahead.extended_held_out or ahead.extended).free
+        leaves = "falls" if free is None else f"leaves E {percent(free)}"
+        return f" for {ahead.words}: a free simulation {leaves}"
+
     def assumed(self) -> dict[str, str]:
         """See `Result.assumed`: constants that are held, how trials begin, and the estimator."""
         return {**assumed_of(self.nominal.model, self.nominal.trials), **super().assumed()}
