@@ -10,6 +10,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from fes_pin.infer.text import plain_name
+
 NUMBER = r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?"
 BETWEEN = r"\s*(?:\|\s*[^|\[\d]{0,24}\|)?\s*"
 """Between an estimate and its interval: nothing, or the cell of a unit."""
@@ -99,7 +101,7 @@ class Saved:
 
     def has_interval(self, name: str, value: str, low: str, high: str) -> bool:
         """Return whether an estimate with its interval stands in the file, under its name if that is a parameter's."""
-        named = [one for n, one in self.triples if n == name.rpartition(".")[2]]
+        named = [one for n, one in self.triples if name.rpartition(".")[2] in _printed_names(n)]
         return any(
             all(agrees(p, s) for p, s in zip((value, low, high), one, strict=True))
             for one in named or [one for _, one in self.triples]
@@ -108,6 +110,11 @@ class Saved:
     def has_errors(self, measure: str, nominal: str, extended: str) -> bool:
         """Return whether the errors E of both models stand in the file, under their measure."""
         return any(m.endswith(measure) and agrees(nominal, n) and agrees(extended, e) for m, n, e in self.errors)
+
+
+def _printed_names(name: str) -> set[str]:
+    """Return a parameter's name as it is saved, and the last word of its names in words, on every rig."""
+    return {name, *(plain_name(name, unit).rpartition(" ")[2] for unit in ("", "N"))}
 
 
 def _triples(pairs: list[tuple[str, Any]]) -> Iterator[tuple[str, tuple[float, float, float]]]:
