@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
-from fes_pin.contrasts.result import Contrast
-from fes_pin.data.trial import derived_trial
+from fes_pin.contrasts.grouped import Grouped
+from fes_pin.data.trial import Trial, derived_trial
 from fes_pin.identify.ahead import default_horizon
 from fes_pin.identify.replay import Replay, replayed, squares_of
 from fes_pin.infer.held_out import percent_of_spread
@@ -12,20 +12,20 @@ EVERY = "every group"
 """Name of the model where nothing differs between the groups."""
 
 
-def horizon_of(found: Contrast) -> float | None:
+def horizon_of(fit: Grouped) -> float | None:
     """Return the horizon of the predictions that are shown, s; None for a rig that is simulated freely."""
-    return default_horizon(found.study.trials) if found.driven else None
+    return default_horizon(fit.trials) if fit.is_driven else None
 
 
-def replayed_groups(found: Contrast) -> tuple[Replay, ...]:
-    """Return every trial of the study, in its order, as models predict it: that of its group, and that of another.
+def replayed_groups(fit: Grouped, trials: Sequence[Trial], groups: Sequence[str]) -> tuple[Replay, ...]:
+    """Return every trial, in its order, as models predict it: that of its group, and that of another.
 
     The other group is the one before its own, of the first group the second. Where no change is named, the groups share
     one model, `EVERY`.
     """
-    fit, groups, horizon_s, made = found.fit, found.groups, horizon_of(found), []
+    horizon_s, made = horizon_of(fit), []
     conditions = {t.name: t.conditions for t in fit.trials}  # a misread one is corrected
-    for measured in found.study.trials:
+    for measured in trials:
         trial = derived_trial(measured, conditions=conditions.get(measured.name, measured.conditions))
         place = groups.index(str(trial.group))
         noise, known, models = fit.weights.noise[groups[place]], fit.unknowns_of(trial), {}

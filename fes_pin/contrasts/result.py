@@ -2,11 +2,15 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, ClassVar
 
 from fes_pin.contrasts.grouped import Grouped
+from fes_pin.contrasts.replay import errors_by_group, horizon_of, replayed_groups
 from fes_pin.data.results import Result
-from fes_pin.infer.result import SEEN, Change, Named, ParameterEstimate, shown
+from fes_pin.identify.error_measures import FREE
+from fes_pin.identify.replay import Replay
+from fes_pin.infer.result import FITTED, SEEN, Change, Explained, Named, ParameterEstimate, shown
 from fes_pin.infer.text import listed, percent
 from fes_pin.models.assumed import assumed_of
 from fes_pin.models.catalogue import Catalogue, installed
@@ -62,6 +66,29 @@ class Contrast(Result):
         seen |= {n: percent(100.0 * share) for n, share in self.unchanged.items()}
         said = [(n, f"did not change by its score: more than {size} {SEEN}") for n, size in seen.items()]
         return said + [(n, "not testable with these data") for n in self.untestable]
+
+    @cached_property
+    def replays(self) -> tuple[Replay, ...]:
+        """Every trial as the models of its group and of another predict it."""
+        return replayed_groups(self.fit, self.study.trials, self.groups)
+
+    def errors(self) -> list[Explained]:
+        """Return errors of the trials of each group by the model of another group, and by its own; none of one model.
+
+        Errors are of free simulations, of driven rigs of predictions over the horizon.
+        """
+        horizon_s = horizon_of(self.fit)
+        what = f"predictions {horizon_s:g} s ahead" if horizon_s else FREE
+        gone = []
+        for group, own in errors_by_group(self.replays).items():
+            gone += [
+                Explained(
+                    f"{what} of the trials of {group}, by the model of {n} and by their own", FITTED, e, own[group]
+                )
+                for n, e in own.items()
+                if n != group and group in own
+            ]
+        return gone
 
     def assumed(self) -> dict[str, str]:
         """See `Result.assumed`: constants that are held, how trials begin, and the estimator."""

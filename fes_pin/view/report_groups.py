@@ -1,11 +1,8 @@
 """Sections of the report of a contrast: its trials with the models of its groups, and what did not change."""
 
-from collections.abc import Mapping
-
-from fes_pin.contrasts.replay import EVERY, errors_by_group, horizon_of, replayed_groups
+from fes_pin.contrasts.replay import EVERY, errors_by_group, horizon_of
 from fes_pin.contrasts.result import Contrast
 from fes_pin.identify.error_measures import E_WORDS
-from fes_pin.infer.result import FITTED, Explained
 from fes_pin.infer.text import percent
 from fes_pin.view.page import Content, Markup, element, html_table, section, unit_text
 from fes_pin.view.plots import MEASURED, Legend
@@ -31,28 +28,24 @@ def _legend(found: Contrast) -> Legend:
 
 def _sections(found: Contrast) -> list[Markup]:
     """Its own sections."""
-    replays, horizon_s = replayed_groups(found), horizon_of(found)
+    horizon_s = horizon_of(found.fit)
     ahead = f"Simulated: {horizon_s:g} s ahead of what was measured, for it is driven. " if horizon_s else ""
     unit = found.fit.grouped.rig.units()["q"]
     return [
-        section("Errors by group", *_errors(found, errors_by_group(replays), horizon_s)),
-        section("Trials", *trials_section(replays, _legend(found), unit, ahead)),
+        section("Errors by group", *_errors(found)),
+        section("Trials", *trials_section(found.replays, _legend(found), unit, ahead)),
         section("What did not change", *_unchanged(found)),
     ]
 
 
-def _errors(found: Contrast, errors: Mapping[str, Mapping[str, float]], horizon_s: float | None) -> list[Markup]:
+def _errors(found: Contrast) -> list[Markup]:
     """Return E of the trials of each group by each model, and what a group's own values remove."""
+    errors = errors_by_group(found.replays)
     models = [n for n in (*found.groups, EVERY) if any(n in own for own in errors.values())]
     rows: list[list[Content]] = [[g, *(percent(own.get(n)) for n in models)] for g, own in errors.items()]
     head = ("trials of", *(f"E, model of {n}" for n in models))
-    what = f"predictions {horizon_s:g} s ahead" if horizon_s else "free simulations"
-    gains = []
-    for group in dict.fromkeys(one.group for one in found.changes if one.group in errors[one.group]):
-        (other,) = set(errors[group]) - {group}
-        pair = errors[group][other], errors[group][group]
-        gone = Explained(f"{what} of the trials of {group}", FITTED, *pair)
-        gains.append(element("p", f"The model of {group}, instead of that of {other}, removes {gone}."))
+    changed = {f"of {one.group}," for one in found.changes}
+    gains = [element("p", f"{one}.") for one in found.errors() if any(of in one.what for of in changed)]
     return [element("p", E_WORDS, class_="soft"), *gains, html_table(head, rows, range(1, len(head)))]
 
 

@@ -93,11 +93,12 @@ class Saved:
     def __init__(self, record: Any) -> None:
         pairs = list(walked({n: v for n, v in record.items() if n not in ("text", "table", "provenance")}))
         numbers = [(path, one) for path, one in pairs if isinstance(one, float)]
+        self.errors = [(e["measure"], e["nominal"], e["extended"]) for e in record.get("errors", [])]
         self.shares = [one for path, one in numbers if re.search("percent|error|words", path)]
         self.shares += [100.0 * one for path, one in numbers if re.search("at_most|/repeats/", path)]
+        self.shares += [100.0 * (1.0 - after / before) for _, before, after in self.errors if before]
         self.p_values = [one for path, one in numbers if path.endswith("p_value")]
         self.triples = list(_triples(pairs))
-        self.errors = [(e["measure"], e["nominal"], e["extended"]) for e in record.get("errors", [])]
 
     def has_interval(self, name: str, value: str, low: str, high: str) -> bool:
         """Return whether an estimate with its interval stands in the file, under its name if that is a parameter's."""

@@ -17,7 +17,7 @@ from fes_pin.contrasts.changes import not_changed, ranges
 from fes_pin.contrasts.fits import GroupedFits
 from fes_pin.contrasts.groups import in_groups
 from fes_pin.contrasts.models import ContrastModels
-from fes_pin.contrasts.replay import EVERY, errors_by_group, replayed_groups
+from fes_pin.contrasts.replay import EVERY, errors_by_group
 from fes_pin.data.errors import InputError
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
@@ -87,18 +87,19 @@ def test_one_change_is_named_alone_with_its_size(tmp_path):
 
 def assert_the_page_shows_both_groups(found):
     """Trials of both groups are drawn, with the models of both, and the error of each is in a table."""
-    page, errors = report_html(found), errors_by_group(replayed_groups(found))
+    page, errors = report_html(found), errors_by_group(found.replays)
     for words in ("measured, before", "measured, after", "model of before", "model of after", "force (N)"):
         assert f">{words}</text>" in page, words
     assert errors["after"]["after"] < 0.1 * errors["after"]["before"]
     removed = 100.0 * (1.0 - errors["after"]["after"] / errors["after"]["before"])
-    assert f"instead of that of before, removes {removed:.0f} % of the squared error" in page
+    gone = f"{removed:.0f} % of the squared error of free simulations of the trials of after, by the model of before"
+    assert gone in page and gone.partition(" % of the squared error of ")[2] in str(found)
     assert "before absent, after" in page and "after none" not in page and "held" not in found.changes[0].row()[2]
 
 
 def test_groups_without_a_change_share_one_model(tmp_path):
     found = fp.contrast(free_pair("muscle", (), 80.0, 3, tmp_path))
-    assert all(list(one.models) == [EVERY] for one in replayed_groups(found))
+    assert all(list(one.models) == [EVERY] for one in found.replays)
     assert f">model of {EVERY}</text>" in report_html(found)
 
 
