@@ -49,7 +49,7 @@ sphinx_gallery_conf = {
     "download_all_examples": False,
     "show_signature": False,
     "write_computation_times": False,  # its page would load scripts from the network
-    "plot_gallery": True,
+    "plot_gallery": not tags.has("no_stories"),  # type: ignore[name-defined]  # noqa: F821  (Sphinx defines it)
 }
 
 

@@ -13,7 +13,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from pkgutil import iter_modules
 
 import fes_pin
 from fes_pin.data.schema import NumberKey, RigSchema, known_rigs
@@ -22,29 +21,23 @@ from fes_pin.models.describe import equation, remark, sentence
 from fes_pin.models.parameters import ROTARY
 from fes_pin.models.stage import Effect, Stage
 
-ROOMS = {
-    "data": "Studies, trials, readers",
-    "infer": "Inference",
+CHAPTERS = {
+    "data": "Studies, trials, results",
     "models": "Models: rigs, effects, simulation",
-    "identify": "Fits, noise",
-    "remainder": "Lack of fit",
-    "search": "Sets of causes",
-    "prepare": "Trials before a search",
-    "faults": "Faults of a record",
-    "diagnosis": "Diagnosis",
+    "identify": "Fits",
+    "verdict": "Checks and diagnoses",
+    "diagnosis": "What a diagnosis says",
+    "walk": "Measured walking",
     "contrasts": "What changed",
     "comparison": "Models of the literature, ranked",
+    "view": "Reports and pictures",
     "paper": "The paper's ankle",
     "body": "The walking body",
-    "walk": "Measured walking",
     "muscles": "Muscles and nerves",
     "allocation": "Allocation",
     "control": "Position control",
-    "view": "Reports and pictures",
-    "verdict": "One question for every study",
-    "cohort": "Cohorts",
 }
-"""The packages of the API reference, with their headings; `cli` is the command line, which says itself what it does."""
+"""The packages that public names come from, with their headings in the API reference."""
 
 KNOWN = "known"
 FITTED = "start value, fitted"
@@ -176,30 +169,23 @@ def causes_text() -> str:
     return "\n".join(parts)
 
 
-def modules(room: str) -> list[str]:
-    """Names of a room's public modules, in the order of their paths."""
-    package = import_module(f"fes_pin.{room}")
-    return _modules(package.__name__, package.__path__)
+def public_of(package: str) -> list[str]:
+    """The public names of `fes_pin` that are written in one of its packages."""
+    return [name for name, where in public_names().items() if where.split(".")[1] == package]
 
 
-def _modules(name: str, paths: Iterable[str]) -> list[str]:
-    out = []
-    for one in sorted(iter_modules(paths), key=lambda m: m.name):
-        full = f"{name}.{one.name}"
-        out.append(full)
-        if one.ispkg:
-            out += _modules(full, import_module(full).__path__)
-    return out
-
-
-def room_text(room: str, heading: str) -> str:
-    """The page of one room: its modules with everything public in them."""
-    package = import_module(f"fes_pin.{room}")
-    title = f"{heading}: ``fes_pin.{room}``"
-    lines = [title, "=" * len(title), "", inspect.cleandoc(package.__doc__ or ""), ""]
-    for name in modules(room):
-        head = f"``{name.removeprefix('fes_pin.')}``"
-        lines += [head, "-" * len(head), "", f".. automodule:: {name}", "   :members:", ""]
+def chapter_text(package: str, heading: str) -> str:
+    """The page of one package: its public names, as `import fes_pin as fp` gives them."""
+    lines = [heading, "=" * len(heading), "", ".. currentmodule:: fes_pin", ""]
+    for name in public_of(package):
+        where = public_names()[name]
+        one = resolve(where)
+        if inspect.ismodule(one):
+            lines += [f".. automodule:: {where}", "   :no-members:", "", ".. currentmodule:: fes_pin", ""]
+        elif inspect.isclass(one):
+            lines += [f".. autoclass:: fes_pin.{name}", "   :members:", ""]
+        else:
+            lines += [f".. autofunction:: fes_pin.{name}", ""]
     return "\n".join(lines)
 
 
@@ -224,8 +210,8 @@ def public_text() -> str:
     for name, where in public_names().items():
         one = resolve(where)
         summary = " ".join(inspect.cleandoc(one.__doc__ or "").split("\n\n")[0].split())
-        role = "py:mod" if inspect.ismodule(one) else "py:obj"
-        rows.append((f"{{{role}}}`fes_pin.{name} <{where}>`", summary))
+        target = f"py:mod}}`fes_pin.{name} <{where}>`" if inspect.ismodule(one) else f"py:obj}}`fes_pin.{name}`"
+        rows.append((f"{{{target}", summary))
     return table(("name", "what it is"), rows)
 
 
@@ -347,8 +333,11 @@ def write(docs: Path) -> None:
         "_generated/causes.md": causes_text(),
         "_generated/public.md": public_text(),
         "_generated/numbers.md": numbers_text(),
-        **{f"api/{room}.rst": room_text(room, heading) for room, heading in ROOMS.items()},
+        **{f"api/{package}.rst": chapter_text(package, heading) for package, heading in CHAPTERS.items()},
     }
+    for stale in (docs / "api").glob("*.rst"):
+        if stale.stem not in CHAPTERS:
+            stale.unlink()
     for name, text in pages.items():
         path = docs / name
         path.parent.mkdir(parents=True, exist_ok=True)
