@@ -141,12 +141,12 @@ def blocks(page, language):
     return re.findall(rf"```{language}\n(.*?)```", (DOCS / page).read_text(), re.DOTALL)
 
 
-def test_getting_started_is_a_study_that_can_be_read_and_fitted(tmp_path, monkeypatch):
+def test_the_study_by_hand_is_one_that_can_be_read_and_fitted(tmp_path, monkeypatch):
     folder = tmp_path / "my_pendulum"
     (folder / "trials").mkdir(parents=True)
-    (folder / "pendulum.urdf").write_text(blocks("getting_started.md", "xml")[0])
-    (folder / "study.toml").write_text(blocks("getting_started.md", "toml")[0])
-    header = blocks("getting_started.md", "text")[1].splitlines()[0]
+    (folder / "pendulum.urdf").write_text(blocks("own_recordings.md", "xml")[0])
+    (folder / "study.toml").write_text(blocks("own_recordings.md", "toml")[0])
+    header = blocks("own_recordings.md", "text")[1].splitlines()[0]
     time = np.arange(0.0, 4.0, 0.005)
     inertia, damping = 0.002 + 0.5 * 0.2**2, 0.02
     for trial, begin in (("a", 0.6), ("b", -0.9), ("c", 0.3)):
@@ -161,12 +161,12 @@ def test_getting_started_is_a_study_that_can_be_read_and_fitted(tmp_path, monkey
         (folder / "trials" / f"{trial}.csv").write_text(f"{header}\n{rows}")
     monkeypatch.chdir(tmp_path)
     names = {}
-    exec(compile(blocks("getting_started.md", "python")[0], "getting_started.md", "exec"), names)
+    exec(compile(blocks("own_recordings.md", "python")[0], "own_recordings.md", "exec"), names)
     assert names["fitted"].values["damping"] == pytest.approx(damping, rel=1e-2)
 
 
-def test_getting_started_has_every_option_of_new_study():
-    page = (DOCS / "getting_started.md").read_text()
+def test_the_page_of_own_recordings_has_every_option_of_new_study():
+    page = (DOCS / "own_recordings.md").read_text()
     own = {"files": "", "setting": "set", "force": "", "library": "", "name": ""}
     for name in inspect.signature(new_study).parameters:
         assert not (option := own.get(name, name)) or f"--{option}" in page, name

@@ -9,13 +9,13 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-WRITTEN_BY_OTHERS = {"CHANGELOG.md", "accuracy.md"}
-"""A record of what was said, and a page that a script writes."""
 PACKAGE = ROOT / "fes_pin"
 STORIES = sorted((ROOT / "analysis").rglob("*.py"))
 """Scripts that draw the pictures of the manual."""
 ROOMS = sorted({path.relative_to(PACKAGE).parts[0] for path in PACKAGE.rglob("*.py")})
-PAGES = [ROOT / "README.md", *(p for p in sorted((ROOT / "docs").glob("*.md")) if p.name not in WRITTEN_BY_OTHERS)]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+OTHERS = [ROOT / "CONTRIBUTING.md", ROOT / "docs" / "api" / "index.md"]
+"""Pages whose sentences are counted too."""
 
 WORDS = {
     r"\bforet(ell|ells|old|elling)\b": "predict, one-step prediction",
@@ -168,3 +168,59 @@ def test_what_is_kept_is_there():
     assert [one for one in KEPT if one not in text] == []
     names = {n for path in files for _, n, _ in names_with_such_words(path)}
     assert sorted(set(KEPT_NAMES) - names) == []
+
+
+LONGEST_SENTENCE = 40
+"""Words."""
+ENDS = re.compile(r"(?<=[.!?])[\"*)]*\s+(?=[\"*(\[]*[A-Zx0-9])(?<!e\.g\. )(?<!eq\. )(?<!al\. )")
+"""Where a sentence ends: not after an abbreviation."""
+
+
+def without_fences(text):
+    """A page without its fenced code and its comments; every line stays in its place."""
+    fenced = re.compile(r"^( *)(`{3,}|:{3,}).*?^\1\2 *$|<!--.*?-->", re.DOTALL | re.MULTILINE)
+    return fenced.sub(lambda m: "\n" * m[0].count("\n"), text)
+
+
+def paragraphs(text):
+    """Paragraphs and items of lists, each with its first line; no headings, tables, or code."""
+    begun, found = False, []
+    for number, line in enumerate(without_fences(text).split("\n"), 1):
+        shown = line.strip()
+        if not shown or shown.startswith(("|", "#")) or (line.startswith("    ") and not begun):
+            begun = False
+            continue
+        item = re.match(r"(?:[-*] |\d+\. )", shown)
+        if item or not begun:
+            found.append((number, []))
+        found[-1][1].append(shown[item.end() :] if item else shown)
+        begun = True
+    return [(number, " ".join(lines)) for number, lines in found]
+
+
+def sentences(text):
+    """Sentences of a page with the lines that their paragraphs begin in; code in a sentence counts as one word."""
+    for number, words in paragraphs(text):
+        for one in ENDS.split(re.sub(r"\]\([^)]*\)", "]", re.sub(r"`[^`]*`", "x", words))):
+            yield number, one
+
+
+@pytest.mark.parametrize("page", [*PAGES, *OTHERS], ids=name)
+def test_no_sentence_is_long(page):
+    counted = [(number, len(one.split()), one) for number, one in sentences(page.read_text())]
+    assert [f"line {n}: {count} words: {one}" for n, count, one in counted if count > LONGEST_SENTENCE] == []
+
+
+@pytest.mark.parametrize("page", [p for p in PAGES if p.stem != "architecture"], ids=name)
+def test_no_sentence_names_a_file_of_the_package(page):
+    """A table of docs/architecture.md has these names."""
+    files = re.compile(r"`(?:fes_pin|infer|diagnosis|tests|analysis)/[\w/.]+`")
+    assert [(number, found) for number, text in paragraphs(page.read_text()) for found in files.findall(text)] == []
+
+
+def test_sentences_are_counted_without_code_and_tables():
+    page = (
+        "# A b\n\nOne two\n`three\nfour` five. Five\nsix: Seven.\n\n    code here\n\n| a | b |\n\n- item (e.g. This)\n"
+        "- [x](y.md). Z\n\n```\nz\n```\n"
+    )
+    assert [(n, len(one.split())) for n, one in sentences(page)] == [(3, 4), (3, 3), (12, 3), (13, 1), (13, 1)]
