@@ -141,14 +141,15 @@ def blocks(page, language):
     return re.findall(rf"```{language}\n(.*?)```", (DOCS / page).read_text(), re.DOTALL)
 
 
-def test_the_study_by_hand_is_one_that_can_be_read_and_fitted(tmp_path, monkeypatch):
-    folder = tmp_path / "my_pendulum"
+def study_by_hand(place, damping):
+    """The study of docs/own_recordings.md in a folder, with trials of a pendulum and a sensor's noise."""
+    folder = place / "my_pendulum"
     (folder / "trials").mkdir(parents=True)
     (folder / "pendulum.urdf").write_text(blocks("own_recordings.md", "xml")[0])
     (folder / "study.toml").write_text(blocks("own_recordings.md", "toml")[0])
     header = blocks("own_recordings.md", "text")[1].splitlines()[0]
     time = np.arange(0.0, 4.0, 0.005)
-    inertia, damping = 0.002 + 0.5 * 0.2**2, 0.02
+    inertia, noise = 0.002 + 0.5 * 0.2**2, np.random.default_rng(0)
     for trial, begin in (("a", 0.6), ("b", -0.9), ("c", 0.3)):
         run = solve_ivp(
             lambda t, x: [x[1], (-0.5 * 9.81 * 0.2 * np.sin(x[0]) - damping * x[1]) / inertia],
@@ -157,12 +158,17 @@ def test_the_study_by_hand_is_one_that_can_be_read_and_fitted(tmp_path, monkeypa
             t_eval=time,
             rtol=1e-9,
         )
-        rows = "".join(f"{t:.3f},{q:.6f}\n" for t, q in zip(time, run.y[0], strict=True))
+        read = run.y[0] + 1e-4 * noise.standard_normal(time.size)
+        rows = "".join(f"{t:.3f},{q:.6f}\n" for t, q in zip(time, read, strict=True))
         (folder / "trials" / f"{trial}.csv").write_text(f"{header}\n{rows}")
+
+
+def test_the_study_by_hand_can_be_read_and_fitted(tmp_path, monkeypatch):
+    study_by_hand(tmp_path, damping=0.02)
     monkeypatch.chdir(tmp_path)
     names = {}
     exec(compile(blocks("own_recordings.md", "python")[0], "own_recordings.md", "exec"), names)
-    assert names["fitted"].values["damping"] == pytest.approx(damping, rel=1e-2)
+    assert names["fitted"].values["damping"] == pytest.approx(0.02, rel=1e-2)
 
 
 def test_the_page_of_own_recordings_has_every_option_of_new_study():

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from test_docs import study_by_hand
 
 DOCS = Path(__file__).parents[1] / "docs"
 ORDERS = (("getting_started.md", "what_to_do.md"), ("recipes.md",))
@@ -51,6 +52,14 @@ def test_the_pages_run_as_written(pages, tmp_path, monkeypatch):
 def test_the_pages_run_with_what_takes_longer(pages, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     run(pages, tmp_path, ("walk",))
+
+
+@pytest.mark.long
+def test_the_study_by_hand_is_answered(tmp_path, monkeypatch):
+    study_by_hand(tmp_path, damping=0.02)
+    monkeypatch.chdir(tmp_path)
+    run(["own_recordings.md"], tmp_path, ())
+    assert (tmp_path / "predicted.csv").stat().st_size > 10_000
 
 
 @pytest.mark.shared

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-PAGES = ("README.md", "docs/ankle.md", "docs/body.md", "docs/allocation.md")
+PAGES = ("README.md", "docs/ankle.md", "docs/body.md", "docs/allocation.md", "docs/study_format.md")
 BLOCKS = [
     pytest.param(page, code, id=f"{page}-{number}")
     for page in PAGES

@@ -178,7 +178,7 @@ RESOLVED_S = 1e-6
 
 
 class JointObserver:
-    """See the module.
+    """Extended Kalman filter of an ankle's state, from the angle alone, one sample to a pulse.
 
     Parameters
     ----------

@@ -79,7 +79,7 @@ def subject_nerves(
 
 
 def controllability(linear: LinearBody, inputs, horizon: float = 0.3) -> ModalControllability:
-    """`fes_pin.body.controllability.modal_controllability`, which also understands names of nerves.
+    """Controllability of every mode of a body by nerves, joints with a motor, or other inputs.
 
     Parameters
     ----------

@@ -63,7 +63,7 @@ def diagnose(
     limit: float | None = None,
     progress: Callable[[float, str], None] | None = None,
 ) -> ModelResult:
-    """Find out what the model of a study gets wrong: `diagnose.diagnosis.diagnose_joint`, for a body `diagnose_walk`.
+    """Find out what the model of a study gets wrong; of a walking body it is `diagnose_walk` that answers.
 
     Both answers have `verdict`, `causes`, `remainder`, `absorbed`, `nominal_error`, `extended_error`,
     `ceiling_percent`, `next_experiment`, `warnings`, `wall_s`, and the extended `model`: a body's is a `Body`. What
