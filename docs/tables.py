@@ -24,7 +24,8 @@ from fes_pin.models.stage import Effect, Stage
 CHAPTERS = {
     "data": "Studies, trials, results",
     "models": "Models: rigs, effects, simulation",
-    "identify": "Fits",
+    "search": "Fitting a model",
+    "identify": "What a fit says",
     "verdict": "Checks and diagnoses",
     "diagnosis": "What a diagnosis says",
     "walk": "Measured walking",
