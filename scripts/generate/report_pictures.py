@@ -28,7 +28,7 @@ PARTS = {"verdict": (0, 0), "causes": (1, 2), "missing": (3, 3), "trials": (4, 4
 """The first and the last part of the page that a picture shows: its head is 0, its sections follow."""
 STYLE = """<style>.n {display: inline-block; min-width: 1em; padding: 0 .25em; margin-right: .4em; border-radius: 1em;
 background: #b3261e; color: #fff; font: bold 14px/1.5em sans-serif; text-align: center}
-footer, h3 ~ h3, h3 ~ h3 ~ *, .key + .grid:not(.three) figure ~ figure, .grid ~ details,
+footer, h3 ~ h3, h3 ~ h3 ~ *, .grid ~ details,
 .three ~ .three, .three figure:nth-child(n + 5) {display: none}</style>"""
 HEADINGS = re.compile(r"<h1[^>]*>|<dt>|<section><h2>")
 
