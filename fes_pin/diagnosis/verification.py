@@ -84,13 +84,13 @@ class Verification(ReadOnly):
             for t in self.trials
         }
         found = {"study": self.study.name, "model": list(self.model.structure()), "horizon_s": shown(self.horizon_s)}
-        return {**found, "trials": rows, "unexplained": self.remainder.record()}
+        return {**found, "trials": rows, "remainder": self.remainder.record()}
 
     def __str__(self) -> str:
         left = self.remainder
         word = "leaves more than its noise" if left.unexplained else "explains the trials within its noise"
         on = f", most by {left.where}" if left.where else ""
-        head = "trial", "E, free", f"E, {self.horizon_s:.3g} s ahead", "only noise", "outside the fitted range"
+        head = "trial", "E, free", f"E, {self.horizon_s:.3g} s ahead", "lack of fit", "outside the fitted range"
         rows = [
             (t.name, f"{t.free:.3g} %", f"{t.ahead:.3g} %", probability(t.p_value), _outside(t)) for t in self.trials
         ]

@@ -40,7 +40,7 @@ def test_trials_of_a_weaker_muscle_are_not(made, monkeypatch, capsys):
     found = json.loads(capsys.readouterr().out)
     assert set(found) == {"study", "model", "horizon_s", "trials", "unexplained"}
     assert found["horizon_s"] == 0.2 and found["model"] == ["ankle"]
-    assert found["unexplained"]["p_value"] < 0.01
+    assert found["remainder"]["p_value"] < 0.01
     for name, one in found["trials"].items():
         trial = fp.read_study(made / "weaker").trial(name)
         predicted = fp.predict(fp.load_model(made / "model.toml"), trial)
