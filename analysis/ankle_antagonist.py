@@ -34,7 +34,7 @@ carried = np.sqrt(np.diag(carried_covariance(problem, optimum, curve)))
 for k, name in enumerate(RATIOS):
     own = np.log(noise.maximum(name) / noise.minimum(name)) / 2 / 1.96
     value = optimum.ratios[name]
-    print(f"{name} = {value:.2f}: +- {100 * own:.1f} % from noise, +- {100 * carried[k]:.1f} % from F_ANT")
+    print(f"{name} = {value:.2f}, standard deviation {100 * own:.1f} % from noise, {100 * carried[k]:.1f} % from F_ANT")
 
 # %% The picture
 grid = np.linspace(1.2, 2.3, 200)

@@ -101,8 +101,8 @@ for name, (*_, diagnosis) in answers.items():
         print("  {} {:9s} {:.2f} degrees, {:.1f} %, fit {:.1f} %".format(name, label, *np.mean(rows, axis=0)))
 print(
     """
-For comparison, others report of people's ankles under stimulation: RMSE 2.78 +- 0.33 degrees, NRMSE 23.7 +- 1.8 %
-(tenfold cross-validation of a neural Hammerstein model, Zhou and others, IEEE Access 7, 2019, doi
+For comparison, others report of people's ankles under stimulation: RMSE 2.78 degrees (standard deviation 0.33),
+NRMSE 23.7 % (1.8) (tenfold cross-validation of a neural Hammerstein model, Zhou and others, IEEE Access 7, 2019, doi
 10.1109/ACCESS.2019.2943453), and cross-validated fits of 73 to 76 %, whose source was not found again. Ours is better
 on twins, down to the noise of their potentiometer, because what moves them is in the library. That is no comparison of
 methods: those trials have what no one put in. It says that a cause in the library is found and that nothing of the

@@ -80,7 +80,7 @@ played = replace(twin, hysteresis_us=60.0)
 without = fp.track(fp.PositionController(model, LOAD), RunningTwin(played), wave).rms_error_deg(2.0)
 aware = fp.PositionController(model + fp.effects.RecruitmentHysteresis(half_width_us=60.0), LOAD)
 undone = fp.track(aware, RunningTwin(played), wave).rms_error_deg(2.0)
-print(f"hysteresis of +-60 us: RMS {without:.3f} degrees, compensated {undone:.3f}")
+print(f"hysteresis of 60 us either way: RMS {without:.3f} degrees, compensated {undone:.3f}")
 
 # %% Five minutes, fatigue to 60 %, within the budget; and 20 degrees, which is beyond it
 fatigue = fp.effects.Fatigue(rate_per_s=0.068, recovery_s=60.0)

@@ -88,7 +88,7 @@ for label, k, k_std, t in (
     ("batch fit", batch.values["gain"], batch.std("gain"), batch.values["time_constant_s"]),
     ("Kalman", history.gain[-1], history.gain_std[-1], history.time_constant_s[-1]),
 ):
-    print(f"{label:10s} K = {k:.4f} +- {k_std:.4f}, tau = {1e3 * t:.2f} ms")
+    print(f"{label:10s} K = {k:.4f} (standard deviation {k_std:.4f}), tau = {1e3 * t:.2f} ms")
 print(f"noise of 1 N: plain regression finds tau = {1e3 * plain.at(8)[1]:.1f} ms, ours {1e3 * ours.at(8)[1]:.1f} ms")
 error = step.residual(simulated, "force_n")
 print(f"figure 4: residual {np.std(error):.3f} N RMS, noise {FORCE_NOISE_N} N")

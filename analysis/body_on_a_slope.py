@@ -36,7 +36,7 @@ flat = len(grades) // 2
 for label, values in rows.items():
     per_percent = np.gradient(values[:, 0], 100 * grades)[flat]
     spread = 50.0 * np.ptp(values[:, 4]) / values[flat, 4]
-    print(f"{label:26s} ankle {per_percent:+6.2f} N m for each percent; slowest fall's rate +-{spread:.1f} %")
+    print(f"{label:26s} ankle {per_percent:+6.2f} N m for each percent; slowest fall's rate within {spread:.1f} %")
 square = np.gradient(rows["square to the ground"][:, 0], 100 * grades)[flat]
 print(
     f"\nA slope changes what must be held (C), not how the body falls (A, B): {abs(square):.1f} N m at the ankle "

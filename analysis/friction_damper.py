@@ -57,7 +57,8 @@ for group in GROUPS:
     read[group] = float(np.mean([on_the_loops(t) for t in train]))
     before[group] = float(np.mean([error_percent(nominal.model, t) for t in held]))
     after[group] = float(np.mean([error_percent(fits[group].model, t) for t in held]))
-    level = f"{fitted[group]:6.0f} +- {fits[group].std('coulomb_friction.torque_nm'):.0f} N fitted"
+    low, high = fits[group].interval("coulomb_friction.torque_nm")
+    level = f"{fitted[group]:6.0f} [{low:.0f}, {high:.0f}] N fitted"
     errors = f"held out E {before[group]:.0f} -> {after[group]:.1f} %"
     print(f"{group:12s} {level}, {read[group]:6.0f} N on the loops; {errors}")
 

@@ -15,6 +15,7 @@ import scipy.optimize
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import between, number, numbers, positive_number
 from fes_pin.data.show import Tabulated
+from fes_pin.infer.levels import CONFIDENCE_95
 from fes_pin.paper.equation_1 import antagonist_n, halved, static_torque_nm
 
 NAMES = ("f0_n", "f1_per_rad", "theta_r_rad")
@@ -59,10 +60,10 @@ class Antagonist(Tabulated):
         return dict(zip(NAMES, (float(v) for v in self.values), strict=True))
 
     def __str__(self) -> str:
-        stds = np.sqrt(np.diag(self.covariance))
+        halves = CONFIDENCE_95 * np.sqrt(np.diag(self.covariance))
         units = ("N", "1/rad", "rad")
-        rows = zip(NAMES, self.values, stds, units, strict=True)
-        return "\n".join(f"  {n:12s} {v:8.4f} +- {s:.4f} {u}" for n, v, s, u in rows)
+        rows = zip(NAMES, self.values, halves, units, strict=True)
+        return "\n".join(f"  {n:12s} {v:8.4f} [{v - h:.4f}, {v + h:.4f}] {u}" for n, v, h, u in rows)
 
 
 def _slope(angle: np.ndarray, values: np.ndarray) -> np.ndarray:
