@@ -8,7 +8,7 @@ import typer
 
 from fes_pin.cli.group import needs
 from fes_pin.cli.options import Force, Libraries, Limit, Seed, output
-from fes_pin.cli.progress import progress
+from fes_pin.cli.progress import print_text, progress
 
 SAID_EVERY_S = 30.0
 """Seconds between lines of progress where nobody watches."""
@@ -48,7 +48,7 @@ def cohort(
             progress=tell,
         )
     title, head, rows, notes = made.as_table()
-    typer.echo(table_text(title, head, rows, [one for one in notes if not one.startswith("failed")]))
+    print_text(table_text(title, head, rows, [one for one in notes if not one.startswith("failed")]))
     for row in made.failed:
         typer.echo(f"failed: {row['study']}: {row['error']}", err=True)
     typer.echo(f"page: {out / 'cohort.html'}")

@@ -156,9 +156,7 @@ def stubs(monkeypatch, inputs):
         check_folder(given[1])
         Path(given[1]).mkdir(exist_ok=True)
         (Path(given[1]) / "cohort.html").write_text(told(*given, **named))
-        return SimpleNamespace(
-            studies=[1], failed=[], prevalence=[{"cause": told(*given, **named), "studies": 1, "share_percent": 1}]
-        )
+        return SimpleNamespace(failed=[], as_table=Told(told(*given, **named)).as_table)
 
     monkeypatch.setattr("fes_pin.diagnosis.diagnosis.diagnose_joint", diagnose_joint)
     monkeypatch.setattr("fes_pin.cohort.run.run_cohort", cohort)
@@ -192,6 +190,9 @@ class Told(str):
 
     def by_command(self, command):
         return self
+
+    def explain(self, name):
+        return [f"{name}: {self}"]
 
 
 def value_of(parameter, words, rng):
