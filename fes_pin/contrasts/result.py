@@ -129,7 +129,10 @@ class Contrast(Result):
         left = self.remainder
         where = "in every group" if left.everywhere else "in one group alone" if left.unexplained else "none found"
         sizes = [f"{n} {p.value:.2g} {p.unit}".strip() for n, p in self.excluded.items()]
+        changed = {one.group for one in self.changes}
+        gains = [str(one) for one in self.errors() if any(f"trials of {g}," in one.what for g in changed)]
         rows = [
+            ("explained", "; ".join(gains)),
             ("in all groups alike, so no change", ", ".join(self.common)),
             ("repeats scatter by (standard deviation)", _shares(self.repeats)),
             (f"did not change ({SEEN} beyond)", _shares(self.unchanged)),

@@ -1,6 +1,7 @@
 """The report of a result: one page of sections, the same for every front end, and what each front end adds."""
 
 import math
+import re
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -117,6 +118,10 @@ def _errors(result: Result) -> list[Markup]:
     return [element("p", E_WORDS), html_table(head, [r[: len(head)] for r in rows], (2, 3))] if rows else []
 
 
+AFTER_INTERVAL = r"(?<=\] )[^,\n]*"
+"""The unit of an estimate in a cell of the table."""
+
+
 def _named(result: Result) -> list[Markup]:
     """Return the named causes or changes: a table, their gains, and a card for each."""
     if not result.causes:
@@ -124,7 +129,8 @@ def _named(result: Result) -> list[Markup]:
         return [element("p", f"None is named{open_}.")]
     _, head, rows, _ = result.as_table()
     gains = [(c.name, c.gain_held_out, c.stage) for c in result.causes if isinstance(c, Cause)]
-    table = html_table(head, [[element("code", row[0]), *row[1:]] for row in rows])
+    cells = [[re.sub(AFTER_INTERVAL, lambda unit: unit_text(unit[0]), cell) for cell in row[1:]] for row in rows]
+    table = html_table(head, [[element("code", row[0]), *own] for row, own in zip(rows, cells, strict=True)])
     cards = [_card(result, one) for one in result.causes]
     if not gains:
         return [table, *cards]

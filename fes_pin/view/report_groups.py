@@ -1,9 +1,7 @@
 """Sections of the report of a contrast: its trials with the models of its groups, and what did not change."""
 
-from fes_pin.contrasts.replay import EVERY, errors_by_group, horizon_of
+from fes_pin.contrasts.replay import EVERY, horizon_of
 from fes_pin.contrasts.result import Contrast
-from fes_pin.identify.error_measures import E_WORDS
-from fes_pin.infer.text import percent
 from fes_pin.view.page import Content, Markup, element, html_table, section, unit_text
 from fes_pin.view.plots import MEASURED, Legend
 from fes_pin.view.report_trials import trials_section
@@ -32,21 +30,9 @@ def _sections(found: Contrast) -> list[Markup]:
     ahead = f"Simulated: {horizon_s:g} s ahead of what was measured, for it is driven. " if horizon_s else ""
     unit = found.fit.grouped.rig.units()["q"]
     return [
-        section("Errors by group", *_errors(found)),
         section("Trials", *trials_section(found.replays, _legend(found), unit, ahead)),
         section("What did not change", *_unchanged(found)),
     ]
-
-
-def _errors(found: Contrast) -> list[Markup]:
-    """Return E of the trials of each group by each model, and what a group's own values remove."""
-    errors = errors_by_group(found.replays)
-    models = [n for n in (*found.groups, EVERY) if any(n in own for own in errors.values())]
-    rows: list[list[Content]] = [[g, *(percent(own.get(n)) for n in models)] for g, own in errors.items()]
-    head = ("trials of", *(f"E, model of {n}" for n in models))
-    changed = {f"of {one.group}," for one in found.changes}
-    gains = [element("p", f"{one}.") for one in found.errors() if any(of in one.what for of in changed)]
-    return [element("p", E_WORDS, class_="soft"), *gains, html_table(head, rows, range(1, len(head)))]
 
 
 def _unchanged(found: Contrast) -> list[Markup]:

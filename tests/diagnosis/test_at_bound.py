@@ -31,7 +31,7 @@ def test_the_text_says_so(diagnosis):
     assert str(AT_ITS_BOUND) == "0 N m (at its bound, at most 0.0123)"
     assert str(replace(AT_ITS_BOUND, value=9.0, ends=(4.5, 9.0))) == "9 N m (at its bound, at least 4.5)"
     assert str(replace(AT_ITS_BOUND, ends=(0.0, math.inf))) == "0 N m (at its bound, not identified)"
-    assert "torque_nm 0 N m (at its bound, at most 0.0123)" in str(diagnosis)
+    assert "torque 0 N m (at its bound, at most 0.0123)" in str(diagnosis)
     assert "at its bound" in diagnosis._repr_html_()
 
 
