@@ -392,7 +392,8 @@ class Named:
 
     def label(self, name: str, one: ParameterEstimate) -> str:
         """Return the name of a parameter as printed: in words, but for one of a site, which may be that of a trial."""
-        return name if self.site else plain_name(name, one.unit)
+        is_of_trial = self.site and not name.endswith(f"_{one.unit.lower()}")
+        return name if is_of_trial else plain_name(name, one.unit)
 
     def estimates(self) -> list[tuple[tuple[str, ...], ParameterEstimate]]:
         """Return every estimate of it, with its cells of `CELL`."""

@@ -88,9 +88,12 @@ class WalkEffect:
     ----------
     name
         The canonical name of the cause.
+    vector
+        Symbol in the equation whose parts are the parameters; "" where the equation has these themselves.
     """
 
     name: ClassVar[str]
+    vector: ClassVar[str] = ""
     rigs: ClassVar[tuple[str, ...]] = ("body",)
 
     @classmethod

@@ -1,6 +1,7 @@
 """The verdict on causes of a walk: those that are named, with their size, significance and equivalents."""
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache, partial
 
@@ -9,7 +10,7 @@ from fes_pin.infer.distributions import normal_tail
 from fes_pin.infer.levels import CLAIM_LEVEL, PARAMETER_PENALTY, SEPARABLE
 from fes_pin.infer.result import FITTED, NO_GAIN, Cause, Evidence, ParameterEstimate, Remainder
 from fes_pin.infer.search import SearchResult
-from fes_pin.infer.text import listed
+from fes_pin.infer.text import listed, plain_name
 from fes_pin.infer.verdict import State, Verdict, Weighed
 from fes_pin.models.describe import equation, sentence
 from fes_pin.walk.designs import Designs
@@ -74,7 +75,7 @@ class WalkVerdict(Verdict[WalkFit, WalkModels, Weighed]):
         instead = [forms[n] for r in near for n in r.names if n not in best.names]
         values, stds = self.models.sizes(best)[name].tolist(), self.models.deviations(best)[name].tolist()
         each = [*zip(form.parameters, values, stds, form.units, strict=True)]
-        (said, equation_here), words = _as_fitted(form.cause, form.site), ""
+        (said, equation_here), words = as_fitted(form.cause, form.site, form.parameters), ""
         if form.cause == StatedMass.name:
             body, (share,), (std,) = self.models.designs.stated.body_kg, values, stds
             each = [(form.site, body * (1.0 + share), body * std, "kg")]
@@ -99,10 +100,12 @@ class WalkVerdict(Verdict[WalkFit, WalkModels, Weighed]):
         )
 
 
-def _as_fitted(name: str, site: str) -> tuple[str, str]:
-    """Return the sentence of a cause, and its equation at a site."""
+def as_fitted(name: str, site: str, parameters: Sequence[str] = ()) -> tuple[str, str]:
+    """Return the sentence of a cause, and its equation at a site, with the parts of its vector that are fitted."""
     kind = next(one for one in EFFECTS if one.name == name)
-    return sentence(kind), equation(kind, set(re.findall(r"\w+", site)))
+    parts = ", ".join(plain_name(n, "") for n in parameters)
+    of_vector = f"\n{kind.vector} = ({parts})" if kind.vector and parts else ""
+    return sentence(kind), equation(kind, set(re.findall(r"\w+", site))) + of_vector
 
 
 def _on_other_leg(models: WalkModels, name: str) -> float | None:
@@ -124,7 +127,7 @@ def marker_noise(designs: Designs) -> tuple[Correction, Cause] | None:
     beyond = normal_tail((level - ORDINARY_MM) / std) if level > ORDINARY_MM else 1.0
     words = f"white noise of {level:.2g} mm on the coordinates"
     fault = Correction("marker_noise", beyond, CLAIM_LEVEL, words, saved - PARAMETER_PENALTY, SEPARABLE)
-    said, equation_here = _as_fitted(fault.name, "white")
+    said, equation_here = as_fitted(fault.name, "white")
     cause = Cause(
         name=fault.name,
         stage=STAGE,

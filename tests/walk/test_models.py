@@ -9,11 +9,12 @@ import pytest
 
 from fes_pin.data.study import read_study
 from fes_pin.infer.levels import POSSIBLE_SIZES, WALK_LEVEL
+from fes_pin.infer.text import plain_name
 from fes_pin.walk.designs import Designs
 from fes_pin.walk.effect import Segment, changed_segment, is_of_a_body
 from fes_pin.walk.models import WalkModels, WalkSearch
 from fes_pin.walk.recording import recordings_of
-from fes_pin.walk.verdict import WalkVerdict, marker_noise
+from fes_pin.walk.verdict import WalkVerdict, as_fitted, marker_noise
 from fes_pin.workers import OutOfTime, noting_stops, time_limit
 
 pytestmark = pytest.mark.shared
@@ -131,3 +132,12 @@ def test_a_segment_without_mass_or_with_one_moment_is_of_no_body():
     rod = np.diag([1.0, 1.0, 2.1])
     assert not is_of_a_body(Segment(1.0, np.zeros(3), rod))
     assert not is_of_a_body(Segment(-1.0, np.zeros(3), np.eye(3)))
+
+
+def test_the_equation_of_a_form_has_every_part_that_is_fitted(models):
+    for form in models.designs.forms.values():
+        _, text = as_fitted(form.cause, form.site, form.parameters)
+        parts = [plain_name(n, "") for n in form.parameters if form.cause != "clock_offset"]
+        assert all(part in text for part in parts), (form.label, text)
+    _, text = as_fitted("external_force", "pelvis, forward and up", ("forward_n", "up_n"))
+    assert text.endswith("F = (forward, up)")

@@ -24,6 +24,7 @@ class LaboratoryTilt(WalkEffect):
     """
 
     name = "base_tilt"
+    vector = "tilt"
 
     @classmethod
     def forms(cls) -> Iterator[Form]:

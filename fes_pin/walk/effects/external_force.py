@@ -28,6 +28,7 @@ class ExternalForce(WalkEffect):
     """
 
     name = "external_force"
+    vector = "F"
 
     @classmethod
     def forms(cls) -> Iterator[Form]:

@@ -11,7 +11,7 @@ from fes_pin.walk.walk_trial import WalkTrial
 class MarkerNoise(WalkEffect):
     """Accelerations carry noise or filtering that the plates do not confirm.
 
-        required = true + smoothing^2 d2 required / dt2   motion smoothed more than the plates       on smoothed
+        required = true + smoothing d2 required / dt2   motion smoothed more than the plates       on smoothed
         coordinates = true + noise   white; its second derivative is in the required reaction        on white
 
     Tell-tale: too little of the reaction's fast part, or a residual that no two strides share and that grows with

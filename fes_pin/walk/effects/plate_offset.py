@@ -27,6 +27,7 @@ class PlateOffset(WalkEffect):
     """
 
     name = "plate_offset"
+    vector = "constant"
 
     @classmethod
     def forms(cls) -> Iterator[Form]:

@@ -23,6 +23,7 @@ class SegmentCom(WalkEffect):
     """
 
     name = "segment_com"
+    vector = "d"
 
     @classmethod
     def forms(cls) -> Iterator[Form]:
