@@ -11,12 +11,11 @@ from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.show import table_text
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
-from fes_pin.identify.ahead import default_horizon, free_residuals, predict_ahead
+from fes_pin.diagnosis.errors_ahead import squared_errors
+from fes_pin.identify.ahead import default_horizon
 from fes_pin.identify.likelihood import LikelihoodProblem
-from fes_pin.identify.likelihood_fit import fit_of
+from fes_pin.identify.likelihood_fit import LikelihoodFit, fit_of
 from fes_pin.identify.stored import load_log, load_random, load_range
-from fes_pin.infer.held_out import percent_of_spread
-from fes_pin.infer.noise import NoiseModel
 from fes_pin.infer.optimum import minimise
 from fes_pin.infer.result import Remainder, p_shown, probability, shown
 from fes_pin.models.catalogue import Source
@@ -39,8 +38,8 @@ class Verified:
     ----------
     free, ahead
         E of the free simulation, and over the horizon, percent.
-    p_value, where
-        Of the test that the trial leaves no more than noise, and what its residual depends on where it leaves more.
+    left
+        The test that the trial leaves no more than noise.
     outside
         Columns with values beyond the range of the trials that the model was fitted to; None where it is not known.
     """
@@ -48,8 +47,7 @@ class Verified:
     name: str
     free: float
     ahead: float
-    p_value: float
-    where: str | None
+    left: Remainder
     outside: tuple[str, ...] | None
 
 
@@ -78,7 +76,7 @@ class Verification(ReadOnly):
         rows = {
             t.name: {
                 "error_percent": {"free": shown(t.free), "horizon": shown(t.ahead)},
-                "p_value": p_shown(t.p_value),
+                "p_value": p_shown(t.left.p_value),
                 "outside": None if t.outside is None else list(t.outside),
             }
             for t in self.trials
@@ -92,7 +90,8 @@ class Verification(ReadOnly):
         on = f", most by {left.where}" if left.where else ""
         head = "trial", "E, free", f"E, {self.horizon_s:.3g} s ahead", "lack of fit", "outside the fitted range"
         rows = [
-            (t.name, f"{t.free:.3g} %", f"{t.ahead:.3g} %", probability(t.p_value), _outside(t)) for t in self.trials
+            (t.name, f"{t.free:.3g} %", f"{t.ahead:.3g} %", probability(t.left.p_value), _outside(t))
+            for t in self.trials
         ]
         title = f"{self.study.name}: the model {' + '.join(self.model.structure())} {word} ({left.tested()}{on})."
         return table_text(title, head, rows)
@@ -134,39 +133,25 @@ def verify(
     measured = [log.applied(t) for t in measured_study(study).study.trials]
     horizon = horizon_s or study.horizon_s or default_horizon(measured)
     with one_thread_each():
-        tested = [_lack_of_fit(model, t, noise) for t in at_noise_rate(measured, study.schema)]
-        pairs = zip(measured, tested, strict=True)
-        rows = [_verified(model, t, noise, horizon, ranges, left) for t, left in pairs]
-    worst = min(rows, key=lambda one: one.p_value)
-    p, level = min(1.0, len(rows) * worst.p_value), tested[0].level
+        fits = [_with_own_start(model, t, noise) for t in at_noise_rate(measured, study.schema)]
+        rows = [_verified(one, t, horizon, ranges) for one, t in zip(fits, measured, strict=True)]
+    worst = min((one.left for one in rows), key=lambda left: left.p_value)
+    p, level = min(1.0, len(rows) * worst.p_value), worst.level
     left = Remainder(p < level, p, worst.where if p < level else None, level)
     return Verification(study, model, tuple(rows), horizon, left)
 
 
-def _lack_of_fit(model: Model, trial: Trial, noise: StateSpaceNoise) -> Remainder:
-    """Return the lack of fit of one trial, with its initial state alone estimated."""
+def _with_own_start(model: Model, trial: Trial, noise: StateSpaceNoise) -> LikelihoodFit:
+    """Return the fit of the initial state of one trial, at the values and the noise of the model."""
     problem = LikelihoodProblem(model, [trial], noise, ())
-    return lack_of_fit(fit_of(problem, minimise(problem, model.parameters())))
+    return fit_of(problem, minimise(problem, model.parameters()))
 
 
-def _verified(
-    model: Model,
-    trial: Trial,
-    noise: NoiseModel,
-    horizon_s: float,
-    ranges: dict[str, tuple[float, float]],
-    left: Remainder,
-) -> Verified:
-    """Return the errors of one trial, columns in units of their noise."""
-    free, ahead = free_residuals(model, trial, noise), predict_ahead(model, trial, noise, horizon_s)
-    later = {n: trial[n] - ahead[n] for n in free}
-    spread = {n: trial[n] - np.nanmean(trial[n]) for n in free}
-    errors, over, around = (
-        sum(float(np.nansum(v**2)) / noise[n].std ** 2 for n, v in one.items()) for one in (free, later, spread)
-    )
-    e_free, e_ahead = (percent_of_spread(np.array([e]), np.array([around])) for e in (errors, over))
+def _verified(one: LikelihoodFit, trial: Trial, horizon_s: float, ranges: dict[str, tuple[float, float]]) -> Verified:
+    """Return the errors of one trial and its test."""
+    free, ahead = (squared_errors([(one, one, [trial])], span).error_percent() for span in (None, horizon_s))
     beyond = tuple(n for n, ends in ranges.items() if n in trial and _is_beyond(trial[n], *ends))
-    return Verified(trial.name, e_free, e_ahead, left.p_value, left.where, beyond if ranges else None)
+    return Verified(trial.name, free, ahead, lack_of_fit(one), beyond if ranges else None)
 
 
 def _is_beyond(values: np.ndarray, low: float, high: float) -> bool:
