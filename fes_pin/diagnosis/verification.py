@@ -17,7 +17,8 @@ from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit, fit_of
 from fes_pin.identify.stored import load_log, load_random, load_range
 from fes_pin.infer.optimum import minimise
-from fes_pin.infer.result import Remainder, p_shown, probability, shown
+from fes_pin.infer.result import Remainder, p_shown, shown
+from fes_pin.infer.text import percent, probability
 from fes_pin.models.catalogue import Source
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import StateSpaceNoise
@@ -90,8 +91,7 @@ class Verification(ReadOnly):
         on = f", most by {left.where}" if left.where else ""
         head = "trial", "E, free", f"E, {self.horizon_s:.3g} s ahead", "lack of fit", "outside the fitted range"
         rows = [
-            (t.name, f"{t.free:.3g} %", f"{t.ahead:.3g} %", probability(t.left.p_value), _outside(t))
-            for t in self.trials
+            (t.name, percent(t.free), percent(t.ahead), probability(t.left.p_value), _outside(t)) for t in self.trials
         ]
         title = f"{self.study.name}: the model {' + '.join(self.model.structure())} {word} ({left.tested()}{on})."
         return table_text(title, head, rows)

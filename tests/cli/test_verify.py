@@ -36,6 +36,13 @@ def test_new_trials_of_the_same_rig_are_explained(made, monkeypatch, capsys):
     assert rows == [trial.name for trial in fp.read_study(made / "same").trials]
 
 
+def test_errors_over_the_horizon_do_not_count_the_time_before_it(made, monkeypatch, capsys):
+    """Predictions from before the first readings made E of a right model ten times that of its free simulation."""
+    assert run(monkeypatch, "verify", made / "same", made / "model.toml", "--json") == 0
+    for one in json.loads(capsys.readouterr().out)["trials"].values():
+        assert one["error_percent"]["horizon"] < 3.0 * one["error_percent"]["free"]
+
+
 def test_trials_of_a_weaker_muscle_are_not(made, monkeypatch, capsys):
     assert run(monkeypatch, "verify", made / "weaker", made / "model.toml", "--json", "--horizon", "0.2") == 1
     found = json.loads(capsys.readouterr().out)
