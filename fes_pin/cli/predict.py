@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from fes_pin.data.trial import Trial
+    from fes_pin.infer.noise import NoiseModel
     from fes_pin.models.catalogue import Catalogue
     from fes_pin.models.model import Model
 
@@ -66,7 +67,7 @@ def predict(
     from fes_pin.data.plausibility import ToPredict
     from fes_pin.data.table import check_table, table_bytes
     from fes_pin.diagnosis.replay import trial_table
-    from fes_pin.identify.stored import load_log
+    from fes_pin.identify.stored import load_log, load_random
     from fes_pin.models.predict import predicted_trial
     from fes_pin.models.store import load_model
     from fes_pin.prepare.measured import check_study
@@ -88,7 +89,7 @@ def predict(
         odd = check_study(ToPredict(measured, schema, loaded.rig.constants, trial), loaded)
     given = [load_log(model).applied(one) for one in measured]
     found = [predicted_trial(loaded, one) if horizon is None else _along(model, loaded, one, horizon) for one in given]
-    errors = _errors(model, given, found, horizon)
+    errors = _errors(loaded, load_random(model), given, found, horizon)
     if (residuals or out is None) and not errors:
         columns = " or ".join(dict.fromkeys(n for one in found for n in one.columns))
         raise InputError(f"expected a column {columns} to compare with{'' if residuals else ', or --out'}", file=trial)
@@ -177,20 +178,23 @@ def _along(path: Path, model: Model, trial: Trial, horizon_s: float) -> Trial:
     return derived_trial(trial, columns=predict_ahead(model, trial, random, horizon_s))
 
 
-def _errors(path: Path, measured: Sequence[Trial], found: Sequence[Trial], horizon_s: float | None) -> list[str]:
+def _errors(
+    model: Model, noise: NoiseModel | None, measured: Sequence[Trial], found: Sequence[Trial], horizon_s: float | None
+) -> list[str]:
     """E of each trial whose outputs were measured, and of all of them, in words; SI units of a model without noise."""
+    from fes_pin.identify.ahead import first_ahead
     from fes_pin.identify.replay import squares_of
-    from fes_pin.identify.stored import load_random
     from fes_pin.infer.held_out import percent_of_spread
+    from fes_pin.infer.text import percent
 
-    noise, squares = load_random(path) or {}, {}
+    squares = {}
     for one, predicted in zip(measured, found, strict=True):
         if names := [n for n in predicted.columns if n in one]:
-            squares[one.name] = squares_of(one, predicted, names, noise)
+            squares[one.name] = squares_of(one, predicted, names, noise or {}, first_ahead(model, one, horizon_s))
     ahead = "" if horizon_s is None else f", {horizon_s:g} s ahead"
-    lines = [f"{name}: E {percent_of_spread(*both):.3g} %{ahead}" for name, both in squares.items()]
+    lines = [f"{name}: E {percent(percent_of_spread(*both))}{ahead}" for name, both in squares.items()]
     if len(squares) > 1:
-        lines.append(f"all trials: E {percent_of_spread(*zip(*squares.values(), strict=True)):.3g} %{ahead}")
+        lines.append(f"all trials: E {percent(percent_of_spread(*zip(*squares.values(), strict=True)))}{ahead}")
     return lines
 
 

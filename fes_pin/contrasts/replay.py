@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 from fes_pin.contrasts.grouped import Grouped
 from fes_pin.data.trial import Trial, derived_trial
-from fes_pin.identify.ahead import default_horizon
-from fes_pin.identify.replay import Replay, replayed, squares_of
+from fes_pin.identify.ahead import default_horizon, first_ahead
+from fes_pin.identify.replay import Replay, replayed
 from fes_pin.infer.held_out import percent_of_spread
 
 EVERY = "every group"
@@ -32,8 +32,9 @@ def replayed_groups(fit: Grouped, trials: Sequence[Trial], groups: Sequence[str]
         for k in sorted({place, place - 1 if place else 1}):
             name = groups[k] if fit.changes else EVERY
             models[name] = replayed(fit.grouped.models[groups[k]], trial, noise, noise, horizon_s, known)
-        rig = fit.grouped.models[groups[place]].rig
-        made.append(Replay(trial, models, noise, tuple(n for n in rig.outputs(trial.kind) if n in trial)))
+        model = fit.grouped.models[groups[place]]
+        outputs = tuple(n for n in model.rig.outputs(trial.kind) if n in trial)
+        made.append(Replay(trial, models, noise, outputs, first_ahead(model, trial, horizon_s)))
     return tuple(made)
 
 
@@ -42,8 +43,8 @@ def errors_by_group(replays: Sequence[Replay]) -> dict[str, dict[str, float]]:
     squares: dict[str, dict[str, list[tuple[float, float]]]] = {}
     for one in replays:
         own = squares.setdefault(str(one.measured.group), {})
-        for name, model in one.models.items():
-            own.setdefault(name, []).append(squares_of(one.measured, model, one.outputs, one.noise))
+        for name, pair in one.squares.items():
+            own.setdefault(name, []).append(pair)
     return {
         g: {n: percent_of_spread(*zip(*pairs, strict=True)) for n, pairs in own.items()} for g, own in squares.items()
     }

@@ -7,7 +7,7 @@ from weakref import finalize
 import numpy as np
 
 from fes_pin.data.trial import Trial
-from fes_pin.identify.ahead import forecast, forecasts, free_ahead, free_residuals, one_step, reach_of
+from fes_pin.identify.ahead import first_ahead, forecast, forecasts, free_ahead, free_residuals, one_step
 from fes_pin.identify.likelihood import is_simulated
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.process_noise import driving_size, first_guess
@@ -158,7 +158,7 @@ def _squares(fitted: LikelihoodFit, floor: LikelihoodFit, trial: Trial, horizon_
     for name, one in _predicted(fitted, trial, horizon_s).items():
         lines = _lines(trial[name], trial[name] - one.values, floor.noise.white[name] ** 2, one.variances)
         whole += [*lines, 2.0 * lines[2] ** 2 * max(1.0, horizon_s / trial.dt)]
-    whole[:, : _first(fitted, trial, horizon_s)] = 0.0
+    whole[:, : first_ahead(fitted.model, trial, horizon_s)] = 0.0
     pieces = np.array_split(whole, max(1, round(trial.duration)), axis=1)
     return np.array([p.sum(axis=1) for p in pieces]).T
 
@@ -203,13 +203,6 @@ def _predict(fitted: LikelihoodFit, trial: Trial, horizon_s: float) -> dict[str,
     return {n: one._replace(variances=alone[n].variances) for n, one in predicted.items()}
 
 
-def _first(fitted: LikelihoodFit, trial: Trial, horizon_s: float) -> int:
-    """Return the first sample that is predicted from more than the first reading; 0 where the trial ends before, or
-    where its initial state is known."""
-    first = sum(reach_of(trial, horizon_s)) if fitted.model.rig.unknowns(trial.kind) else 0
-    return first if first < len(trial) else 0
-
-
 def noise_that_is_small(fitted: LikelihoodFit) -> StateSpaceNoise:
     """Return the part of the process and measurement noise of a fit that is noise and not an error of the model.
 
@@ -249,7 +242,7 @@ def _sums(fitted: LikelihoodFit, floor: LikelihoodFit, trial: Trial, horizon_s: 
     else:
         next_one = one_step(fitted.model, trial, fitted.noise)[name]
     missed, unit = (next_one, measured - later.values, free), floor.noise.white[name] ** 2
-    begun = 0, _first(fitted, trial, horizon_s), 0
+    begun = 0, first_ahead(fitted.model, trial, horizon_s), 0
     each = zip(missed, begun, strict=True)
     one, ahead, alone = (_lines(measured, m, unit, later.variances)[:, k:].sum(axis=1) for m, k in each)
     return np.array([[one[0], ahead[0], alone[0], ahead[2]], [one[1], ahead[1], alone[1], ahead[1]]])

@@ -6,6 +6,7 @@ import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.result import Diagnosis
+from fes_pin.identify.ahead import first_ahead
 from fes_pin.identify.replay import Replay, replayed
 
 
@@ -21,7 +22,8 @@ def replayed_trials(diagnosis: Diagnosis, both: bool = False) -> tuple[Replay, .
     made = []
     for trial in diagnosis.study.trials:
         models = {n: replayed(f.model, trial, noise, f.noise, horizon_s, f.unknowns_of(trial)) for n, f in fits.items()}
-        made.append(Replay(trial, models, noise, tuple(n for n in rig.outputs(trial.kind) if n in trial)))
+        outputs = tuple(n for n in rig.outputs(trial.kind) if n in trial)
+        made.append(Replay(trial, models, noise, outputs, first_ahead(diagnosis.model, trial, horizon_s)))
     return tuple(made)
 
 

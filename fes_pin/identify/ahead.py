@@ -58,6 +58,15 @@ def forecast(residual: np.ndarray, noise: Noise, dt: float, ahead_s: float) -> n
     return np.pad(out, (0, len(residual) - len(out)), mode="edge") if len(out) else np.zeros(len(residual))
 
 
+def first_ahead(model: Model, trial: Trial, horizon_s: float | None) -> int:
+    """Return the first sample that is predicted from more than the first reading; errors are counted from it on.
+
+    It is 0 of a free simulation (None), where the trial ends before, and where the initial state is known.
+    """
+    first = sum(reach_of(trial, horizon_s)) if horizon_s is not None and model.rig.unknowns(trial.kind) else 0
+    return first if first < len(trial) else 0
+
+
 def predict_ahead(model: Model, trial: Trial, random: NoiseModel, horizon_s: float) -> dict[str, np.ndarray]:
     """Predict each sample of a trial from readings that are older by `horizon_s` or more.
 

@@ -30,18 +30,26 @@ class Replay:
         Of each output: `residual` of a figure is compared with it, and channels of an error are in its units.
     outputs
         The measured columns that the models predict.
+    first
+        The first sample that counts in errors.
     """
 
     measured: Trial
     models: Mapping[str, Trial]
     noise: NoiseModel
     outputs: tuple[str, ...]
+    first: int = 0
 
     @property
     def errors(self) -> dict[str, float]:
         """E of eq. (2) of this trial alone by model, percent; all channels in units of their noise."""
-        squares = {n: squares_of(self.measured, m, self.outputs, self.noise) for n, m in self.models.items()}
-        return {n: percent_of_spread(*one) for n, one in squares.items()}
+        return {n: percent_of_spread(*one) for n, one in self.squares.items()}
+
+    @property
+    def squares(self) -> dict[str, tuple[float, float]]:
+        """Squared errors by model, and the measurement's squares about its mean; see `squares_of`."""
+        given = self.outputs, self.noise, self.first
+        return {n: squares_of(self.measured, simulated, *given) for n, simulated in self.models.items()}
 
     def residuals(self, name: str) -> dict[str, np.ndarray]:
         """Return the residuals of an output by model, each of shape (n,)."""
@@ -76,11 +84,16 @@ def replayed(
     return derived_trial(trial, columns=columns)
 
 
-def squares_of(measured: Trial, simulated: Trial, outputs: Sequence[str], noise: NoiseModel) -> tuple[float, float]:
-    """Return the squared error of a trial, and the measurement's squares about its mean, in units of the noise."""
+def squares_of(
+    measured: Trial, simulated: Trial, outputs: Sequence[str], noise: NoiseModel, first: int = 0
+) -> tuple[float, float]:
+    """Return the squared error of a trial, and the measurement's squares about its mean, in units of the noise.
+
+    Samples count from the number `first` on.
+    """
     squares = spread = 0.0
     for name in outputs:
         variance = noise[name].std ** 2 if name in noise else 1.0
-        squares += float(np.sum(measured.residual(simulated, name) ** 2)) / variance
-        spread += float(np.sum((measured[name] - measured[name].mean()) ** 2)) / variance
+        squares += float(np.sum(measured.residual(simulated, name)[first:] ** 2)) / variance
+        spread += float(np.sum((measured[name] - measured[name].mean())[first:] ** 2)) / variance
     return squares, spread

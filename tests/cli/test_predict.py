@@ -16,6 +16,7 @@ from fes_pin.data.table import table_bytes
 from fes_pin.data.trial import write_trial
 from fes_pin.identify.replay import squares_of
 from fes_pin.infer.held_out import percent_of_spread
+from fes_pin.infer.text import percent
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.predict import predict
 from fes_pin.models.store import model_toml, save_model
@@ -51,7 +52,7 @@ def test_all_trials_of_a_study_are_predicted_under_their_own_conditions(made, mo
                 assert np.allclose(rows[name], values, rtol=0, atol=1e-12)
                 assert np.allclose(rows[f"{name}_residual"], trial[name] - values, rtol=0, atol=1e-12)
                 error = percent_of_spread(*squares_of(trial, predicted, [name], {}))
-            assert line == f"{trial.name}: E {error:.3g} %"
+            assert line == f"{trial.name}: E {percent(error)}"
 
 
 def test_the_error_of_all_trials_pools_their_squares_in_units_of_the_noise(monkeypatch, capsys, tmp_path):
@@ -73,9 +74,9 @@ def test_the_error_of_all_trials_pools_their_squares_in_units_of_the_noise(monke
             missed += np.sum(((trial[name] - predicted[name]) / unit) ** 2)
             around += np.sum(((trial[name] - np.mean(trial[name])) / unit) ** 2)
         sums[trial.name] = missed, around
-    expected = [f"{name}: E {100 * missed / around:.3g} %" for name, (missed, around) in sums.items()]
+    expected = [f"{name}: E {percent(100 * missed / around)}" for name, (missed, around) in sums.items()]
     missed, around = np.sum(list(sums.values()), axis=0)
-    expected.append(f"all trials: E {100 * missed / around:.3g} %")
+    expected.append(f"all trials: E {percent(100 * missed / around)}")
 
     assert run(monkeypatch, "predict", tmp_path / "model.toml", tmp_path / "study") == 0
     assert capsys.readouterr().out.splitlines() == expected
