@@ -7,6 +7,7 @@ import typer
 
 from fes_pin.cli.group import needs, python_names
 from fes_pin.cli.options import Force, offered, output
+from fes_pin.cli.progress import print_text
 
 
 def _names() -> list[str]:
@@ -35,7 +36,7 @@ def datasets(
             typer.echo(f"{name}: {place}")
         return
     for one in DATASETS.values():
-        typer.echo(f"{one.name}: {one.what}\n  {one.origin} ({one.licence})")
+        print_text(f"{one.name}: {one.what}\n  {one.origin} ({one.licence})")
         typer.echo(f"  {_where(one.name) or one.by_hand or f'fes-pin datasets {one.name}'}")
 
 

@@ -28,7 +28,7 @@ from fes_pin.cli.options import (
 from fes_pin.cli.out import pulses, urdf
 from fes_pin.cli.own import check, new_study
 from fes_pin.cli.predict import predict
-from fes_pin.cli.progress import catalogue_with, print_result, progress, say_whose_code
+from fes_pin.cli.progress import catalogue_with, print_result, print_text, progress, say_whose_code
 from fes_pin.cli.verify import verify
 from fes_pin.data.errors import InputError
 
@@ -133,11 +133,11 @@ def effects(library: Libraries = None) -> None:
     catalogue = catalogue_with(library)
     say_whose_code(catalogue)
     for one in catalogue.effects:
-        typer.echo(describe(one))
-    typer.echo(MISREAD)
+        print_text(describe(one))
+    print_text(MISREAD)
     for cause in EFFECTS:
         sizes = {n: u for form in cause.forms() for n, u in zip(form.parameters, form.units, strict=True)}
-        typer.echo(described(cause, STAGE, {n: f"[{unit or '1'}], absent at 0" for n, unit in sizes.items()}))
+        print_text(described(cause, STAGE, {n: f"[{unit or '1'}], absent at 0" for n, unit in sizes.items()}))
 
 
 def main() -> None:

@@ -14,7 +14,7 @@ import typer
 
 from fes_pin.cli.group import needs, release_output
 from fes_pin.cli.options import Exclude, Libraries, Trials, offered, output, pairs, study_of
-from fes_pin.cli.progress import catalogue_with
+from fes_pin.cli.progress import catalogue_with, print_text
 from fes_pin.data.as_read import HeldFile
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import check_folder, read_bytes
@@ -130,7 +130,7 @@ def new_study(
     if "motion" in made.kinds and schema.outputs.get(IMPOSED) in {own for own, _, _ in made.taken}:
         effort = schema.outputs[IMPOSED]
         typer.echo(f"{effort} is taken as what drives it; where the motion drives: --set kind={IMPOSED}")
-    typer.echo("\n".join(odd_lines(study, warnings)))
+    print_text("\n".join(odd_lines(study, warnings)))
     place = shlex.quote(str(folder))
     typer.echo(f"wrote {folder / 'study.toml'}: look at it, then run")
     typer.echo(f"  fes-pin check {place}\n  fes-pin diagnose {place} --out answer")
@@ -150,7 +150,7 @@ def check(
 
     catalogue = catalogue_with(library)
     found = find(study_of(study, catalogue, trials, exclude), library=catalogue)
-    typer.echo(json.dumps(found.as_dict(), indent=1) if as_json else str(found))
+    (typer.echo if as_json else print_text)(json.dumps(found.as_dict(), indent=1) if as_json else str(found))
 
 
 def _template(

@@ -62,7 +62,8 @@ def print_text(text: str) -> None:
     """Print lines of words, broken between words where they are longer than the terminal is wide."""
     width = shutil.get_terminal_size().columns
     for line in text.splitlines():
-        kept = textwrap.wrap(line, width, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False)
+        further = " " * (len(line) - len(line.lstrip()) + 4)
+        kept = textwrap.wrap(line, width, subsequent_indent=further, break_long_words=False, break_on_hyphens=False)
         print("\n".join(kept))
 
 

@@ -174,7 +174,7 @@ def test_the_command_line_lists_ones_own_and_says_whose_code_it_runs(own, monkey
     printed = capsys.readouterr()
     assert ended.value.code in (0, None)
     assert printed.err == f"fes-pin: runs the code of {own / 'door_closer.py'}: door_closer\n"
-    assert f"door_closer (joint; rigs: joint; code of {own / 'door_closer.py'})" in printed.out
+    assert f"door_closer (joint; rigs: joint; code of {own / 'door_closer.py'})" in " ".join(printed.out.split())
     assert "torque - coefficient ramp(v)" in printed.out
 
 
