@@ -199,7 +199,8 @@ def test_the_command(server, here, monkeypatch, capsys):
     code, printed = run()
     assert code == 0
     for one in DATASETS.values():
-        assert f"{one.name}: {one.what}\n  {one.origin} ({one.licence})\n" in printed.out
+        words = f"{one.name}: {one.what} {one.origin} ({one.licence}) "
+        assert words in " ".join(printed.out.split())
     assert "  fes-pin datasets free_pendulum\n" in printed.out
     assert run("free_pendulum")[0] == 0
     assert f"here: {here / 'free_pendulum'}" in run()[1].out
