@@ -15,7 +15,12 @@ from harness.run import made
 
 from printed_numbers.read import Printed, Saved, page_text, printed_in, terminal_text
 
-FAMILIES = ("free", "driven", "imposed", "walking", "contrast")
+FAMILIES = {
+    **{name: ("diagnose", name) for name in ("free", "driven", "imposed", "walking")},
+    "contrast": ("contrast", "contrast"),
+    "compare": ("compare", "misread"),
+}
+"""Command that answers, and generator of its studies, by family."""
 
 
 def answered(command: str, study: Path, out: Path) -> str:
@@ -27,9 +32,10 @@ def answered(command: str, study: Path, out: Path) -> str:
 
 def compared(printed: str, out: Path) -> list[Printed]:
     """Return the numbers that an answer prints at the terminal and on its page, each with whether it is saved."""
-    (record,) = (p for p in out.glob("*.json") if p.stem in ("diagnosis", "contrast"))
-    saved, page = Saved(json.loads(record.read_text())), page_text((out / "report.html").read_text())
-    return [*printed_in(terminal_text(printed), "terminal", saved), *printed_in(page, "page", saved)]
+    (record,) = (p for p in out.glob("*.json") if p.stem in ("diagnosis", "contrast", "compare"))
+    saved, page = Saved(json.loads(record.read_text())), out / "report.html"
+    found = [*printed_in(terminal_text(printed), "terminal", saved)]
+    return [*found, *printed_in(page_text(page.read_text()), "page", saved)] if page.exists() else found
 
 
 def main(
@@ -40,11 +46,12 @@ def main(
     """Have studies answered, and compare the numbers that are printed of each answer with those that are saved."""
     wrong = 0
     for family in families:
-        for item in planned(family, count, seed, False, []):
+        command, generator = FAMILIES[family]
+        for item in planned(generator, count, seed, False, []):
             with tempfile.TemporaryDirectory() as folder:
                 study, out = Path(folder, "study"), Path(folder, "answer")
-                made(generator_of(family), item, study)
-                printed = answered("contrast" if family == "contrast" else "diagnose", study, out)
+                made(generator_of(generator), item, study)
+                printed = answered(command, study, out)
                 numbers = compared(printed, out)
             missed = [one for one in numbers if not one.is_saved]
             typer.echo(f"{family} {item.key}: {len(numbers)} numbers, {len(missed)} of them not saved")
