@@ -70,7 +70,7 @@ RAISED = {
     "fit": [
         lambda: fp.fit(MODEL, []), lambda: fp.fit(None, TRIAL), lambda: fp.fit(MODEL, TRIAL.without("angle_rad")),
         lambda: fp.fit(MODEL, TRIAL, noise=3), lambda: fp.fit(MODEL, TRIAL, max_iterations=None), lambda: fp.fit(MODEL, TRIAL, max_iterations=0),
-        lambda: fp.fit(MODEL, TRIAL, fixed=None), lambda: fp.fit(MODEL, TRIAL, fixed=3), lambda: fp.fit(MODEL, TRIAL, fixed={3: 1.0}),
+        lambda: fp.fit(MODEL, TRIAL, max_iterations=3), lambda: fp.fit(MODEL, TRIAL, fixed=None), lambda: fp.fit(MODEL, TRIAL, fixed=3), lambda: fp.fit(MODEL, TRIAL, fixed={3: 1.0}),
         lambda: fp.fit(MODEL, TRIAL, fixed={"gain": "x"}), lambda: fp.fit(MODEL, TRIAL, fixed=np.ones((2, 2))),
         lambda: fp.fit(MODEL, TRIAL, bounds=3), lambda: fp.fit(MODEL, TRIAL, bounds={"gain": ("a", 1.0)}), lambda: fp.fit(MODEL, TRIAL, bounds={"gain": (1.0, 0.5)}),
     ],

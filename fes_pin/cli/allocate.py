@@ -1,6 +1,5 @@
 """`fes-pin allocate`: from wanted joint torques to pulse widths."""
 
-import json
 from pathlib import Path
 from typing import Annotated
 
@@ -8,7 +7,7 @@ import typer
 
 from fes_pin.cli.group import needs
 from fes_pin.cli.options import numbers_of, pairs
-from fes_pin.cli.progress import print_text
+from fes_pin.cli.progress import print_found, print_text
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import between
 
@@ -92,10 +91,7 @@ def allocate(
     rates = {name: radians(value) for name, value in joint_numbers(rate, "--rate", MOST_DEG_S).items()}
     curve = LinearRecruitment(threshold_us, saturation_us)
     answer = solve(wanted, channels, posture, least=least, recruitment=curve, v=rates or None)
-    if as_json:
-        typer.echo(json.dumps(answer.as_dict(), indent=1))
-    else:
-        print_text(str(answer))
+    print_found(answer, as_json)
 
 
 def _alone(walk: bool, nerves: bool, torques: bool) -> None:

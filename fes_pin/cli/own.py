@@ -14,7 +14,7 @@ import typer
 
 from fes_pin.cli.group import needs, release_output
 from fes_pin.cli.options import Exclude, Libraries, Trials, offered, output, pairs, study_of
-from fes_pin.cli.progress import catalogue_with, print_text
+from fes_pin.cli.progress import catalogue_with, print_found, print_text
 from fes_pin.data.as_read import HeldFile
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import check_folder, read_bytes
@@ -144,13 +144,11 @@ def check(
     library: Libraries = None,
 ) -> None:
     """Say what is odd about a study before anything is looked for, and what its trials can and cannot show."""
-    import json
-
     from fes_pin.verdict.ask import check as find
 
     catalogue = catalogue_with(library)
     found = find(study_of(study, catalogue, trials, exclude), library=catalogue)
-    (typer.echo if as_json else print_text)(json.dumps(found.as_dict(), indent=1) if as_json else str(found))
+    print_found(found, as_json)
 
 
 def _template(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
 import shutil
@@ -11,6 +12,8 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
+
+import typer
 
 from fes_pin.cli.group import VOICE, remark
 
@@ -64,7 +67,15 @@ def print_text(text: str) -> None:
     for line in text.splitlines():
         further = " " * (len(line) - len(line.lstrip()) + 4)
         kept = textwrap.wrap(line, width, subsequent_indent=further, break_long_words=False, break_on_hyphens=False)
-        print("\n".join(kept))
+        typer.echo("\n".join(kept))
+
+
+def print_found(found: Any, as_json: bool) -> None:
+    """Print what a command found: its `as_dict` as JSON, or its words, no wider than the terminal."""
+    if as_json:
+        typer.echo(json.dumps(found.as_dict(), indent=1))
+    else:
+        print_text(str(found))
 
 
 PIECES = re.compile(r"\[[^\]]*\]|\S+")

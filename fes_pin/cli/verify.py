@@ -7,7 +7,7 @@ import typer
 
 from fes_pin.cli.group import python_names
 from fes_pin.cli.options import Exclude, Libraries, Trials, study_of
-from fes_pin.cli.progress import catalogue_with, print_text, say_whose_code
+from fes_pin.cli.progress import catalogue_with, print_found, say_whose_code
 
 
 @python_names(horizon_s="--horizon", library="--library")
@@ -23,13 +23,11 @@ def verify(
     library: Libraries = None,
 ) -> None:
     """Say whether a saved model explains trials within its noise; exit code 1 where it does not."""
-    import json
-
     from fes_pin.diagnosis.verification import verify as find
 
     catalogue = catalogue_with(library)
     found = find(study_of(study, catalogue, trials, exclude), model, horizon_s=horizon, library=catalogue)
     say_whose_code(catalogue)
-    (typer.echo if as_json else print_text)(json.dumps(found.as_dict(), indent=1) if as_json else str(found))
+    print_found(found, as_json)
     if found.remainder.unexplained:
         raise typer.Exit(1)

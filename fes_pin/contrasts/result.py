@@ -72,23 +72,24 @@ class Contrast(Result):
         """Every trial as the models of its group and of another predict it."""
         return replayed_groups(self.fit, self.study.trials, self.groups)
 
-    def errors(self) -> list[Explained]:
-        """Return errors of the trials of each group by the model of another group, and by its own; none of one model.
+    @cached_property
+    def by_own_values(self) -> dict[str, Explained]:
+        """Errors of the trials of each group, by the model of another group and by its own; none of one model.
 
         Errors are of free simulations, of driven rigs of predictions over the horizon.
         """
         horizon_s = horizon_of(self.fit)
         what = f"predictions {horizon_s:g} s ahead" if horizon_s else FREE
-        gone = []
-        for group, own in errors_by_group(self.replays).items():
-            gone += [
-                Explained(
-                    f"{what} of the trials of {group}, by the model of {n} and by their own", FITTED, e, own[group]
-                )
-                for n, e in own.items()
-                if n != group and group in own
-            ]
-        return gone
+        return {
+            g: Explained(f"{what} of the trials of {g}, by the model of {n} and by their own", FITTED, e, own[g])
+            for g, own in errors_by_group(self.replays).items()
+            for n, e in own.items()
+            if n != g and g in own
+        }
+
+    def errors(self) -> list[Explained]:
+        """Return errors of the trials of each group; see `by_own_values`."""
+        return list(self.by_own_values.values())
 
     def assumed(self) -> dict[str, str]:
         """See `Result.assumed`: constants that are held, how trials begin, and the estimator."""
@@ -129,8 +130,8 @@ class Contrast(Result):
         left = self.remainder
         where = "in every group" if left.everywhere else "in one group alone" if left.unexplained else "none found"
         sizes = [f"{n} {p.value:.2g} {p.unit}".strip() for n, p in self.excluded.items()]
-        changed = {one.group for one in self.changes}
-        gains = [str(one) for one in self.errors() if any(f"trials of {g}," in one.what for g in changed)]
+        changed = dict.fromkeys(one.group for one in self.changes)
+        gains = [str(self.by_own_values[g]) for g in changed if g in self.by_own_values]
         rows = [
             ("explained", "; ".join(gains)),
             ("in all groups alike, so no change", ", ".join(self.common)),

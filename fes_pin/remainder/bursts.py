@@ -61,11 +61,12 @@ def _hump(length: float, dt: float) -> np.ndarray:
 
 
 def _one(scores: Sequence[np.ndarray], g: np.ndarray) -> float | None:
-    """Return the p-value of one shape; None where no trial is long enough for it."""
+    """Return the p-value of one shape; None where no trial is long enough for it, or innovations are constant."""
     z = [np.convolve(e, g[::-1], "valid") for e in scores if len(e) >= 2 * len(g)]
-    if not z:
+    level = float(np.mean(np.concatenate(z) ** 2)) if z else 0.0
+    if level == 0.0:
         return None
-    count, level = sum(map(len, z)), float(np.mean(np.concatenate(z) ** 2))
+    count = sum(map(len, z))
     statistic = sum(float(np.sum((one**2 / level) ** 2 - 3.0)) for one in z)
     power = autocorrelation(z) ** 2
     variance = 24.0 * count * float(power @ power)

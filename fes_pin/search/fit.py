@@ -74,7 +74,8 @@ def fit(
     noise
         Known noise by output column: the fit is then weighted least squares of free simulations.
     max_iterations
-        Most steps of a fit with known noise; a fit that has not converged by then says so in `converged`.
+        Most steps of a fit with known noise, and an error without it; a fit that has not converged by then says so in
+        `converged`.
     fixed
         Names of parameters that are not fitted, or values that they are held at by name: `("gain",)`,
         `{"gain": 0.65}`.
@@ -102,7 +103,10 @@ def fit(
     """
     chosen = trials.to_fit() if isinstance(trials, Study) else trials
     measured = accepted_trials(model, chosen, inputs_only=False)
-    max_iterations = whole(max_iterations, "max_iterations", least=1)
+    if whole(max_iterations, "max_iterations", least=1) != MAX_ITERATIONS and noise is None:
+        raise InputError(
+            "expected noise as well: without it a fit ends where it has converged", column="max_iterations"
+        )
     if noise is not None:
         instance(noise, Mapping, "noise")
     if isinstance(fixed, Mapping):

@@ -259,3 +259,8 @@ def test_a_trial_of_which_noise_of_a_long_order_leaves_nothing_has_no_lines():
     time = np.arange(8) * DT
     trial = Trial("short", "motion", {"effort": np.ones(8), "position": time}, time)
     assert line_p_value([SimpleNamespace(trial=trial, values=np.empty(0), dt=DT, inputs=("effort",))]) == (1.0, "time")
+
+
+def test_innovations_that_are_constant_are_no_burst():
+    """A sensor that was stuck in every trial made 0 / 0 of the test."""
+    assert burst_p_value([np.zeros(400), np.zeros(300)], Noise(1.0), 0.01) == 1.0
