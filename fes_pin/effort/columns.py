@@ -1,0 +1,302 @@
+"""Columns of a regression of efforts: links by Pinocchio, and one small function a cause of the catalogue.
+
+    effort = (links + damping v + sum of torques of causes) / (1 + effort_gain)
+
+The torque of a cause has the sign in which it resists: minus that of its equation in the catalogue. What a sensor does
+to the reading is a view: the reading is corrected, and all columns are made again from it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import pinocchio as pin
+
+from fes_pin.effort.motion import Track
+from fes_pin.models.rigs.rigid import gravity_coefficients, joint_inertia, joint_is_revolute
+
+Values = Mapping[str, float]
+"""Values by name; those of a cause as `cause.parameter`, within its own functions as `parameter`."""
+Torques = Callable[[Track, Values, "Sizes"], Sequence[np.ndarray]]
+
+SLOWLY = 0.05
+"""Speed at which friction has most of its size, as a share of the usual speed, until data show another."""
+STRIBECK = 0.1
+"""Speed over which stiction falls, as a share of the usual speed, where a fit starts."""
+STOPS = ((0.98, 0.93, 0.85, 0.7), (0.02, 0.07, 0.15, 0.3))
+"""Quantiles of the position at which an upper and a lower stop are tried."""
+RELAXING_S = (0.08, 0.3, 1.2)
+"""Relaxation times that are tried, s, as the catalogue has them."""
+SWAYS_HZ = tuple(k / 20 for k in range(2, 16))
+"""Frequencies of a periodic torque that are tried, Hz, as the catalogue has them."""
+WAVES = tuple(1.5 + 0.75 * k for k in range(20))
+"""Waves of a cogging torque within the range that are tried."""
+RINGS_HZ = (3.0, 4.5, 6.5, 9.0, 11.0, 13.5, 17.0, 22.0)
+"""Frequencies of a frame that are tried, Hz, as the catalogue has them."""
+PLAYS = (0.003, 0.03)
+"""Half widths of a play that are tried, as shares of the range, as the catalogue has them."""
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """What trials of a study have in common.
+
+    Attributes
+    ----------
+    low, high
+        Range of the positions.
+    usual, fast
+        Root mean square and 98 % quantile of the speed.
+    seconds
+        Longest trial.
+    quantiles
+        Positions by the quantiles of `STOPS`.
+    links
+        The rig's links.
+    """
+
+    low: float
+    high: float
+    usual: float
+    fast: float
+    seconds: float
+    quantiles: Mapping[float, float]
+    links: Links
+
+    @property
+    def reach(self) -> float:
+        """Range of the positions."""
+        return self.high - self.low
+
+
+@dataclass(frozen=True)
+class Links:
+    """Inertia and gravity of one joint: inertia a + cosine cos(q) + sine sin(q); see `models.rigs.joint`."""
+
+    inertia: float
+    cosine: float
+    sine: float
+    turns: bool
+
+    @classmethod
+    def of(cls, model: pin.Model) -> Links:
+        """Return the links of a Pinocchio model of one joint."""
+        return cls(joint_inertia(model), *gravity_coefficients(model), joint_is_revolute(model))
+
+    def gravity(self, q: np.ndarray, tilt: float = 0.0) -> np.ndarray:
+        """Return the torque of gravity at positions, shape (n,), the base tilted."""
+        at = self.turns * q + tilt
+        return self.cosine * np.cos(at) + self.sine * np.sin(at)
+
+    @property
+    def idle(self) -> float:
+        """Position at which the joint rests without effort: hanging."""
+        return math.atan2(-self.cosine, self.sine) if self.turns and (self.cosine or self.sine) else 0.0
+
+
+def nominal_columns(track: Track, links: Links, tilt: float = 0.0) -> dict[str, np.ndarray]:
+    """Return the columns of the nominal model at the rows of a trial."""
+    gravity = track.low(links.gravity(track.q, tilt)) if links.cosine or links.sine else np.zeros(len(track.rows))
+    return {"inertia_scale": links.inertia * track.moved(2), "damping": track.moved(1), "gravity_scale": gravity}
+
+
+def coulomb_friction(track: Track, x: Values, sizes: Sizes) -> Sequence[np.ndarray]:
+    """Return dry friction, with stiction that falls over the Stribeck speed."""
+    stiction = 1.0 + x["stiction"] * np.exp(-((track.v / x["stribeck_speed"]) ** 2))
+    return (track.low(np.tanh(track.v / x["creep_speed"]) * stiction),)
+
+
+def quadratic_damping(track: Track, x: Values, sizes: Sizes) -> Sequence[np.ndarray]:
+    """Return drag in proportion to the square of the speed."""
+    return (track.low(track.v * np.abs(track.v)),)
+
+
+def effort_offset(track: Track, x: Values, sizes: Sizes) -> Sequence[np.ndarray]:
+    """Return a constant effort in addition to the recorded one."""
+    return (-np.ones(len(track.rows)),)
+
+
+def parallel_stiffness(track: Track, x: Values, sizes: Sizes) -> Sequence[np.ndarray]:
+    """Return a spring."""
+    away = track.moved(0) - x["rest_angle_rad"]
+    if x["hardening_per_rad2"]:
+        away = away + x["hardening_per_rad2"] * track.low((track.q - x["rest_angle_rad"]) ** 3)
+    return (away,)
+
+
+def joint_stop(track: Track, x: Values, sizes: Sizes) -> Sequence[np.ndarray]:
+    """Return a stiff limit at an angle."""
+    return (track.low(x["side"] * np.maximum(x["side"] * (track.q - x["angle_rad"]), 0.0)),)
+
+
+def passive_relaxation(track: Track, x: Values, sizes: Sizes) -> Sequence[np.ndarray]:
+    """Return a spring in series with a damper."""
+    from scipy.signal import lfilter  # half a second, which other rigs need not wait for
+
+    keeps = math.exp(-track.dt / x["relaxation_s"])
+    rest = lfilter([1.0 - keeps], [1.0, -keeps], track.q - track.q[0]) + track.q[0]
+    return (track.low(track.q - rest),)
+
+
+def periodic_torque(track: Track, x: Values, sizes: Sizes) -> Sequence[np.ndarray]:
+    """Return a torque that is periodic in time."""
+    phase = 2.0 * math.pi * x["frequency_hz"] * track.time
+    return track.low(-np.sin(phase)), track.low(-np.cos(phase))
+
+
+def cogging(track: Track, x: Values, sizes: Sizes) -> Sequence[np.ndarray]:
+    """Return a torque that is periodic in the angle."""
+    return track.low(-np.sin(x["waves"] * track.q)), track.low(-np.cos(x["waves"] * track.q))
+
+
+def frame_vibration(track: Track, x: Values, sizes: Sizes) -> Sequence[np.ndarray]:
+    """Return the effort that a swinging frame takes, to first order in its coupling.
+
+    With H = s^2 / (s^2 + 2 zeta omega s + omega^2) the believed inertia has the effort coupling H q''.
+    """
+    from scipy.signal import bilinear, lfilter
+
+    omega = 2.0 * math.pi * x["frequency_hz"]
+    b, a = bilinear([1.0, 0.0, 0.0], [1.0, 2.0 * x["damping_ratio"] * omega, omega**2], 1.0 / track.dt)
+    return (track.low(sizes.links.inertia * lfilter(b, a, track.a)),)
+
+
+def sensor_offset(track: Track, x: Values, sizes: Sizes) -> np.ndarray:
+    """Return the reading without a constant."""
+    return np.asarray(track.reading - x["offset"])
+
+
+def sensor_drift(track: Track, x: Values, sizes: Sizes) -> np.ndarray:
+    """Return the reading without a ramp in time."""
+    return np.asarray(track.reading - x["rate_per_s"] * track.time)
+
+
+def _origin(track: Track, x: Values, sizes: Sizes) -> float:
+    return float((np.median(track.reading[:5]), sizes.links.idle, 0.0)[round(x["place"])])
+
+
+def sensor_gain(track: Track, x: Values, sizes: Sizes) -> np.ndarray:
+    """Return the reading with its deviations from a place divided by the gain."""
+    origin = _origin(track, x, sizes)
+    return np.asarray(origin + (track.reading - origin) / (1.0 + x["error"]))
+
+
+def sensor_nonlinearity(track: Track, x: Values, sizes: Sizes) -> np.ndarray:
+    """Return the y of which y + curvature y^2 is the deviation of the reading from a place."""
+    origin = _origin(track, x, sizes)
+    away = track.reading - origin
+    return np.asarray(origin + 2.0 * away / (1.0 + np.sqrt(np.maximum(1.0 + 4.0 * x["curvature"] * away, 0.25))))
+
+
+def backlash(track: Track, x: Values, sizes: Sizes) -> np.ndarray:
+    """Return the reading on the driven side of a play, which it crosses about where it reverses."""
+    return np.asarray(track.reading + x["half_width"] * np.tanh(track.v / (SLOWLY * sizes.usual)))
+
+
+@dataclass(frozen=True)
+class CauseOfEffort:
+    """A cause as a search fits it.
+
+    Attributes
+    ----------
+    torques
+        Columns at the rows, one for each amplitude, at values of the shapes; None of a view or a change of the effort.
+    view
+        The corrected reading, shape (n,); None of a torque.
+    amplitudes
+        By name: bounds, and a size at which the cause is tried, where it is no torque.
+    shapes
+        Starts of the shapes by name, for each place at which it is tried.
+    free
+        Shapes that are fitted from the first: bounds.
+    forms
+        Further shapes that are fitted if that is significant, one form after the other: start and bounds.
+    """
+
+    name: str
+    torques: Torques | None = None
+    view: Callable[[Track, Values, Sizes], np.ndarray] | None = None
+    amplitudes: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
+    shapes: Sequence[Values] = ({},)
+    free: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    forms: Sequence[Mapping[str, tuple[float, float, float]]] = ()
+
+
+ANY, POSITIVE = (-math.inf, math.inf, 0.0), (0.0, math.inf, 0.0)
+
+
+def library(sizes: Sizes) -> dict[str, CauseOfEffort]:
+    """Return the causes of one joint by name, with the starts and bounds that the recorded motion gives."""
+    s, creep, reach = sizes, SLOWLY * sizes.usual, sizes.reach
+    stops = [{"side": side, "angle_rad": s.quantiles[q]} for side, qs in zip((1.0, -1.0), STOPS, strict=True) for q in qs]
+    friction = {"creep_speed": creep, "stiction": 0.0, "stribeck_speed": STRIBECK * s.usual}
+    softer = {"creep_speed": (creep, 0.1 * creep, 20.0 * creep)}
+    sticks = {"stiction": (0.2, 0.0, 3.0), "stribeck_speed": (STRIBECK * s.usual, 0.5 * creep, s.usual)}
+    rests = [{"rest_angle_rad": x, "hardening_per_rad2": 0.0} for x in (s.quantiles[0.5], s.low, s.high)]
+    slowest = 1.0 / s.seconds
+    waves = 2.0 * math.pi / reach
+    most = math.pi / 2.0 if s.links.turns else reach
+    places = [{"place": k} for k in (1.0, 0.0, 2.0)] if s.links.turns else [{"place": 0.0}]
+    hardens = {"hardening_per_rad2": (1.0 / reach**2, 0.0, 1e3 / reach**2)}
+    causes = [
+        CauseOfEffort("coulomb_friction", coulomb_friction, None, {"torque_nm": POSITIVE}, [friction], {}, [softer, sticks]),
+        CauseOfEffort("quadratic_damping", quadratic_damping, None, {"coefficient": POSITIVE}),
+        CauseOfEffort("effort_offset", effort_offset, None, {"offset": ANY}),
+        CauseOfEffort(
+            "parallel_stiffness",
+            parallel_stiffness,
+            None,
+            {"stiffness_nm_per_rad": POSITIVE},
+            rests,
+            {"rest_angle_rad": (s.low - 0.5 * reach, s.high + 0.5 * reach)},
+            [hardens],
+        ),
+        CauseOfEffort("joint_stop", joint_stop, None, {"stiffness": POSITIVE}, stops, {"angle_rad": (s.low, s.high)}),
+        CauseOfEffort(
+            "passive_relaxation",
+            passive_relaxation,
+            None,
+            {"stiffness_nm_per_rad": POSITIVE},
+            [{"relaxation_s": x} for x in RELAXING_S],
+            {"relaxation_s": (0.02, s.seconds)},
+        ),
+        CauseOfEffort(
+            "periodic_torque",
+            periodic_torque,
+            None,
+            {"in_phase": ANY, "quadrature": ANY},
+            [{"frequency_hz": f} for f in SWAYS_HZ if f >= slowest] or [{"frequency_hz": SWAYS_HZ[-1]}],
+            {"frequency_hz": (min(slowest, SWAYS_HZ[-1]), 0.8)},
+        ),
+        CauseOfEffort(
+            "cogging",
+            cogging,
+            None,
+            {"in_phase": ANY, "quadrature": ANY},
+            [{"waves": waves * n} for n in WAVES],
+            {"waves": (WAVES[0] * waves, 2.0 * WAVES[-1] * waves)},
+        ),
+        CauseOfEffort(
+            "frame_vibration",
+            frame_vibration,
+            None,
+            {"coupling": (0.0, 5.0, 0.0)},
+            [{"frequency_hz": f, "damping_ratio": 0.05} for f in RINGS_HZ],
+            {"frequency_hz": (2.0, 60.0), "damping_ratio": (0.0, 0.2)},
+        ),
+        CauseOfEffort("effort_gain", None, None, {"error": (-0.9, 9.0, 0.05)}),
+        CauseOfEffort("sensor_lag", None, None, {"lag_s": (0.0, 0.5, 0.005)}),
+        CauseOfEffort("sensor_offset", None, sensor_offset, {"offset": (-most, most, 0.02 * reach)}),
+        CauseOfEffort("sensor_drift", None, sensor_drift, {"rate_per_s": (-most, most, 0.02 * reach / s.seconds)}),
+        CauseOfEffort("sensor_gain", None, sensor_gain, {"error": (-0.5, 1.0, 0.02)}, places),
+        CauseOfEffort(
+            "sensor_nonlinearity", None, sensor_nonlinearity, {"curvature": (-2 / reach, 2 / reach, 0.02 / reach)}, places
+        ),
+        CauseOfEffort("backlash", None, backlash, {"half_width": (0.0, 0.5 * reach, PLAYS[0] * reach)}),
+    ]
+    if s.links.turns and (s.links.cosine or s.links.sine):
+        causes.append(CauseOfEffort("base_tilt", None, None, {"tilt_rad": (-1.0, 1.0, 0.02)}))
+    return {one.name: one for one in causes}

@@ -1,0 +1,242 @@
+"""Sets of causes of an effort as the search of `infer` fits them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+
+from fes_pin.effort.columns import CauseOfEffort, Values
+from fes_pin.effort.motion import WIDER, Band, Record
+from fes_pin.effort.problem import HELD_ROWS, HOLD, EffortFit, EffortProblem, Rows, own
+from fes_pin.infer import scatter
+from fes_pin.infer.distributions import chi2_tail
+from fes_pin.infer.family import Family
+from fes_pin.infer.fits import Candidate, FittedSets, Names
+from fes_pin.infer.levels import CLAIM_LEVEL, CONFIDENCE_95
+from fes_pin.infer.maximise import alternate
+from fes_pin.infer.optimum import Optimum, minimise
+from fes_pin.infer.projection import Projection
+from fes_pin.infer.scatter import excess_scatter, least_apart, with_honest_intervals
+
+NOMINAL = {"inertia_scale": (1e-3, 1e3), "damping": (0.0, 1e8), "gravity_scale": (-10.0, 10.0)}
+"""Bounds of the nominal parameters, as those of `models.rigs.joint`."""
+
+
+def fit_of(
+    problem: EffortProblem, values: Values, forms: Mapping[str, int], by: type[EffortFit] = EffortFit
+) -> EffortFit:
+    """Return the fit of a problem from start values."""
+    found = alternate(problem, values)
+    assert problem.weights is not None
+    known = {n: getattr(found, n) for n in Optimum.__dataclass_fields__}
+    return by(**known, names=problem.names, forms=forms, weights=problem.weights)
+
+
+class EffortSets(FittedSets[EffortFit, Values]):
+    """Sets of causes of one driven joint, compared by the likelihood of Student's t.
+
+    Parameters
+    ----------
+    rows
+        The trials.
+    nominal_values
+        Nominal parameters by name.
+    fitted
+        Those that are fitted.
+    seed
+        Of simulations.
+    """
+
+    def __init__(self, rows: Rows, nominal_values: Values, fitted: Sequence[str], seed: int = 0) -> None:
+        super().__init__()
+        self.rows, self.seed, self.takes_forms = rows, seed, False
+        imposed = all(t.record.kind == "imposed" for t in rows.tracks)
+        self.values = {**nominal_values, HOLD: HELD_ROWS * (not imposed)}
+        self.base = {n: NOMINAL[n] for n in fitted} | ({HOLD: (0.0, HELD_ROWS)} if imposed else {})
+        self.library = rows.library
+
+    @property
+    def estimator(self) -> str:
+        """How sets are fitted, in words."""
+        return "least squares of the low-passed effort"
+
+    def limits(self, names: Sequence[str], forms: Mapping[str, int]) -> dict[str, tuple[float, float]]:
+        """Return the bounds of what is fitted of a set, by name, the nominal parameters first."""
+        out = dict(self.base)
+        for name in names:
+            cause = self.library[name]
+            out |= {f"{name}.{n}": x[:2] for n, x in cause.amplitudes.items()}
+            out |= {f"{name}.{n}": x for n, x in cause.free.items()}
+            for form in cause.forms[: forms.get(name, 0)]:
+                out |= {f"{name}.{n}": x[1:] for n, x in form.items()}
+        return out
+
+    def problem(self, names: Sequence[str], forms: Mapping[str, int], **more: object) -> EffortProblem:
+        """Return the problem of a set."""
+        return EffortProblem(self.rows, names, self.limits(names, forms), **more)  # type: ignore[arg-type]
+
+    def fit(self, names: Names, values: Values, forms: Mapping[str, int]) -> EffortFit:
+        """Return the fit of a set from start values, which need not have those of the nominal model."""
+        return fit_of(self.problem(names, forms), {**self.values, **values}, forms)
+
+    def nominal(self) -> EffortFit:
+        """Fit the nominal model."""
+        self.fits[()] = self.fit((), {}, {})
+        return self.fits[()]
+
+    @cached_property
+    def _tried(self) -> dict[str, list[dict[str, float]]]:
+        """The values of each cause at which it is tried, by its name."""
+        out: dict[str, list[dict[str, float]]] = {}
+        for name, cause in self.library.items():
+            sizes = {n: x[2] for n, x in cause.amplitudes.items()}
+            out[name] = [{f"{name}.{n}": v for n, v in {**sizes, **shape}.items()} for shape in cause.shapes]
+        return out
+
+    def _slopes(self, base: EffortFit, cause: CauseOfEffort, tried: Values) -> list[np.ndarray]:
+        """Return the change of each trial's prediction by the amplitudes of a cause, at values that are tried."""
+        values, names = {**base.values, **tried}, (*base.names, cause.name)
+        amplitudes = [f"{cause.name}.{n}" for n in cause.amplitudes]
+        if cause.torques is not None:
+            gain = 1.0 + base.values.get("effort_gain.error", 0.0)
+            columns = self.rows.columns(values, names, cause.name)
+            return [np.stack([one[n] for n in amplitudes], axis=1) / gain for one in columns]
+        without, _ = self.problem(base.names, base.forms).residuals(base.values)
+        there, _ = self.problem(names, base.forms).residuals(values)
+        (size,) = (tried[n] for n in amplitudes)
+        return [((a - b) / size)[:, None] for a, b in zip(without, there, strict=True)]
+
+    def _whitened(self, base: EffortFit, name: str) -> list[np.ndarray]:
+        """Return the columns of a candidate at each place where it is tried, whitened, shape (m, amplitudes)."""
+        problem, cause = self.problem(base.names, base.forms, weights=base.weights), self.library[name]
+        roots = [problem._roots(k, base.weights)[0] for k in range(len(self.rows.tracks))]
+        each = [self._slopes(base, cause, tried) for tried in self._tried[name]]
+        return [np.concatenate([s * r[:, None] for s, r in zip(one, roots, strict=True)]) for one in each]
+
+    def candidates(self, base: EffortFit) -> Mapping[str, Candidate[Values]]:
+        """Return the causes that a set lacks, with the gain of their score and the place where that is largest."""
+        projection, out = Projection(base.parts), {}
+        for name in (n for n in self.library if n not in base.names):
+            best: tuple[float, dict[str, float]] | None = None
+            for tried, columns in zip(self._tried[name], self._whitened(base, name), strict=True):
+                gain, sizes = _score(projection, columns)
+                limits = list(self.library[name].amplitudes.values())
+                sizes = [min(max(s, x[0]), x[1]) for s, x in zip(sizes, limits, strict=True)]
+                if any(sizes) and (best is None or gain > best[0]):
+                    best = gain, {**tried, **dict(zip((f"{name}.{n}" for n in self.library[name].amplitudes), sizes))}
+            if best is not None:
+                out[name] = Candidate(best[0], best[1])
+        return out
+
+    @cached_property
+    def family(self) -> Family:  # type: ignore[override]
+        """The family of all candidates, at each place where they are tried."""
+        base = self.fits[()]
+        projection, many, blocks = Projection(base.parts), [], list[slice]()
+        for name in self.library:
+            for columns in self._whitened(base, name):
+                start = blocks[-1].stop if blocks else 0
+                blocks.append(slice(start, start + columns.shape[1]))
+                many.append(projection(columns))
+        left = np.concatenate(many, axis=1)
+        return Family(left.T @ left, blocks, self.seed)
+
+    def begin(self, base: EffortFit, starts: Mapping[Names, Values]) -> Mapping[Names, EffortFit]:
+        """Return fits of sets that extend a base."""
+        return {names: self.fit(names, {**base.values, **start}, base.forms) for names, start in starts.items()}
+
+    def form_of(self, fitted: EffortFit) -> frozenset[Hashable]:
+        """Return the forms of the causes in a fit."""
+        return frozenset((n, k) for n, many in fitted.forms.items() for k in range(many))
+
+    def without(self, names: Names, name: str) -> EffortFit:
+        """Return the fit of a set without one cause, in the forms that the others have in it."""
+        whole, rest = self.fits[names], tuple(n for n in names if n != name)
+        forms = {n: k for n, k in whole.forms.items() if n != name}
+        if rest not in self.fits or dict(self.fits[rest].forms) != forms:
+            less = self.fit(rest, {n: v for n, v in whole.values.items() if not n.startswith(f"{name}.")}, forms)
+            known = self.fits.get(rest)
+            if known is None or less.criterion < known.criterion:
+                self.fits[rest] = less
+        return self.fits[rest]
+
+    def is_possible(self, fitted: EffortFit) -> bool:
+        """Return whether every size of a cause is off its bounds."""
+        return not any("." in n and fitted.values[n] != 0.0 for n in fitted.at_bound)
+
+    def is_a_model(self, fitted: EffortFit) -> bool:
+        """Return whether every nominal parameter is off its bounds, but for a damping of 0."""
+        return not any("." not in n and n != HOLD and fitted.values[n] != 0.0 for n in fitted.at_bound)
+
+    def is_certain(self, fitted: EffortFit, name: str) -> bool:
+        """Return whether an amplitude of a cause is twice its deviation."""
+        honest = with_honest_intervals(fitted)
+        sizes = [f"{name}.{n}" for n in self.library[name].amplitudes]
+        return any(abs(fitted.values[n]) > CONFIDENCE_95 * honest.std(n) for n in sizes)
+
+    def is_distinguished(self, best: EffortFit, without: EffortFit, rival: EffortFit, lead: float) -> bool:
+        """See `infer.scatter.least_apart`."""
+        return lead >= least_apart(best, rival)
+
+    def excess_scatter(self, larger: EffortFit, smaller: EffortFit) -> float:
+        """See `infer.scatter.excess_scatter`."""
+        return excess_scatter(larger, smaller)
+
+    def extension_p_value(self, fitted: EffortFit) -> float:
+        """Return the family-wise p-value of the best score of a further candidate."""
+        if not self.has_room(fitted.names):
+            return 0.0
+        known = self.candidates(fitted)
+        single = [float(chi2_tail(c.gain, len(self.library[n].amplitudes))) for n, c in known.items()]
+        return self.family.adjusted(min(single, default=1.0))
+
+    def leaves_noise(self, fitted: EffortFit) -> bool:
+        """Return False: a further cause need not lower an error that is of the fitted rows."""
+        return False
+
+    def better_form(self, fitted: EffortFit) -> EffortFit | None:
+        """Return the set with a further form of one of its causes that is significant; None before all were tried."""
+        if not self.takes_forms:
+            return None
+        for name in fitted.names:
+            at = fitted.forms.get(name, 0)
+            if at >= len(self.library[name].forms):
+                continue
+            forms = {**fitted.forms, name: at + 1}
+            start = {f"{name}.{n}": x[0] for n, x in self.library[name].forms[at].items()}
+            again = self.fit(fitted.names, {**fitted.values, **start}, forms)
+            if self.p_value(again, fitted) < CLAIM_LEVEL and self.is_possible(again):
+                return again
+        return None
+
+    def begin_again(self, names: Names) -> bool:
+        """Take forms of causes in, and return whether the set has a better one.
+
+        Forms are not tried before further causes were: a flexible friction takes the place of quadratic damping.
+        """
+        if self.takes_forms:
+            return False
+        self.takes_forms = True
+        better = self.better_form(self.fits[names])
+        if better is not None:
+            self.fits[names] = better
+        return better is not None
+
+    def final(self, fitted: EffortFit, kept: Sequence[np.ndarray] | None = None) -> EffortFit:
+        """Return a set by plain least squares, from a fit of it, to all rows or to some."""
+        problem = self.problem(fitted.names, fitted.forms, robust=False, kept=kept)
+        return fit_of(problem, fitted.values, fitted.forms)
+
+
+def _score(projection: Projection, columns: np.ndarray) -> tuple[float, list[float]]:
+    """Return the gain of the score of columns, and the sizes of a step; no gain where they are confounded."""
+    left = projection(columns)
+    gram, slope = left.T @ left, left.T @ projection.residual
+    if not np.trace(gram) > 1e-6 * float(np.sum(columns**2)):
+        return 0.0, [0.0] * columns.shape[1]
+    sizes = np.linalg.lstsq(gram, slope, rcond=1e-9)[0]
+    return float(slope @ sizes), [float(x) for x in sizes]

@@ -1,0 +1,272 @@
+"""Least squares of the low-passed effort as a problem of `infer`: residuals, sensitivities, weights."""
+
+from __future__ import annotations
+
+import math
+from collections import OrderedDict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fes_pin.effort.columns import CauseOfEffort, Links, Sizes, Values, library, nominal_columns
+from fes_pin.effort.motion import Band, Record, Track
+from fes_pin.infer.optimum import Optimum
+from fes_pin.infer.problem import Linearized, Problem, Unknowns
+
+FREEDOM = 6.0
+"""Degrees of freedom of Student's t of a residual, by whose weights sets are compared: a distant row counts little
+(Lange, Little and Taylor, J. Am. Stat. Assoc. 84:881, 1989, who find 4 to 8)."""
+HELD_ROWS = 0.5
+"""Rows by which a command acts late that is held until the next."""
+STEP = 1e-4
+"""Step of a numerical derivative, as a share of the value or of the size at which a cause is tried."""
+KEPT_VIEWS = 24
+"""Sets of tracks that are kept: one for each correction of the reading that is tried."""
+HOLD = "hold_rows"
+"""Rows by which an effort acts after it was recorded, a nuisance where the motion is imposed."""
+Columns = dict[str, np.ndarray]
+
+
+class Rows:
+    """All trials at their rows: columns by name at any values, each made once.
+
+    Parameters
+    ----------
+    records
+        The trials.
+    band
+        Their band.
+    links
+        Of the rig.
+    """
+
+    def __init__(self, records: Sequence[Record], band: Band, links: Links) -> None:
+        self.band, self.links = band, links
+        tracks = [Track(r, band) for r in records]
+        self.tracks = [t for t in tracks if len(t.rows)]
+        self.sizes = _sizes(self.tracks, links)
+        self.library = library(self.sizes)
+        self.reversing = [t.reversing(self.sizes.fast) for t in self.tracks]
+        self._views: OrderedDict[Values, list[Track]] = OrderedDict()
+        self._made: dict[object, list[Sequence[np.ndarray]]] = {}
+        self._nominal: dict[object, list[Columns]] = {}
+
+    @property
+    def lengths(self) -> list[int]:
+        """Rows of each trial."""
+        return [len(t.rows) for t in self.tracks]
+
+    def seen(self, values: Values, names: Sequence[str]) -> tuple[object, list[Track]]:
+        """Return the tracks as sensor causes of a set have them, with a key."""
+        views = [self.library[n] for n in names if self.library[n].view is not None]
+        key = tuple((c.name, *own(values, c.name).items()) for c in views)
+        if not views:
+            return key, self.tracks
+        if key not in self._views:
+            tracks = self.tracks
+            for cause in views:
+                assert cause.view is not None
+                many = [(t, cause.view(t, own(values, cause.name), self.sizes)) for t in tracks]
+                tracks = [Track(t.record, t.band, reading) for t, reading in many]
+            self._views[key] = tracks
+            if len(self._views) > KEPT_VIEWS:
+                self._views.popitem(last=False)
+        return key, self._views[key]
+
+    def columns(self, values: Values, names: Sequence[str], only: str = "") -> list[Columns]:
+        """Return the columns of each trial, by the parameter that multiplies each.
+
+        Parameters
+        ----------
+        only
+            The cause whose columns alone are made; by default those of a set and of the nominal model.
+        """
+        key, tracks = self.seen(values, names)
+        tilt = values.get("base_tilt.tilt_rad", 0.0) if "base_tilt" in names else 0.0
+        out: list[Columns] = [{} for _ in tracks]
+        if not only:
+            at = (key, tilt)
+            if at not in self._nominal:
+                self._nominal[at] = [nominal_columns(t, self.links, tilt) for t in tracks]
+            out = [dict(one) for one in self._nominal[at]]
+        for name in (only,) if only else names:
+            cause = self.library[name]
+            if cause.torques is None:
+                continue
+            shapes = {n: v for n, v in own(values, name).items() if n not in cause.amplitudes}
+            place = (key, name, *shapes.items())
+            if place not in self._made:
+                self._made[place] = [cause.torques(t, shapes, self.sizes) for t in tracks]
+            for one, made in zip(out, self._made[place], strict=True):
+                one.update(zip((f"{name}.{n}" for n in cause.amplitudes), made, strict=True))
+        return out
+
+    def efforts(self, values: Values) -> list[np.ndarray]:
+        """Return the low-passed effort of each trial, as late as its hold and a sensor's lag have it."""
+        hold, lag = values[HOLD], values.get("sensor_lag.lag_s", 0.0)
+        if ("effort", hold, lag) not in self._made:
+            self._made["effort", hold, lag] = [(t.effort(hold * t.dt, lag),) for t in self.tracks]
+        return [one for (one,) in self._made["effort", hold, lag]]
+
+
+def own(values: Values, name: str) -> dict[str, float]:
+    """Return the values of a cause by its own names."""
+    return {n.removeprefix(f"{name}."): v for n, v in values.items() if n.startswith(f"{name}.")}
+
+
+def _sizes(tracks: Sequence[Track], links: Links) -> Sizes:
+    q, v = (np.concatenate([getattr(t, n) for t in tracks]) for n in "qv")
+    marks = (0.02, 0.07, 0.15, 0.3, 0.5, 0.7, 0.85, 0.93, 0.98)
+    quantiles = dict(zip(marks, map(float, np.quantile(q, marks)), strict=True))
+    usual, fast = float(np.sqrt(np.mean(v**2))), float(np.quantile(np.abs(v), 0.98))
+    seconds = max(float(t.time[-1]) for t in tracks)
+    return Sizes(float(q.min()), float(q.max()), usual, fast, seconds, quantiles, links)
+
+
+@dataclass(frozen=True)
+class Weights:
+    """Noise of the rows: variances of usual rows and of those near reversals, and the weights of Student's t.
+
+    Attributes
+    ----------
+    variances
+        Of rows that do not reverse, and of those that do.
+    residuals
+        Of each trial, at which the weights were taken; None for a Gaussian.
+    """
+
+    variances: tuple[float, float]
+    residuals: Sequence[np.ndarray] | None = None
+
+
+class EffortProblem(Problem):
+    """The effort of a set of causes.
+
+    Parameters
+    ----------
+    rows
+        The trials.
+    names
+        The set.
+    free
+        Names of the fitted parameters.
+    limits
+        Their bounds.
+    weights
+        Noise to begin with; None to begin with that of the first residuals.
+    robust
+        Whether weights are those of Student's t with a variance of its own near reversals; else all rows count alike.
+    kept
+        Of each trial, the rows that are fitted, as bool; None for all.
+    """
+
+    unknown_names = ()
+
+    def __init__(
+        self,
+        rows: Rows,
+        names: Sequence[str],
+        limits: dict[str, tuple[float, float]],
+        weights: Weights | None = None,
+        robust: bool = True,
+        kept: Sequence[np.ndarray] | None = None,
+    ) -> None:
+        self.rows, self.names, self.limits, self.free = rows, tuple(names), limits, tuple(limits)
+        self.weights, self.robust, self.kept = weights, robust, kept
+
+    def start_unknowns(self) -> Unknowns:
+        """Return no unknowns, one empty mapping a trial."""
+        return [{} for _ in self.rows.tracks]
+
+    def residuals(self, values: Values) -> tuple[list[np.ndarray], list[Columns]]:
+        """Return residuals of each trial in the effort's unit, and the columns of the parameters that are linear."""
+        gain = 1.0 + values.get("effort_gain.error", 0.0)
+        columns, left = self.rows.columns(values, self.names), []
+        for effort, one in zip(self.rows.efforts(values), columns, strict=True):
+            left.append(effort - sum(values[n] * column for n, column in one.items()) / gain)
+            for n in one:
+                one[n] = one[n] / gain
+        return left, columns
+
+    def sensitivities(self, values: Values, names: Sequence[str]) -> tuple[list[np.ndarray], list[np.ndarray]]:
+        """Return residuals, and derivatives of the prediction by some parameters, shape (m, names), of each trial."""
+        left, columns = self.residuals(values)
+        many: list[list[np.ndarray]] = [[] for _ in left]
+        for name in names:
+            step = STEP * max(abs(values[name]), self._scale(name))
+            there = None if name in columns[0] else self.residuals({**values, name: values[name] + step})[0]
+            for k, one in enumerate(many):
+                one.append(columns[k][name] if there is None else (left[k] - there[k]) / step)
+        return left, [np.stack(one, axis=1) for one in many]
+
+    def _scale(self, name: str) -> float:
+        cause, _, parameter = name.partition(".")
+        tried = self.rows.library[cause].amplitudes.get(parameter) if parameter else None
+        low, high = self.limits.get(name, (0.0, 1.0))
+        return tried[2] if tried and tried[2] else high - low if math.isfinite(high - low) else 1.0
+
+    def linearize(self, values: Values, unknowns: Unknowns) -> list[Linearized]:
+        """Return residuals and sensitivities of the fitted rows by their standard deviation."""
+        left, slopes = self.sensitivities(values, self.free)
+        if self.weights is None:
+            self.weights = self._improved(left)
+        parts = []
+        for k, (one, slope) in enumerate(zip(left, slopes, strict=True)):
+            roots, constant = self._roots(k, self.weights)
+            at = slice(None) if self.kept is None else self.kept[k]
+            scaled = Linearized((one * roots)[at], (slope * roots[:, None])[at], np.zeros((len(one[at]), 0)))
+            parts.append(replace(scaled, log_determinant=float(constant[at].sum())))
+        return parts
+
+    def _roots(self, k: int, weights: Weights) -> tuple[np.ndarray, np.ndarray]:
+        """Return the roots of the weights of a trial's rows, and constants that make squares twice a log-likelihood."""
+        variance = np.where(self.rows.reversing[k] & self.robust, weights.variances[1], weights.variances[0])
+        if not self.robust or weights.residuals is None:
+            return 1.0 / np.sqrt(variance), np.log(variance)
+        square = weights.residuals[k] ** 2 / variance
+        t = (FREEDOM + 1.0) / (FREEDOM + square)
+        constant = np.log(variance) + (FREEDOM + 1.0) * np.log1p(square / FREEDOM) - t * square
+        return np.sqrt(t / variance), constant
+
+    def _improved(self, left: Sequence[np.ndarray]) -> Weights:
+        """Return variances, and weights, that are likelier at residuals."""
+        slow = np.concatenate([r & self.robust for r in self.rows.reversing])
+        kept = np.ones(len(slow), bool) if self.kept is None else np.concatenate(list(self.kept))
+        flat = np.concatenate(left)
+        squares, variances = flat**2, []
+        floor = max(1e-12 * float(np.mean(np.concatenate(self.rows.efforts({HOLD: 0.0})) ** 2)), 1e-300)
+        for group in (~slow & kept, slow & kept):
+            some = squares[group] if group.sum() > FREEDOM else squares[kept]
+            variance = max(float(np.median(some)) if self.robust else float(np.mean(some)), floor)
+            for _ in range(30 * self.robust):
+                weight = (FREEDOM + 1.0) / (FREEDOM + some / variance)
+                variance = max(float(np.mean(weight * some)), floor)
+            variances.append(variance)
+        return Weights((variances[0], variances[1]), [np.array(r) for r in left] if self.robust else None)
+
+    def noise_step(self, values: Mapping[str, float], unknowns: Unknowns) -> float:
+        """Improve variances and weights; return by how much twice the negative log-likelihood falls."""
+        before = sum(float(p.residual @ p.residual) + p.log_determinant for p in self.linearize(values, unknowns))
+        self.weights = self._improved(self.residuals(values)[0])
+        after = sum(float(p.residual @ p.residual) + p.log_determinant for p in self.linearize(values, unknowns))
+        return before - after
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class EffortFit(Optimum):
+    """A fit of a set of causes.
+
+    Attributes
+    ----------
+    names
+        The set, in alphabetical order.
+    forms
+        Number of forms of each cause that are fitted, by name, where there are some.
+    weights
+        The noise at the end.
+    """
+
+    names: tuple[str, ...]
+    forms: Mapping[str, int]
+    weights: Weights

@@ -1,0 +1,168 @@
+"""The causes of a driven joint by its recorded efforts: searched, judged, and with final values."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from fes_pin.data.errors import InputError
+from fes_pin.data.study import Study
+from fes_pin.effort.columns import Links
+from fes_pin.effort.fits import EffortSets
+from fes_pin.effort.motion import Band, Record, band_of
+from fes_pin.effort.problem import HOLD, EffortFit, Rows
+from fes_pin.effort.verdict import EffortSearch, EffortState, EffortVerdict
+from fes_pin.infer.result import Cause, ParameterEstimate, Remainder
+from fes_pin.infer.scatter import as_wide_as_estimates_differ, as_wide_as_trials_differ, with_honest_intervals
+from fes_pin.infer.search import Search
+from fes_pin.infer.verdict import share_in, word_of
+from fes_pin.models.effects import effect_named
+from fes_pin.models.rigs.joint import Joint
+from fes_pin.models.rigs.rigid import load_urdf
+
+OTHER_BANDS = (0.7, 1.4)
+"""Bands in which a set is fitted again, as shares of its own: half of the power of the acceleration apart."""
+REFUSED_BAND = "the band does not carry the inertia: it moves by more than its interval between 0.7 and 1.4 of the band"
+"""Why no values are given."""
+NO_EFFORT = "no effort was recorded: what drives the joint is not in the trials"
+"""Why nothing is searched."""
+
+
+@dataclass(frozen=True)
+class EffortAnswer:
+    """What the efforts of a joint state.
+
+    Attributes
+    ----------
+    causes
+        In the order of their gain on held-out data.
+    nominal, extended
+        Parameters of the nominal and of the extended model.
+    remainder
+        Lack of fit of the extended model.
+    band_hz
+        Cut-off frequency of the low pass.
+    refusal
+        Why nothing is claimed, in words; None where something is.
+    """
+
+    verdict: str
+    causes: tuple[Cause, ...] = ()
+    nominal: Mapping[str, ParameterEstimate] | None = None
+    extended: Mapping[str, ParameterEstimate] | None = None
+    remainder: Remainder = Remainder(False, math.nan, None)
+    band_hz: float = math.nan
+    refusal: str | None = None
+
+    def to_json(self) -> str:
+        """Return the answer as JSON, by the names of a diagnosis."""
+        models = {"nominal": self.nominal or {}, "extended": self.extended or {}}
+        record: dict[str, Any] = {
+            "verdict": self.verdict,
+            "causes": [one.record() for one in self.causes],
+            "remainder": self.remainder.record(),
+            **{n: {"parameters": {k: x.record() for k, x in one.items()}} for n, one in models.items()},
+        }
+        return json.dumps(record)
+
+
+def search_effort(study: Study, seed: int = 0) -> EffortAnswer:
+    """Return the causes of a joint by least squares of its low-passed efforts.
+
+    Parameters
+    ----------
+    study
+        A study of a joint. Trials that it holds out are not used.
+
+    Raises
+    ------
+    InputError
+        The study is not of a joint, or its motion is not above the noise.
+    """
+    if study.rig != "joint" or study.urdf is None:
+        raise InputError(f"expected a study of a joint, found one of the rig {study.rig}", file=study.folder)
+    trials = [t for t in study.trials if t.role != "held_out"]
+    if any("effort" not in t.columns or "position" not in t.columns or not t["effort"].any() for t in trials):
+        return EffortAnswer("refused", refusal=NO_EFFORT)
+    records = [Record(t.name, t.time, t["position"], t["effort"], t.kind) for t in trials]
+    joint, links = Joint.of_study(study), Links.of(load_urdf(study.urdf))
+    values = {n: float(getattr(joint, n)) for n in ("inertia_scale", "damping", "gravity_scale")}
+    fitted = [n for n in joint.fitted if n != "gravity_scale" or links.cosine or links.sine]
+    band = band_of(records)
+
+    def sets_in(one: Band) -> EffortSets:
+        return EffortSets(Rows(records, one, links), values, fitted, seed)
+
+    search: EffortSearch = Search(sets_in(band), lambda share, words: None)
+    verdict = EffortVerdict(search)
+    state = verdict.of(search.run())
+    others = [sets_in(replace(band, low=r * band.low, wide=max(band.wide, r * band.low))) for r in OTHER_BANDS]
+    nominal, extended = (_final(verdict, one, others) for one in (state.found.nominal, state.found.best))
+    word = word_of(bool(state.names), state.weighed.lack_of_fit)
+    if _moves(extended, state.found.best, others):
+        return EffortAnswer("refused", band_hz=band.low, refusal=REFUSED_BAND, remainder=state.weighed.lack_of_fit)
+    units = joint.units()
+    return EffortAnswer(
+        word,
+        tuple(_causes(state, extended, units)),
+        _estimates(nominal, "", units),
+        _estimates(extended, "", units),
+        state.weighed.lack_of_fit,
+        band.low,
+    )
+
+
+def _final(verdict: EffortVerdict, fitted: EffortFit, others: Sequence[EffortSets]) -> EffortFit:
+    """Return a set by plain least squares, with intervals of pieces, of parts that are left out, and of other bands."""
+    plain = verdict.search.models.final(fitted)
+    wide = as_wide_as_trials_differ(with_honest_intervals(plain), verdict.refits(plain))
+    for sets in others:
+        wide = as_wide_as_estimates_differ(wide, sets.final(fitted))
+    return wide
+
+
+def _moves(final: EffortFit, fitted: EffortFit, others: Sequence[EffortSets]) -> bool:
+    """Return whether the inertia moves by more than its interval between bands."""
+    name = "inertia_scale"
+    if name not in final.free:
+        return False
+    again = [with_honest_intervals(sets.final(fitted)) for sets in others]
+    return any(abs(one.values[name] - final.values[name]) > final.reach(name) + one.reach(name) for one in again)
+
+
+def _estimates(fitted: EffortFit, name: str, units: Mapping[str, str]) -> dict[str, ParameterEstimate]:
+    """Return the estimates of a cause by its names, or of the nominal model for an empty name."""
+    info = effect_named(name).parameters() if name else Joint.parameters()
+    out = {}
+    for path in fitted.free:
+        cause, _, parameter = path.rpartition(".")
+        if cause == name and parameter != HOLD:
+            unit = info[parameter].unit.format_map(units) if parameter in info else ""
+            out[parameter] = ParameterEstimate.of(fitted, path, unit)
+    return out
+
+
+def _causes(state: EffortState, final: EffortFit, units: Mapping[str, str]) -> list[Cause]:
+    """Return the named causes, largest gain first."""
+    found, sets, out = state.found, state.search.models, []
+    for name, gain in state.weighed.gains.items():
+        near = sets.equivalents(found.best, found.without[name], found.rivals[name])
+        alike = sorted({n for f in near for n in f.names} - set(found.best.names))
+        out.append(
+            Cause(
+                name=name,
+                parameters=_estimates(final, name, units),
+                equivalents=tuple(alike),
+                p_value=found.p_values[name],
+                stage=effect_named(name).stage.value,
+                gain_fit=100.0 * share_in(found, name),
+                gain_held_out=gain,
+                evidence=state.weighed.evidence[name],
+            )
+        )
+    return sorted(out, key=lambda c: -c.gain_held_out.percent)

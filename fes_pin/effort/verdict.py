@@ -1,0 +1,126 @@
+"""The verdict on causes of an effort: parts of the data that are held out, and tests of lack of fit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from fes_pin.effort.fits import EffortSets
+from fes_pin.effort.problem import EffortFit
+from fes_pin.infer.distributions import f_tail
+from fes_pin.infer.held_out import FOLDS, Errors, added_likelihood, deal, held_out_gain
+from fes_pin.infer.levels import CLAIM_LEVEL
+from fes_pin.infer.projection import Projection
+from fes_pin.infer.result import Evidence, Remainder
+from fes_pin.infer.scatter import scores_of
+from fes_pin.infer.search import Search, SearchResult
+from fes_pin.infer.verdict import State, Verdict, Weighed
+
+PARTS = 4
+"""Parts of a trial that are held out by themselves where there are fewer trials than `FOLDS`."""
+PLACES = 7
+"""Places of the hat functions by which a residual is tested for a dependence on a variable."""
+
+EffortSearch = Search[EffortFit, EffortSets]
+EffortState = State[EffortFit, EffortSets, Weighed]
+
+
+def units_of(lengths: Sequence[int]) -> list[np.ndarray]:
+    """Return the unit of evidence of each row of each trial: a trial, or a quarter of one where there are few."""
+    parts = 1 if len(lengths) >= FOLDS else PARTS
+    return [parts * k + (parts * np.arange(n)) // n for k, n in enumerate(lengths)]
+
+
+class EffortVerdict(Verdict[EffortFit, EffortSets, Weighed]):
+    """The verdict: each cause must predict the effort of parts that were held out."""
+
+    def __init__(self, search: EffortSearch) -> None:
+        super().__init__(search)
+        self.units = units_of(search.models.rows.lengths)
+        count = int(self.units[-1][-1]) + 1
+        self.folds = [np.isin(np.arange(count), out) for out in deal(range(count))]
+        self._left: dict[tuple[object, ...], list[np.ndarray]] = {}
+
+    def refits(self, fitted: EffortFit) -> list[EffortFit]:
+        """Return plain fits of a set to all rows but those of each fold."""
+        final = self.search.models.final
+        return [final(fitted, [~fold[one] for one in self.units]) for fold in self.folds]
+
+    def left(self, fitted: EffortFit) -> list[np.ndarray]:
+        """Return what is left of the effort of each trial by fits without the part of a row."""
+        key = (fitted.names, *sorted(fitted.forms.items()))
+        if key not in self._left:
+            out = [np.zeros(len(one)) for one in self.units]
+            for fold, again in zip(self.folds, self.refits(fitted), strict=True):
+                problem = self.search.models.problem(again.names, again.forms)
+                for one, mine, unit in zip(out, problem.residuals(again.values)[0], self.units, strict=True):
+                    one[fold[unit]] = mine[fold[unit]]
+            self._left[key] = out
+        return self._left[key]
+
+    def weigh(self, found: SearchResult[EffortFit]) -> Weighed:
+        """Return gains of causes in the low-passed effort of parts that are held out, and the lack of fit."""
+        best = found.best
+        remainder = lack_of_fit(self.search.models, best)
+        if not best.names:
+            return Weighed({}, {}, remainder)
+        sets = {"": found.nominal, "+": best, **found.without}
+        problem = self.search.models.problem(best.names, best.forms, weights=best.weights)
+        roots = [problem._roots(k, best.weights)[0] for k in range(len(self.units))]
+        left = {n: [r * w for r, w in zip(self.left(f), roots, strict=True)] for n, f in sets.items()}
+        errors = {n: self._errors(one) for n, one in left.items()}
+        gains = {n: held_out_gain(errors[""], errors[n], errors["+"], self.search.models.seed) for n in found.without}
+        evidence = {}
+        for name, less in found.without.items():
+            added = added_likelihood(np.concatenate(left[name]), np.concatenate(left["+"]))
+            scatter = self.search.models.excess_scatter(best, less)
+            evidence[name] = Evidence(added.added / scatter, added.squares / scatter)
+        return Weighed(gains, evidence, remainder, is_robust=True)
+
+    def _errors(self, left: Sequence[np.ndarray]) -> Errors:
+        """Return squared errors by units of evidence; the spread is that of the effort's noise."""
+        unit, flat = np.concatenate(list(self.units)), np.concatenate(list(left))
+        count = np.bincount(unit).astype(float)
+        return Errors(np.bincount(unit, flat**2), count, count)
+
+
+def lack_of_fit(sets: EffortSets, fitted: EffortFit) -> Remainder:
+    """Return whether the residual depends on position, speed or time, by robust score tests of hat functions.
+
+    The scores of pieces of the data scatter about their mean as Hotelling's T^2 has it, whatever the noise.
+    """
+    tracks = sets.rows.tracks
+    variables = {
+        "position": [t.q[t.rows] for t in tracks],
+        "velocity": [t.v[t.rows] for t in tracks],
+        "time": [t.time[t.rows] / sets.rows.sizes.seconds for t in tracks],
+    }
+    found = {name: _depends(fitted, np.concatenate(many)) for name, many in variables.items()}
+    where = min(found, key=lambda n: found[n])
+    p = min(1.0, len(found) * found[where])
+    return Remainder(p < CLAIM_LEVEL, p, where if p < CLAIM_LEVEL else None, CLAIM_LEVEL)
+
+
+def _depends(fitted: EffortFit, variable: np.ndarray) -> float:
+    """Return the p-value of a dependence of the residual on a variable of each row, shape (m,)."""
+    projection = Projection(fitted.parts)
+    places = np.unique(np.quantile(variable, np.linspace(0.0, 1.0, PLACES)))
+    hats = np.stack([np.interp(variable, places, row) for row in np.eye(len(places))], axis=1)
+    left = projection(hats)
+    keep = np.sum(left**2, axis=0) > 1e-3 * np.sum(hats**2, axis=0)
+    if not keep.any():
+        return 1.0
+    basis, sizes, _ = np.linalg.svd(left[:, keep], full_matrices=False)
+    basis = basis[:, sizes > 1e-3 * sizes[0]]
+    ends = np.cumsum([len(p.residual) for p in fitted.parts])[:-1]
+    from dataclasses import replace
+
+    parts = [replace(p, jacobian=b) for p, b in zip(fitted.parts, np.split(basis, ends), strict=True)]
+    scores = scores_of(parts)
+    pieces, k = scores.shape
+    whole = scores.sum(axis=0)
+    about = scores - scores.mean(axis=0)
+    spread = about.T @ about * pieces / (pieces - 1.0)
+    square = float(whole @ np.linalg.lstsq(spread, whole, rcond=1e-9)[0])
+    return f_tail(square * (pieces - k) / (k * (pieces - 1.0)), k, pieces - k) if pieces > k else 1.0
