@@ -228,7 +228,7 @@ class CauseOfEffort:
 ANY, POSITIVE = (-math.inf, math.inf, 0.0), (0.0, math.inf, 0.0)
 
 
-def library(sizes: Sizes) -> dict[str, CauseOfEffort]:
+def library(sizes: Sizes, fastest: float) -> dict[str, CauseOfEffort]:
     """Return the causes of one joint by name, with the starts and bounds that the recorded motion gives."""
     s, creep, reach = sizes, SLOWLY * sizes.usual, sizes.reach
     stops = [{"side": side, "angle_rad": s.quantiles[q]} for side, qs in zip((1.0, -1.0), STOPS, strict=True) for q in qs]
@@ -284,8 +284,8 @@ def library(sizes: Sizes) -> dict[str, CauseOfEffort]:
             frame_vibration,
             None,
             {"coupling": (0.0, 5.0, 0.0)},
-            [{"frequency_hz": f, "damping_ratio": 0.05} for f in RINGS_HZ],
-            {"frequency_hz": (2.0, 60.0), "damping_ratio": (0.0, 0.2)},
+            [{"frequency_hz": f, "damping_ratio": 0.05} for f in RINGS_HZ if f < fastest],
+            {"frequency_hz": (2.0, fastest), "damping_ratio": (0.0, 0.2)},
         ),
         CauseOfEffort("effort_gain", None, None, {"error": (-0.9, 9.0, 0.05)}),
         CauseOfEffort("sensor_lag", None, None, {"lag_s": (0.0, 0.5, 0.005)}),

@@ -20,14 +20,18 @@ from fes_pin.infer.levels import CLAIM_LEVEL, CONFIDENCE_95
 from fes_pin.infer.maximise import alternate
 from fes_pin.infer.optimum import Optimum, minimise
 from fes_pin.infer.projection import Projection
+from fes_pin.infer.search import FITTED
 from fes_pin.infer.scatter import excess_scatter, least_apart, with_honest_intervals
 
 NOMINAL = {"inertia_scale": (1e-3, 1e3), "damping": (0.0, 1e8), "gravity_scale": (-10.0, 10.0)}
 """Bounds of the nominal parameters, as those of `models.rigs.joint`."""
 
 
+Forms = Mapping[str, tuple[int, ...]]
+
+
 def fit_of(
-    problem: EffortProblem, values: Values, forms: Mapping[str, int], by: type[EffortFit] = EffortFit
+    problem: EffortProblem, values: Values, forms: Forms, by: type[EffortFit] = EffortFit
 ) -> EffortFit:
     """Return the fit of a problem from start values."""
     found = alternate(problem, values)
@@ -64,22 +68,22 @@ class EffortSets(FittedSets[EffortFit, Values]):
         """How sets are fitted, in words."""
         return "least squares of the low-passed effort"
 
-    def limits(self, names: Sequence[str], forms: Mapping[str, int]) -> dict[str, tuple[float, float]]:
+    def limits(self, names: Sequence[str], forms: Forms) -> dict[str, tuple[float, float]]:
         """Return the bounds of what is fitted of a set, by name, the nominal parameters first."""
         out = dict(self.base)
         for name in names:
             cause = self.library[name]
             out |= {f"{name}.{n}": x[:2] for n, x in cause.amplitudes.items()}
             out |= {f"{name}.{n}": x for n, x in cause.free.items()}
-            for form in cause.forms[: forms.get(name, 0)]:
-                out |= {f"{name}.{n}": x[1:] for n, x in form.items()}
+            for k in forms.get(name, ()):
+                out |= {f"{name}.{n}": x[1:] for n, x in cause.forms[k].items()}
         return out
 
-    def problem(self, names: Sequence[str], forms: Mapping[str, int], **more: object) -> EffortProblem:
+    def problem(self, names: Sequence[str], forms: Forms, **more: object) -> EffortProblem:
         """Return the problem of a set."""
         return EffortProblem(self.rows, names, self.limits(names, forms), **more)  # type: ignore[arg-type]
 
-    def fit(self, names: Names, values: Values, forms: Mapping[str, int]) -> EffortFit:
+    def fit(self, names: Names, values: Values, forms: Forms) -> EffortFit:
         """Return the fit of a set from start values, which need not have those of the nominal model."""
         return fit_of(self.problem(names, forms), {**self.values, **values}, forms)
 
@@ -151,7 +155,7 @@ class EffortSets(FittedSets[EffortFit, Values]):
 
     def form_of(self, fitted: EffortFit) -> frozenset[Hashable]:
         """Return the forms of the causes in a fit."""
-        return frozenset((n, k) for n, many in fitted.forms.items() for k in range(many))
+        return frozenset((n, k) for n, many in fitted.forms.items() for k in many)
 
     def without(self, names: Names, name: str) -> EffortFit:
         """Return the fit of a set without one cause, in the forms that the others have in it."""
@@ -179,8 +183,25 @@ class EffortSets(FittedSets[EffortFit, Values]):
         return any(abs(fitted.values[n]) > CONFIDENCE_95 * honest.std(n) for n in sizes)
 
     def is_distinguished(self, best: EffortFit, without: EffortFit, rival: EffortFit, lead: float) -> bool:
-        """See `infer.scatter.least_apart`."""
-        return lead >= least_apart(best, rival)
+        """See `infer.scatter.least_apart`; the noise of neighbouring rows is alike, as the excess scatter says."""
+        excess = self.excess_scatter(best, without)
+        return lead / excess >= least_apart(_tempered(best, excess), _tempered(rival, excess))
+
+    def converge_rivals(self, names: Names, name: str) -> None:
+        """Fit the nearest sets that have another cause in the place of one in the forms of the best set."""
+        whole, rest = self.fits[names], tuple(n for n in names if n != name)
+        forms = {n: k for n, k in whole.forms.items() if n in rest}
+        rivals = sorted((k for k in self.fits if len(k) == len(names) and {*rest} < {*k} and k != names), key=self._by)
+        for rival in rivals[:FITTED]:
+            known = self.fits[rival]
+            if any(known.forms.get(n, ()) != k for n, k in forms.items()):
+                shared = {n: v for n, v in whole.values.items() if n.partition(".")[0] in rest}
+                again = self.fit(rival, {**known.values, **shared}, {**known.forms, **forms})
+                if again.criterion < known.criterion:
+                    self.fits[rival] = again
+
+    def _by(self, names: Names) -> float:
+        return self.fits[names].criterion
 
     def excess_scatter(self, larger: EffortFit, smaller: EffortFit) -> float:
         """See `infer.scatter.excess_scatter`."""
@@ -202,13 +223,12 @@ class EffortSets(FittedSets[EffortFit, Values]):
         """Return the set with a further form of one of its causes that is significant; None before all were tried."""
         if not self.takes_forms:
             return None
-        for name in fitted.names:
-            at = fitted.forms.get(name, 0)
-            if at >= len(self.library[name].forms):
+        known = [(n, k, one) for n in fitted.names for k, one in enumerate(self.library[n].forms)]
+        for name, k, form in known:
+            if k in fitted.forms.get(name, ()):
                 continue
-            forms = {**fitted.forms, name: at + 1}
-            start = {f"{name}.{n}": x[0] for n, x in self.library[name].forms[at].items()}
-            again = self.fit(fitted.names, {**fitted.values, **start}, forms)
+            forms = {**fitted.forms, name: tuple(sorted((*fitted.forms.get(name, ()), k)))}
+            again = self.fit(fitted.names, {**fitted.values, **{f"{name}.{n}": x[0] for n, x in form.items()}}, forms)
             if self.p_value(again, fitted) < CLAIM_LEVEL and self.is_possible(again):
                 return again
         return None
@@ -230,6 +250,12 @@ class EffortSets(FittedSets[EffortFit, Values]):
         """Return a set by plain least squares, from a fit of it, to all rows or to some."""
         problem = self.problem(fitted.names, fitted.forms, robust=False, kept=kept)
         return fit_of(problem, fitted.values, fitted.forms)
+
+
+def _tempered(fitted: EffortFit, excess: float) -> EffortFit:
+    """Return a fit with its log-likelihood divided by an excess of scatter."""
+    parts = [replace(p, residual=p.residual / math.sqrt(excess)) for p in fitted.parts]
+    return replace(fitted, parts=parts, sse=fitted.sse / excess)
 
 
 def _score(projection: Projection, columns: np.ndarray) -> tuple[float, list[float]]:

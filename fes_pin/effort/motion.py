@@ -23,6 +23,8 @@ QUIET = 0.7
 """Share of the Nyquist frequency above which a second difference of the reading is noise."""
 OF_POWER, TIMES = 0.98, 4.0
 """Share of the power of the velocity that the motion has below a frequency, and the band in units of that frequency."""
+ABOVE_NOISE = 4.0
+"""Ratio of spectra at which a motion is above the noise: spectra of a few segments scatter by a half."""
 SLOWEST_HZ, FASTEST_HZ = 3.0, 25.0
 """Least and largest band, Hz: limbs and laboratory joints under control move below, flexible modes lie above."""
 OF_RATE = 0.2
@@ -206,12 +208,13 @@ def band_of(records: Sequence[Record]) -> Band:
     dt = max(r.dt for r in records)
     noise = float(np.median([_noise(r) for r in records]))
     frequency, power = _pooled(records, lambda r: np.diff(r.reading) / r.dt, dt)
-    power = np.maximum(power - noise * (2.0 * np.sin(np.pi * frequency * dt) / dt) ** 2, 0.0)
-    if not power.sum() > 0.0:
+    of_noise = noise * (2.0 * np.sin(np.pi * frequency * dt) / dt) ** 2
+    below = power > ABOVE_NOISE * of_noise
+    last = int(np.argmin(below)) if not below.all() else len(power)
+    if not last:
         raise InputError("the recorded motion is not above the noise of its reading", column="position")
-    f98 = float(frequency[np.searchsorted(np.cumsum(power), OF_POWER * power.sum())])
-    above = power > noise * (2.0 * np.pi * frequency) ** 2
-    seen = float(frequency[max(int(np.argmin(above[1:])), 1)]) if not above[1:].all() else float(frequency[-1])
+    whole, seen = np.cumsum(power[:last] - of_noise[:last]), float(frequency[last - 1])
+    f98 = float(frequency[np.searchsorted(whole, OF_POWER * whole[-1])])
     most = OF_RATE / dt
     low = min(max(TIMES * f98, SLOWEST_HZ), max(min(FASTEST_HZ, most, seen), SLOWEST_HZ), most)
     while _noise_share(records, low, noise) > NOISE_SHARE and low > f98:

@@ -23,6 +23,8 @@ STEP = 1e-4
 """Step of a numerical derivative, as a share of the value or of the size at which a cause is tried."""
 KEPT_VIEWS = 24
 """Sets of tracks that are kept: one for each correction of the reading that is tried."""
+HEARD = 1.5
+"""Highest frequency of a frame that swings, in units of the band: the low pass leaves half of its amplitude."""
 HOLD = "hold_rows"
 """Rows by which an effort acts after it was recorded, a nuisance where the motion is imposed."""
 Columns = dict[str, np.ndarray]
@@ -46,7 +48,7 @@ class Rows:
         tracks = [Track(r, band) for r in records]
         self.tracks = [t for t in tracks if len(t.rows)]
         self.sizes = _sizes(self.tracks, links)
-        self.library = library(self.sizes)
+        self.library = library(self.sizes, max(HEARD * band.low, 3.5))
         self.reversing = [t.reversing(self.sizes.fast) for t in self.tracks]
         self._views: OrderedDict[Values, list[Track]] = OrderedDict()
         self._made: dict[object, list[Sequence[np.ndarray]]] = {}
@@ -262,11 +264,11 @@ class EffortFit(Optimum):
     names
         The set, in alphabetical order.
     forms
-        Number of forms of each cause that are fitted, by name, where there are some.
+        Numbers of the forms of each cause that are fitted, by name, where there are some.
     weights
         The noise at the end.
     """
 
     names: tuple[str, ...]
-    forms: Mapping[str, int]
+    forms: Mapping[str, tuple[int, ...]]
     weights: Weights

@@ -16,7 +16,7 @@ from harness.compare import compared
 from harness.generator import Item
 from harness.generators import GENERATORS, generator_of
 from harness.row import Row
-from harness.run import REGRESSION, TEN_LINES, rows_of, run
+from harness.run import EFFORT, REGRESSION, TEN_LINES, rows_of, run
 from harness.table import HEAD, against, counts, families, lines_of, notes, table, totals, worse, wrong
 
 
@@ -48,6 +48,7 @@ def main(
     compare: Annotated[Path | None, typer.Option(help="Another store: both on the same studies.")] = None,
     check: Annotated[bool, typer.Option("--check", help="Exit code 1 if worse than the committed page.")] = False,
     regression: Annotated[bool, typer.Option("--regression", help="The answers of a ten-line regression.")] = False,
+    by_effort: Annotated[bool, typer.Option("--effort", help="The answers of inverse dynamics, `fes_pin.effort`.")] = False,
     by_ten_lines: Annotated[bool, typer.Option("--ten-lines", help="Beside a ten-line fit of the motion.")] = False,
     limit: Annotated[float | None, typer.Option(min=0.0, help="Seconds that the search of a study may take.")] = None,
     draws: Annotated[int, typer.Option(min=2, help="Of `starts`: starts of each study.")] = varied.DRAWS,
@@ -69,13 +70,14 @@ def main(
             typer.echo(f"\n{name}\n\n{varied.shown(name, plan, answers)}")
             continue
         items = planned(name, count, seed, nulls, only or [])
-        label = Path(name).name + page.BY_REGRESSION * regression
+        by = EFFORT if by_effort else REGRESSION * regression
+        label = Path(name).name + f", {by}" * bool(by)
         file = store / f"{label}.jsonl" if store else None
         known = rows_of(file, None)
         rows = (
             [known[i.key] for i in items if i.key in known]
             if stored
-            else run(name, items, file, studies, workers, REGRESSION * regression, limit)
+            else run(name, items, file, studies, workers, by, limit)
         )
         typer.echo(f"\n{label}\n\n{shown(rows)}")
         if by_ten_lines:

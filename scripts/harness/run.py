@@ -20,6 +20,7 @@ import numpy as np
 
 import fes_pin as fp
 from fes_pin.data.sources import code_hash
+from fes_pin.effort import search as effort
 from harness import regression as regressions
 from harness import ten_lines
 from harness.generator import Generator, Item, Truth
@@ -27,10 +28,11 @@ from harness.generators import generator_of
 from harness.row import Row, judged
 
 TRUTH = "truth.json"
-REGRESSION, TEN_LINES = "regression", "ten lines"
+REGRESSION, TEN_LINES, EFFORT = "regression", "ten lines", "effort"
 ESTIMATORS: dict[str, tuple[Callable[[fp.Study], Any], Any]] = {
     REGRESSION: (regressions.regressed, regressions),
     TEN_LINES: (ten_lines.solved, ten_lines),
+    EFFORT: (effort.search_effort, effort),
 }
 """What answers instead of the package, and the module that holds it."""
 GRACE = 3.0
