@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import pinocchio as pin
+from scipy.signal import bilinear, lfilter
 
 from fes_pin.effort.motion import Track
 from fes_pin.models.rigs.rigid import gravity_coefficients, joint_inertia, joint_is_revolute
@@ -134,8 +135,6 @@ def joint_stop(track: Track, x: Values, sizes: Sizes) -> Sequence[np.ndarray]:
 
 def passive_relaxation(track: Track, x: Values, sizes: Sizes) -> Sequence[np.ndarray]:
     """Return a spring in series with a damper."""
-    from scipy.signal import lfilter  # half a second, which other rigs need not wait for
-
     keeps = math.exp(-track.dt / x["relaxation_s"])
     rest = lfilter([1.0 - keeps], [1.0, -keeps], track.q - track.q[0]) + track.q[0]
     return (track.low(track.q - rest),)
@@ -157,8 +156,6 @@ def frame_vibration(track: Track, x: Values, sizes: Sizes) -> Sequence[np.ndarra
 
     With H = s^2 / (s^2 + 2 zeta omega s + omega^2) the believed inertia has the effort coupling H q''.
     """
-    from scipy.signal import bilinear, lfilter
-
     omega = 2.0 * math.pi * x["frequency_hz"]
     b, a = bilinear([1.0, 0.0, 0.0], [1.0, 2.0 * x["damping_ratio"] * omega, omega**2], 1.0 / track.dt)
     return (track.low(sizes.links.inertia * lfilter(b, a, track.a)),)
@@ -231,7 +228,9 @@ ANY, POSITIVE = (-math.inf, math.inf, 0.0), (0.0, math.inf, 0.0)
 def library(sizes: Sizes, fastest: float) -> dict[str, CauseOfEffort]:
     """Return the causes of one joint by name, with the starts and bounds that the recorded motion gives."""
     s, creep, reach = sizes, SLOWLY * sizes.usual, sizes.reach
-    stops = [{"side": side, "angle_rad": s.quantiles[q]} for side, qs in zip((1.0, -1.0), STOPS, strict=True) for q in qs]
+    stops = [
+        {"side": side, "angle_rad": s.quantiles[q]} for side, qs in zip((1.0, -1.0), STOPS, strict=True) for q in qs
+    ]
     friction = {"creep_speed": creep, "stiction": 0.0, "stribeck_speed": STRIBECK * s.usual}
     softer = {"creep_speed": (creep, 0.1 * creep, 20.0 * creep)}
     sticks = {"stiction": (0.2, 0.0, 3.0), "stribeck_speed": (STRIBECK * s.usual, 0.5 * creep, s.usual)}
@@ -242,7 +241,9 @@ def library(sizes: Sizes, fastest: float) -> dict[str, CauseOfEffort]:
     places = [{"place": k} for k in (1.0, 0.0, 2.0)] if s.links.turns else [{"place": 0.0}]
     hardens = {"hardening_per_rad2": (1.0 / reach**2, 0.0, 1e3 / reach**2)}
     causes = [
-        CauseOfEffort("coulomb_friction", coulomb_friction, None, {"torque_nm": POSITIVE}, [friction], {}, [softer, sticks]),
+        CauseOfEffort(
+            "coulomb_friction", coulomb_friction, None, {"torque_nm": POSITIVE}, [friction], {}, [softer, sticks]
+        ),
         CauseOfEffort("quadratic_damping", quadratic_damping, None, {"coefficient": POSITIVE}),
         CauseOfEffort("effort_offset", effort_offset, None, {"offset": ANY}),
         CauseOfEffort(
@@ -293,7 +294,11 @@ def library(sizes: Sizes, fastest: float) -> dict[str, CauseOfEffort]:
         CauseOfEffort("sensor_drift", None, sensor_drift, {"rate_per_s": (-most, most, 0.02 * reach / s.seconds)}),
         CauseOfEffort("sensor_gain", None, sensor_gain, {"error": (-0.5, 1.0, 0.02)}, places),
         CauseOfEffort(
-            "sensor_nonlinearity", None, sensor_nonlinearity, {"curvature": (-2 / reach, 2 / reach, 0.02 / reach)}, places
+            "sensor_nonlinearity",
+            None,
+            sensor_nonlinearity,
+            {"curvature": (-2 / reach, 2 / reach, 0.02 / reach)},
+            places,
         ),
         CauseOfEffort("backlash", None, backlash, {"half_width": (0.0, 0.5 * reach, PLAYS[0] * reach)}),
     ]

@@ -10,18 +10,16 @@ from functools import cached_property
 import numpy as np
 
 from fes_pin.effort.columns import CauseOfEffort, Values
-from fes_pin.effort.motion import WIDER, Band, Record
-from fes_pin.effort.problem import HELD_ROWS, HOLD, EffortFit, EffortProblem, Rows, own
-from fes_pin.infer import scatter
+from fes_pin.effort.problem import HELD_ROWS, HOLD, EffortFit, EffortProblem, Rows
 from fes_pin.infer.distributions import chi2_tail
 from fes_pin.infer.family import Family
 from fes_pin.infer.fits import Candidate, FittedSets, Names
 from fes_pin.infer.levels import CLAIM_LEVEL, CONFIDENCE_95
 from fes_pin.infer.maximise import alternate
-from fes_pin.infer.optimum import Optimum, minimise
+from fes_pin.infer.optimum import Optimum
 from fes_pin.infer.projection import Projection
-from fes_pin.infer.search import FITTED
 from fes_pin.infer.scatter import excess_scatter, least_apart, with_honest_intervals
+from fes_pin.infer.search import FITTED
 
 NOMINAL = {"inertia_scale": (1e-3, 1e3), "damping": (0.0, 1e8), "gravity_scale": (-10.0, 10.0)}
 """Bounds of the nominal parameters, as those of `models.rigs.joint`."""
@@ -31,13 +29,15 @@ Forms = Mapping[str, tuple[int, ...]]
 
 
 def fit_of(
-    problem: EffortProblem, values: Values, forms: Forms, by: type[EffortFit] = EffortFit
+    problem: EffortProblem,
+    values: Values,
+    forms: Forms,
 ) -> EffortFit:
     """Return the fit of a problem from start values."""
     found = alternate(problem, values)
-    assert problem.weights is not None
+    assert problem.variances is not None
     known = {n: getattr(found, n) for n in Optimum.__dataclass_fields__}
-    return by(**known, names=problem.names, forms=forms, weights=problem.weights)
+    return EffortFit(**known, names=problem.names, forms=forms, variances=problem.variances)
 
 
 class EffortSets(FittedSets[EffortFit, Values]):
@@ -114,10 +114,15 @@ class EffortSets(FittedSets[EffortFit, Values]):
         (size,) = (tried[n] for n in amplitudes)
         return [((a - b) / size)[:, None] for a, b in zip(without, there, strict=True)]
 
+    def roots(self, fitted: EffortFit) -> list[np.ndarray]:
+        """Return the roots of the weights of each trial's rows in a fit."""
+        problem = self.problem(fitted.names, fitted.forms)
+        left, _ = problem.residuals(fitted.values)
+        return [problem.roots(k, one, fitted.variances)[0] for k, one in enumerate(left)]
+
     def _whitened(self, base: EffortFit, name: str) -> list[np.ndarray]:
         """Return the columns of a candidate at each place where it is tried, whitened, shape (m, amplitudes)."""
-        problem, cause = self.problem(base.names, base.forms, weights=base.weights), self.library[name]
-        roots = [problem._roots(k, base.weights)[0] for k in range(len(self.rows.tracks))]
+        cause, roots = self.library[name], self.roots(base)
         each = [self._slopes(base, cause, tried) for tried in self._tried[name]]
         return [np.concatenate([s * r[:, None] for s, r in zip(one, roots, strict=True)]) for one in each]
 
@@ -131,7 +136,8 @@ class EffortSets(FittedSets[EffortFit, Values]):
                 limits = list(self.library[name].amplitudes.values())
                 sizes = [min(max(s, x[0]), x[1]) for s, x in zip(sizes, limits, strict=True)]
                 if any(sizes) and (best is None or gain > best[0]):
-                    best = gain, {**tried, **dict(zip((f"{name}.{n}" for n in self.library[name].amplitudes), sizes))}
+                    named = zip((f"{name}.{n}" for n in self.library[name].amplitudes), sizes, strict=True)
+                    best = gain, {**tried, **dict(named)}
             if best is not None:
                 out[name] = Candidate(best[0], best[1])
         return out

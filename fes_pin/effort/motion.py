@@ -243,9 +243,7 @@ def _noise(record: Record) -> float:
     return float(np.median(power[high] / (2.0 * np.sin(np.pi * frequency[high] * record.dt)) ** 4))
 
 
-def _pooled(
-    records: Sequence[Record], of: Callable[[Record], np.ndarray], dt: float
-) -> tuple[np.ndarray, np.ndarray]:
+def _pooled(records: Sequence[Record], of: Callable[[Record], np.ndarray], dt: float) -> tuple[np.ndarray, np.ndarray]:
     """Return the mean spectrum of a signal of trials, each weighed by its length."""
     grid = np.arange(0.5 / SEGMENT_S, 0.5 / dt, 0.5 / SEGMENT_S)
     each = [(len(r.time), *_spectrum(of(r), r.dt)) for r in records]

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fes_pin.effort.columns import CauseOfEffort, Links, Sizes, Values, library, nominal_columns
+from fes_pin.effort.columns import Links, Sizes, Values, library, nominal_columns
 from fes_pin.effort.motion import Band, Record, Track
 from fes_pin.infer.optimum import Optimum
 from fes_pin.infer.problem import Linearized, Problem, Unknowns
@@ -19,6 +19,8 @@ FREEDOM = 6.0
 (Lange, Little and Taylor, J. Am. Stat. Assoc. 84:881, 1989, who find 4 to 8)."""
 HELD_ROWS = 0.5
 """Rows by which a command acts late that is held until the next."""
+ROUNDS, UNHEARD = 40, 1e-12
+"""Steps of a variance under the weights of Student's t, and its least share of the mean square of the effort."""
 STEP = 1e-4
 """Step of a numerical derivative, as a share of the value or of the size at which a cause is tried."""
 KEPT_VIEWS = 24
@@ -126,22 +128,6 @@ def _sizes(tracks: Sequence[Track], links: Links) -> Sizes:
     return Sizes(float(q.min()), float(q.max()), usual, fast, seconds, quantiles, links)
 
 
-@dataclass(frozen=True)
-class Weights:
-    """Noise of the rows: variances of usual rows and of those near reversals, and the weights of Student's t.
-
-    Attributes
-    ----------
-    variances
-        Of rows that do not reverse, and of those that do.
-    residuals
-        Of each trial, at which the weights were taken; None for a Gaussian.
-    """
-
-    variances: tuple[float, float]
-    residuals: Sequence[np.ndarray] | None = None
-
-
 class EffortProblem(Problem):
     """The effort of a set of causes.
 
@@ -155,8 +141,8 @@ class EffortProblem(Problem):
         Names of the fitted parameters.
     limits
         Their bounds.
-    weights
-        Noise to begin with; None to begin with that of the first residuals.
+    variances
+        Of the noise of usual rows and of those near reversals; None to begin with those of the first residuals.
     robust
         Whether weights are those of Student's t with a variance of its own near reversals; else all rows count alike.
     kept
@@ -170,12 +156,12 @@ class EffortProblem(Problem):
         rows: Rows,
         names: Sequence[str],
         limits: dict[str, tuple[float, float]],
-        weights: Weights | None = None,
+        variances: tuple[float, float] | None = None,
         robust: bool = True,
         kept: Sequence[np.ndarray] | None = None,
     ) -> None:
         self.rows, self.names, self.limits, self.free = rows, tuple(names), limits, tuple(limits)
-        self.weights, self.robust, self.kept = weights, robust, kept
+        self.variances, self.robust, self.kept = variances, robust, kept
 
     def start_unknowns(self) -> Unknowns:
         """Return no unknowns, one empty mapping a trial."""
@@ -211,48 +197,60 @@ class EffortProblem(Problem):
     def linearize(self, values: Values, unknowns: Unknowns) -> list[Linearized]:
         """Return residuals and sensitivities of the fitted rows by their standard deviation."""
         left, slopes = self.sensitivities(values, self.free)
-        if self.weights is None:
-            self.weights = self._improved(left)
+        if self.variances is None:
+            self.variances = self._likelier(left)
         parts = []
         for k, (one, slope) in enumerate(zip(left, slopes, strict=True)):
-            roots, constant = self._roots(k, self.weights)
+            roots, constant = self.roots(k, one, self.variances)
             at = slice(None) if self.kept is None else self.kept[k]
             scaled = Linearized((one * roots)[at], (slope * roots[:, None])[at], np.zeros((len(one[at]), 0)))
             parts.append(replace(scaled, log_determinant=float(constant[at].sum())))
         return parts
 
-    def _roots(self, k: int, weights: Weights) -> tuple[np.ndarray, np.ndarray]:
-        """Return the roots of the weights of a trial's rows, and constants that make squares twice a log-likelihood."""
-        variance = np.where(self.rows.reversing[k] & self.robust, weights.variances[1], weights.variances[0])
-        if not self.robust or weights.residuals is None:
-            return 1.0 / np.sqrt(variance), np.log(variance)
-        square = weights.residuals[k] ** 2 / variance
-        t = (FREEDOM + 1.0) / (FREEDOM + square)
-        constant = np.log(variance) + (FREEDOM + 1.0) * np.log1p(square / FREEDOM) - t * square
-        return np.sqrt(t / variance), constant
+    def roots(self, k: int, left: np.ndarray, variances: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
+        """Return the roots of the weights of a trial's rows at residuals, and what makes squares a likelihood.
 
-    def _improved(self, left: Sequence[np.ndarray]) -> Weights:
-        """Return variances, and weights, that are likelier at residuals."""
+        With weights (nu + 1) / (nu + r^2 / s^2) the squares have the slope of Student's likelihood.
+        """
+        variance = np.where(self.rows.reversing[k] & self.robust, variances[1], variances[0])
+        if not self.robust:
+            return 1.0 / np.sqrt(variance), np.log(variance)
+        square = left**2 / variance
+        weight = (FREEDOM + 1.0) / (FREEDOM + square)
+        constant = np.log(variance) + (FREEDOM + 1.0) * np.log1p(square / FREEDOM) - weight * square
+        return np.sqrt(weight / variance), constant
+
+    def _likelier(self, left: Sequence[np.ndarray]) -> tuple[float, float]:
+        """Return the variances that are likeliest at residuals."""
         slow = np.concatenate([r & self.robust for r in self.rows.reversing])
         kept = np.ones(len(slow), bool) if self.kept is None else np.concatenate(list(self.kept))
-        flat = np.concatenate(left)
-        squares, variances = flat**2, []
-        floor = max(1e-12 * float(np.mean(np.concatenate(self.rows.efforts({HOLD: 0.0})) ** 2)), 1e-300)
+        squares, variances = np.concatenate(left) ** 2, []
+        floor = max(UNHEARD * float(np.mean(np.concatenate(self.rows.efforts({HOLD: 0.0})) ** 2)), 1e-300)
         for group in (~slow & kept, slow & kept):
             some = squares[group] if group.sum() > FREEDOM else squares[kept]
-            variance = max(float(np.median(some)) if self.robust else float(np.mean(some)), floor)
-            for _ in range(30 * self.robust):
+            variance = max(float(np.mean(some)), floor)
+            for _ in range(ROUNDS * self.robust):
                 weight = (FREEDOM + 1.0) / (FREEDOM + some / variance)
                 variance = max(float(np.mean(weight * some)), floor)
             variances.append(variance)
-        return Weights((variances[0], variances[1]), [np.array(r) for r in left] if self.robust else None)
+        return variances[0], variances[1]
 
     def noise_step(self, values: Mapping[str, float], unknowns: Unknowns) -> float:
-        """Improve variances and weights; return by how much twice the negative log-likelihood falls."""
-        before = sum(float(p.residual @ p.residual) + p.log_determinant for p in self.linearize(values, unknowns))
-        self.weights = self._improved(self.residuals(values)[0])
-        after = sum(float(p.residual @ p.residual) + p.log_determinant for p in self.linearize(values, unknowns))
-        return before - after
+        """Improve the variances; return by how much twice the negative log-likelihood falls."""
+        left, _ = self.residuals(values)
+        before = self._cost(left)
+        self.variances = self._likelier(left)
+        return before - self._cost(left)
+
+    def costs(self, points: Sequence[tuple[Values, Unknowns]]) -> list[float]:
+        """Return twice the negative log-likelihood at several points."""
+        return [self._cost(self.residuals(values)[0]) for values, _ in points]
+
+    def _cost(self, left: Sequence[np.ndarray]) -> float:
+        assert self.variances is not None
+        each = ((r, *self.roots(k, r, self.variances), k) for k, r in enumerate(left))
+        rows = (np.square(r * root) + constant for r, root, constant, _ in each)
+        return float(sum(x[slice(None) if self.kept is None else self.kept[k]].sum() for k, x in enumerate(rows)))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -265,10 +263,10 @@ class EffortFit(Optimum):
         The set, in alphabetical order.
     forms
         Numbers of the forms of each cause that are fitted, by name, where there are some.
-    weights
-        The noise at the end.
+    variances
+        Of the noise at the end.
     """
 
     names: tuple[str, ...]
     forms: Mapping[str, tuple[int, ...]]
-    weights: Weights
+    variances: tuple[float, float]

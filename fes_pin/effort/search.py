@@ -8,8 +8,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-
 from fes_pin.data.errors import InputError
 from fes_pin.data.study import Study
 from fes_pin.effort.columns import Links
@@ -31,6 +29,9 @@ REFUSED_BAND = "the band does not carry the inertia: it moves by more than its i
 """Why no values are given."""
 NO_EFFORT = "no effort was recorded: what drives the joint is not in the trials"
 """Why nothing is searched."""
+
+NOT_TESTED = Remainder(False, math.nan, None)
+"""The lack of fit of a model that was not fitted."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,7 @@ class EffortAnswer:
     causes: tuple[Cause, ...] = ()
     nominal: Mapping[str, ParameterEstimate] | None = None
     extended: Mapping[str, ParameterEstimate] | None = None
-    remainder: Remainder = Remainder(False, math.nan, None)
+    remainder: Remainder = NOT_TESTED
     band_hz: float = math.nan
     refusal: str | None = None
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -66,8 +67,7 @@ class EffortVerdict(Verdict[EffortFit, EffortSets, Weighed]):
         if not best.names:
             return Weighed({}, {}, remainder)
         sets = {"": found.nominal, "+": best, **found.without}
-        problem = self.search.models.problem(best.names, best.forms, weights=best.weights)
-        roots = [problem._roots(k, best.weights)[0] for k in range(len(self.units))]
+        roots = self.search.models.roots(best)
         left = {n: [r * w for r, w in zip(self.left(f), roots, strict=True)] for n, f in sets.items()}
         errors = {n: self._errors(one) for n, one in left.items()}
         gains = {n: held_out_gain(errors[""], errors[n], errors["+"], self.search.models.seed) for n in found.without}
@@ -114,8 +114,6 @@ def _depends(fitted: EffortFit, variable: np.ndarray) -> float:
     basis, sizes, _ = np.linalg.svd(left[:, keep], full_matrices=False)
     basis = basis[:, sizes > 1e-3 * sizes[0]]
     ends = np.cumsum([len(p.residual) for p in fitted.parts])[:-1]
-    from dataclasses import replace
-
     parts = [replace(p, jacobian=b) for p, b in zip(fitted.parts, np.split(basis, ends), strict=True)]
     scores = scores_of(parts)
     pieces, k = scores.shape
