@@ -8,6 +8,7 @@ to the reading is a view: the reading is corrected, and all columns are made aga
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -27,6 +28,8 @@ SLOWLY = 0.05
 """Speed at which friction has most of its size, as a share of the usual speed, until data show another."""
 STRIBECK = 0.1
 """Speed over which stiction falls, as a share of the usual speed, where a fit starts."""
+PRESLIDING = 1e-3
+"""Way over which friction builds up, as a share of the range, where a fit starts, as the catalogue has it."""
 STOPS = ((0.98, 0.93, 0.85, 0.7), (0.02, 0.07, 0.15, 0.3))
 """Quantiles of the position at which an upper and a lower stop are tried."""
 RELAXING_S = (0.08, 0.3, 1.2)
@@ -105,9 +108,22 @@ def nominal_columns(track: Track, links: Links, tilt: float = 0.0) -> dict[str, 
 
 
 def coulomb_friction(track: Track, x: Values, sizes: Sizes) -> Sequence[np.ndarray]:
-    """Return dry friction, with stiction that falls over the Stribeck speed."""
+    """Return dry friction, with stiction that falls over the Stribeck speed, or that builds up over a way."""
     stiction = 1.0 + x["stiction"] * np.exp(-((track.v / x["stribeck_speed"]) ** 2))
-    return (track.low(np.tanh(track.v / x["creep_speed"]) * stiction),)
+    share = presliding(track.q, x["presliding"]) if x["presliding"] else np.tanh(track.v / x["creep_speed"])
+    return (track.low(share * stiction),)
+
+
+def presliding(q: np.ndarray, way: float) -> np.ndarray:
+    """Return the share of friction that acts along a motion, shape (n,): way z' = |v| (sign(v) - z), from z = 0."""
+    moved = np.diff(q, prepend=q[0])
+    sign, ways = np.sign(moved), np.cumsum(np.abs(moved)) / way
+    turns = np.flatnonzero(np.diff(sign, prepend=0.0, append=0.0))
+    share, last, out = 0.0, 0.0, np.zeros(len(q))
+    for start, end in itertools.pairwise([*turns, len(q)] if not len(turns) or turns[-1] < len(q) else turns):
+        out[start:end] = sign[start] + (share - sign[start]) * np.exp(last - ways[start:end])
+        share, last = float(out[end - 1]), float(ways[end - 1])
+    return out
 
 
 def quadratic_damping(track: Track, x: Values, sizes: Sizes) -> Sequence[np.ndarray]:
@@ -231,9 +247,10 @@ def library(sizes: Sizes, fastest: float) -> dict[str, CauseOfEffort]:
     stops = [
         {"side": side, "angle_rad": s.quantiles[q]} for side, qs in zip((1.0, -1.0), STOPS, strict=True) for q in qs
     ]
-    friction = {"creep_speed": creep, "stiction": 0.0, "stribeck_speed": STRIBECK * s.usual}
+    friction = {"creep_speed": creep, "stiction": 0.0, "stribeck_speed": STRIBECK * s.usual, "presliding": 0.0}
     softer = {"creep_speed": (creep, 0.1 * creep, 20.0 * creep)}
     sticks = {"stiction": (0.2, 0.0, 3.0), "stribeck_speed": (STRIBECK * s.usual, 0.5 * creep, s.usual)}
+    builds_up = {"presliding": (PRESLIDING * reach, 0.0, 0.1 * reach)}
     rests = [{"rest_angle_rad": x, "hardening_per_rad2": 0.0} for x in (s.quantiles[0.5], s.low, s.high)]
     slowest = 1.0 / s.seconds
     waves = 2.0 * math.pi / reach
@@ -242,7 +259,13 @@ def library(sizes: Sizes, fastest: float) -> dict[str, CauseOfEffort]:
     hardens = {"hardening_per_rad2": (1.0 / reach**2, 0.0, 1e3 / reach**2)}
     causes = [
         CauseOfEffort(
-            "coulomb_friction", coulomb_friction, None, {"torque_nm": POSITIVE}, [friction], {}, [softer, sticks]
+            "coulomb_friction",
+            coulomb_friction,
+            None,
+            {"torque_nm": POSITIVE},
+            [friction],
+            {},
+            [softer, sticks, builds_up],
         ),
         CauseOfEffort("quadratic_damping", quadratic_damping, None, {"coefficient": POSITIVE}),
         CauseOfEffort("effort_offset", effort_offset, None, {"offset": ANY}),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -14,7 +14,7 @@ from fes_pin.effort.problem import HELD_ROWS, HOLD, EffortFit, EffortProblem, Ro
 from fes_pin.infer.distributions import chi2_tail
 from fes_pin.infer.family import Family
 from fes_pin.infer.fits import Candidate, FittedSets, Names
-from fes_pin.infer.levels import CLAIM_LEVEL, CONFIDENCE_95
+from fes_pin.infer.levels import CONFIDENCE_95, DRIVEN_LEVEL
 from fes_pin.infer.maximise import alternate
 from fes_pin.infer.optimum import Optimum
 from fes_pin.infer.projection import Projection
@@ -221,6 +221,10 @@ class EffortSets(FittedSets[EffortFit, Values]):
         single = [float(chi2_tail(c.gain, len(self.library[n].amplitudes))) for n, c in known.items()]
         return self.family.adjusted(min(single, default=1.0))
 
+    def level(self, fitted: EffortFit) -> float:
+        """Return the level of a claim where a random torque may act."""
+        return DRIVEN_LEVEL
+
     def leaves_noise(self, fitted: EffortFit) -> bool:
         """Return False: a further cause need not lower an error that is of the fitted rows."""
         return False
@@ -229,15 +233,26 @@ class EffortSets(FittedSets[EffortFit, Values]):
         """Return the set with a further form of one of its causes that is significant; None before all were tried."""
         if not self.takes_forms:
             return None
-        known = [(n, k, one) for n in fitted.names for k, one in enumerate(self.library[n].forms)]
-        for name, k, form in known:
-            if k in fitted.forms.get(name, ()):
-                continue
-            forms = {**fitted.forms, name: tuple(sorted((*fitted.forms.get(name, ()), k)))}
-            again = self.fit(fitted.names, {**fitted.values, **{f"{name}.{n}": x[0] for n, x in form.items()}}, forms)
-            if self.p_value(again, fitted) < CLAIM_LEVEL and self.is_possible(again):
-                return again
-        return None
+        tried = [self._in_form(fitted, n, k, own) for n, k, own in self._further_forms(fitted)]
+        better = (f for f in tried if self.is_possible(f) and self.p_value(f, fitted) < self.level(f))
+        return min(better, key=lambda f: f.criterion, default=None)
+
+    def _further_forms(self, fitted: EffortFit) -> Iterator[tuple[str, int, tuple[int, ...]]]:
+        """Return a cause, a form that it lacks, and all its forms then: with those that it has, and in their place."""
+        for name in fitted.names:
+            has = fitted.forms.get(name, ())
+            for k in range(len(self.library[name].forms)):
+                if k not in has:
+                    yield name, k, (*has, k)
+                    if has:
+                        yield name, k, (k,)
+
+    def _in_form(self, fitted: EffortFit, name: str, k: int, own: tuple[int, ...]) -> EffortFit:
+        forms = self.library[name].forms
+        nulls = {n for j, one in enumerate(forms) if j not in own for n in one}
+        start = {n: self.library[name].shapes[0][n] for n in nulls} | {n: x[0] for n, x in forms[k].items()}
+        values = {**fitted.values, **{f"{name}.{n}": v for n, v in start.items()}}
+        return self.fit(fitted.names, values, {**fitted.forms, name: tuple(sorted(own))})
 
     def begin_again(self, names: Names) -> bool:
         """Take forms of causes in, and return whether the set has a better one.

@@ -48,7 +48,9 @@ def main(
     compare: Annotated[Path | None, typer.Option(help="Another store: both on the same studies.")] = None,
     check: Annotated[bool, typer.Option("--check", help="Exit code 1 if worse than the committed page.")] = False,
     regression: Annotated[bool, typer.Option("--regression", help="The answers of a ten-line regression.")] = False,
-    by_effort: Annotated[bool, typer.Option("--effort", help="The answers of inverse dynamics, `fes_pin.effort`.")] = False,
+    by_effort: Annotated[
+        bool, typer.Option("--effort", help="The answers of inverse dynamics, `fes_pin.effort`.")
+    ] = False,
     by_ten_lines: Annotated[bool, typer.Option("--ten-lines", help="Beside a ten-line fit of the motion.")] = False,
     limit: Annotated[float | None, typer.Option(min=0.0, help="Seconds that the search of a study may take.")] = None,
     draws: Annotated[int, typer.Option(min=2, help="Of `starts`: starts of each study.")] = varied.DRAWS,
