@@ -14,12 +14,13 @@ from fes_pin.effort.problem import HELD_ROWS, HOLD, EffortFit, EffortProblem, Ro
 from fes_pin.infer.distributions import chi2_tail
 from fes_pin.infer.family import Family
 from fes_pin.infer.fits import Candidate, FittedSets, Names
-from fes_pin.infer.levels import CONFIDENCE_95, DRIVEN_LEVEL
+from fes_pin.infer.levels import CONFIDENCE_95, DRIVEN_LEVEL, SEPARABLE
 from fes_pin.infer.maximise import alternate
 from fes_pin.infer.optimum import Optimum
 from fes_pin.infer.projection import Projection
 from fes_pin.infer.scatter import excess_scatter, least_apart, with_honest_intervals
 from fes_pin.infer.search import FITTED
+from fes_pin.models.effects import effect_named
 
 NOMINAL = {"inertia_scale": (1e-3, 1e3), "damping": (0.0, 1e8), "gravity_scale": (-10.0, 10.0)}
 """Bounds of the nominal parameters, as those of `models.rigs.joint`."""
@@ -84,8 +85,19 @@ class EffortSets(FittedSets[EffortFit, Values]):
         return EffortProblem(self.rows, names, self.limits(names, forms), **more)  # type: ignore[arg-type]
 
     def fit(self, names: Names, values: Values, forms: Forms) -> EffortFit:
-        """Return the fit of a set from start values, which need not have those of the nominal model."""
-        return fit_of(self.problem(names, forms), {**self.values, **values}, forms)
+        """Return the fit of a set from start values, which need not have those of the nominal model.
+
+        A shape that ends at its bound is held where it started, if that is hardly less likely: the data do not show it.
+        """
+        problem, start = self.problem(names, forms), {**self.values, **values}
+        found = fit_of(problem, start, forms)
+        unseen = {f"{n}.{x}" for n in names for x in self.library[n].free} & {*found.at_bound}
+        if not unseen:
+            return found
+        limits = {n: x for n, x in problem.limits.items() if n not in unseen}
+        begun = {**found.values, **{n: start[n] for n in unseen}}
+        held = fit_of(EffortProblem(self.rows, names, limits, problem.variances), begun, forms)
+        return held if held.sse < found.sse + SEPARABLE else found
 
     def nominal(self) -> EffortFit:
         """Fit the nominal model."""
@@ -183,10 +195,20 @@ class EffortSets(FittedSets[EffortFit, Values]):
         return not any("." not in n and n != HOLD and fitted.values[n] != 0.0 for n in fitted.at_bound)
 
     def is_certain(self, fitted: EffortFit, name: str) -> bool:
-        """Return whether an amplitude of a cause is twice its deviation."""
-        honest = with_honest_intervals(fitted)
-        sizes = [f"{name}.{n}" for n in self.library[name].amplitudes]
-        return any(abs(fitted.values[n]) > CONFIDENCE_95 * honest.std(n) for n in sizes)
+        """Return whether an amplitude of a cause, or its product with a shape, is twice its deviation.
+
+        A spring whose stiffness is confounded with gravity may still have a certain torque at its rest angle's zero.
+        """
+        honest, info = with_honest_intervals(fitted), effect_named(name).parameters()
+        slopes = [{f"{name}.{n}": 1.0} for n in self.library[name].amplitudes]
+        products = ((f"{name}.{n}", f"{name}.{one.times}") for n, one in info.items() if one.times)
+        slopes += [{a: fitted.values[b], b: fitted.values[a]} for a, b in products if a in fitted.free]
+        for slope in slopes:
+            at, by = [fitted.place(n) for n in slope], np.array([*slope.values()])
+            size = math.prod(fitted.values[n] for n in slope)
+            if abs(size) > CONFIDENCE_95 * math.sqrt(max(float(by @ honest.covariance[np.ix_(at, at)] @ by), 0.0)):
+                return True
+        return False
 
     def is_distinguished(self, best: EffortFit, without: EffortFit, rival: EffortFit, lead: float) -> bool:
         """See `infer.scatter.least_apart`; the noise of neighbouring rows is alike, as the excess scatter says."""
