@@ -225,12 +225,17 @@ def band_of(records: Sequence[Record]) -> Band:
     return band
 
 
-def _noise_share(records: Sequence[Record], low: float, noise: float) -> float:
-    """Return the share of the noise of the reading in the variance of the low-passed acceleration.
+def noise_of_bend(band: Band) -> float:
+    """Return the variance of the low-passed acceleration by the noise of the reading.
 
-    The noise of power S has the variance S (2 pi)^4 times the integral of f^4 exp(-ln 2 (f / low)^2).
+    White noise of power S has S (2 pi)^4 times the integral of f^4 exp(-ln 2 (f / low)^2).
     """
-    variance = noise * (2.0 * math.pi) ** 4 * 0.375 * math.sqrt(math.pi) * (low / math.sqrt(math.log(2.0))) ** 5
+    return band.noise * (2.0 * math.pi) ** 4 * 0.375 * math.sqrt(math.pi) * (band.low / math.sqrt(math.log(2.0))) ** 5
+
+
+def _noise_share(records: Sequence[Record], low: float, noise: float) -> float:
+    """Return the share of the noise of the reading in the variance of the low-passed acceleration."""
+    variance = noise_of_bend(Band(low, low, noise))
     tracks = [Track(r, Band(low, WIDER * low)) for r in records]
     bends = [t.moved(2) for t in tracks if len(t.rows)]
     return variance / max(float(np.mean(np.concatenate(bends) ** 2)), 1e-300) if bends else math.inf

@@ -8,13 +8,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from fes_pin.data.errors import InputError
 from fes_pin.data.study import Study
 from fes_pin.effort.columns import Links
 from fes_pin.effort.fits import EffortSets
-from fes_pin.effort.motion import Band, Record, band_of
+from fes_pin.effort.motion import Band, Record, band_of, noise_of_bend
 from fes_pin.effort.problem import HOLD, EffortFit, Rows
 from fes_pin.effort.verdict import EffortSearch, EffortState, EffortVerdict
+from fes_pin.infer.covariance import covariance_of
+from fes_pin.infer.problem import normal_equations
 from fes_pin.infer.result import Cause, ParameterEstimate, Remainder
 from fes_pin.infer.scatter import as_wide_as_estimates_differ, as_wide_as_trials_differ, with_honest_intervals
 from fes_pin.infer.search import Search
@@ -119,12 +123,43 @@ def search_effort(study: Study, seed: int = 0) -> EffortAnswer:
 
 
 def _final(verdict: EffortVerdict, fitted: EffortFit, others: Sequence[EffortSets]) -> EffortFit:
-    """Return a set by plain least squares, with intervals of pieces, of parts that are left out, and of other bands."""
-    plain = verdict.search.models.final(fitted)
+    """Return a set by plain least squares, with intervals that contain errors of form.
+
+    They are those of the scores of pieces, as wide as parts that are left out differ, and they include the difference
+    to each other estimate where that is significant: by Student's weights, without the rows near reversals, where the
+    form of friction matters most, and in other bands.
+    """
+    sets = verdict.search.models
+    plain = sets.final(fitted)
     wide = as_wide_as_trials_differ(with_honest_intervals(plain), verdict.refits(plain))
-    for sets in others:
-        wide = as_wide_as_estimates_differ(wide, sets.final(fitted))
-    return wide
+    moving = [~near_to(r) for r in sets.rows.reversing]
+    again = [fitted, *(one.final(fitted) for one in others)]
+    if all(one.sum() > len(plain.free) for one in moving):
+        again.append(sets.final(fitted, moving))
+    for other in again:
+        wide = as_wide_as_estimates_differ(wide, other)
+    return _with_noisy_regressor(wide, sets.rows)
+
+
+def near_to(some: np.ndarray) -> np.ndarray:
+    """Return which rows are some, or neighbours of these, shape (m,) of bool."""
+    return np.asarray(np.convolve(some, np.ones(3), mode="same") > 0.5)
+
+
+def _with_noisy_regressor(fitted: EffortFit, rows: Rows) -> EffortFit:
+    """Return a fit with intervals that include the attenuation by the noise of the acceleration.
+
+    With C the covariance of a right model and n rows, noise of variance s^2 in the column of a parameter J moves the
+    estimate by C_J n s^2 J / variance (Fuller, Measurement Error Models, 1987).
+    """
+    name = "inertia_scale"
+    if name not in fitted.free:
+        return fitted
+    system = normal_equations(fitted.parts)
+    known = covariance_of(system.hessian, np.isin(fitted.free, fitted.at_bound, invert=True))[:, fitted.place(name)]
+    power = rows.links.inertia**2 * noise_of_bend(rows.band) / fitted.variances[0]
+    bias = np.where(np.isfinite(known), known, 0.0) * fitted.samples * power * fitted.values[name]
+    return replace(fitted, covariance=fitted.covariance + np.outer(bias, bias))
 
 
 def _moves(final: EffortFit, fitted: EffortFit, others: Sequence[EffortSets]) -> bool:
