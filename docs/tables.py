@@ -218,7 +218,7 @@ def public_text() -> str:
 
 REASONED = (
     *("infer", "identify", "remainder", "search", "prepare", "faults"),
-    *("diagnosis", "contrasts", "walk", "comparison", "cohort", "verdict"),
+    *("diagnosis", "contrasts", "walk", "comparison", "cohort", "verdict", "effort"),
     "models/plausibility.py",
 )
 """Rooms of inference, and a file of another room, whose numbers are listed with their reasons."""

@@ -1,5 +1,6 @@
 """The imports run one way: cohort -> verdict -> view -> front ends -> faults -> search -> identify -> models -> data;
-and control -> allocation -> muscles -> body. No front end (diagnosis, contrasts, comparison, walk) imports another.
+and control -> allocation -> muscles -> body. No front end (diagnosis, contrasts, comparison, walk, effort) imports
+another.
 
 Inference (infer) knows no rig and no body: all may use it, and it uses nothing of ours but `workers`.
 The controller takes eq. (1) from paper, which takes recruitment from muscles. Measured walking (walk) reads the body,
@@ -27,6 +28,7 @@ ALLOWED = {
     "diagnosis": {"faults", "prepare", "search", "remainder", "identify", "models", "data"},
     "contrasts": {"faults", "prepare", "search", "remainder", "identify", "models", "data"},
     "comparison": {"prepare", "search", "identify", "models", "data"},
+    "effort": {"models", "data"},
     "paper": {"muscles", "body", "data"},
     "body": {"data"},
     "walk": {"body", "models", "data"},

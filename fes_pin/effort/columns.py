@@ -239,6 +239,7 @@ class CauseOfEffort:
 
 
 ANY, POSITIVE = (-math.inf, math.inf, 0.0), (0.0, math.inf, 0.0)
+"""Bounds of amplitudes of a torque, which need no size at which they are tried."""
 
 
 def library(sizes: Sizes, fastest: float) -> dict[str, CauseOfEffort]:

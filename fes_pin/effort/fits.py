@@ -19,7 +19,7 @@ from fes_pin.infer.maximise import alternate
 from fes_pin.infer.optimum import Optimum
 from fes_pin.infer.projection import Projection
 from fes_pin.infer.scatter import excess_scatter, least_apart, with_honest_intervals
-from fes_pin.infer.search import FITTED
+from fes_pin.infer.search import BEAM, FITTED
 from fes_pin.models.effects import effect_named
 
 NOMINAL = {"inertia_scale": (1e-3, 1e3), "damping": (0.0, 1e8), "gravity_scale": (-10.0, 10.0)}
@@ -104,6 +104,22 @@ class EffortSets(FittedSets[EffortFit, Values]):
         self.fits[()] = self.fit((), {}, {})
         return self.fits[()]
 
+    def first(self) -> Names:
+        """Return the best two causes where neither is significant alone, and each is given the other; else none.
+
+        Friction and drag bend a torque to opposite sides: one without the other leaves an error of form that scatters.
+        """
+        none = self.fits[()]
+        self.extend(())
+        best = self.fits[self.ranked(1)[0]]
+        if not self.noise_p_value(none.sse - best.sse, 1) < self.level(best) <= self.p_value(best, none):
+            return ()
+        for names in self.ranked(1)[:BEAM]:
+            self.extend(names, FITTED)
+        pair = self.fits[self.ranked(2)[0]]
+        given = (self.p_value(pair, self.without(pair.names, n)) for n in pair.names)
+        return pair.names if self.is_possible(pair) and all(p < self.level(pair) for p in given) else ()
+
     @cached_property
     def _tried(self) -> dict[str, list[dict[str, float]]]:
         """The values of each cause at which it is tried, by its name."""
@@ -140,7 +156,7 @@ class EffortSets(FittedSets[EffortFit, Values]):
 
     def candidates(self, base: EffortFit) -> Mapping[str, Candidate[Values]]:
         """Return the causes that a set lacks, with the gain of their score and the place where that is largest."""
-        projection, out = Projection(base.parts), {}
+        projection, out = Projection(base.parts), dict[str, Candidate[Values]]()
         for name in (n for n in self.library if n not in base.names):
             best: tuple[float, dict[str, float]] | None = None
             for tried, columns in zip(self._tried[name], self._whitened(base, name), strict=True):

@@ -18,6 +18,7 @@ import numpy as np
 from scipy.special import erfcx
 
 from fes_pin.data.errors import InputError
+from fes_pin.infer.levels import SMALL_SHARE
 
 QUIET = 0.7
 """Share of the Nyquist frequency above which a second difference of the reading is noise."""
@@ -44,6 +45,9 @@ REVERSING, AROUND_S = 0.04, 0.02
 """Speed, as a share of a fast one, below which a joint reverses, and the time around it, s: friction is uncertain."""
 SEGMENT_S = 4.0
 """Segments of a spectrum, s: they resolve a quarter of a hertz."""
+
+BELOW_NOISE = "the recorded motion is not above the noise of its reading"
+"""Why there is no band."""
 
 
 @dataclass(frozen=True)
@@ -212,17 +216,24 @@ def band_of(records: Sequence[Record]) -> Band:
     below = power > ABOVE_NOISE * of_noise
     last = int(np.argmin(below)) if not below.all() else len(power)
     if not last:
-        raise InputError("the recorded motion is not above the noise of its reading", column="position")
+        raise InputError(BELOW_NOISE, column="position")
     whole, seen = np.cumsum(power[:last] - of_noise[:last]), float(frequency[last - 1])
     f98 = float(frequency[np.searchsorted(whole, OF_POWER * whole[-1])])
     most = OF_RATE / dt
     low = min(max(TIMES * f98, SLOWEST_HZ), max(min(FASTEST_HZ, most, seen), SLOWEST_HZ), most)
     while _noise_share(records, low, noise) > NOISE_SHARE and low > f98:
         low *= NARROWER
+    if _noise_share(records, low, noise) > SMALL_SHARE:
+        raise InputError(BELOW_NOISE, column="position")
     band = Band(low, min(max(WIDER * low, seen), most), noise)
-    if not any(len(Track(r, band).rows) for r in records):
+    if not has_rows(records, band):
         raise InputError("every trial is shorter than the filter of its band", column="position")
     return band
+
+
+def has_rows(records: Sequence[Record], band: Band) -> bool:
+    """Return whether a trial is longer than the filter of a band."""
+    return any(len(Track(r, band).rows) for r in records)
 
 
 def noise_of_bend(band: Band) -> float:
@@ -250,7 +261,7 @@ def _noise(record: Record) -> float:
 
 def _pooled(records: Sequence[Record], of: Callable[[Record], np.ndarray], dt: float) -> tuple[np.ndarray, np.ndarray]:
     """Return the mean spectrum of a signal of trials, each weighed by its length."""
-    grid = np.arange(0.5 / SEGMENT_S, 0.5 / dt, 0.5 / SEGMENT_S)
+    grid = np.arange(1.0 / SEGMENT_S, 0.5 / dt, 0.5 / SEGMENT_S)
     each = [(len(r.time), *_spectrum(of(r), r.dt)) for r in records]
     return grid, np.average([np.interp(grid, f, p) for _, f, p in each], axis=0, weights=[n for n, _, _ in each])
 

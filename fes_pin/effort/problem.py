@@ -52,7 +52,7 @@ class Rows:
         self.sizes = _sizes(self.tracks, links)
         self.library = library(self.sizes, max(HEARD * band.low, 3.5))
         self.reversing = [t.reversing(self.sizes.fast) for t in self.tracks]
-        self._views: OrderedDict[Values, list[Track]] = OrderedDict()
+        self._views: OrderedDict[object, list[Track]] = OrderedDict()
         self._made: dict[object, list[Sequence[np.ndarray]]] = {}
         self._nominal: dict[object, list[Columns]] = {}
 

@@ -14,7 +14,7 @@ from fes_pin.data.errors import InputError
 from fes_pin.data.study import Study
 from fes_pin.effort.columns import Links
 from fes_pin.effort.fits import EffortSets
-from fes_pin.effort.motion import Band, Record, band_of, noise_of_bend
+from fes_pin.effort.motion import Band, Record, band_of, has_rows, noise_of_bend
 from fes_pin.effort.problem import HOLD, EffortFit, Rows
 from fes_pin.effort.verdict import EffortSearch, EffortState, EffortVerdict
 from fes_pin.infer.covariance import covariance_of
@@ -97,7 +97,7 @@ def search_effort(study: Study, seed: int = 0) -> EffortAnswer:
     records = [Record(t.name, t.time, t["position"], t["effort"], t.kind) for t in trials]
     joint, links = Joint.of_study(study), Links.of(load_urdf(study.urdf))
     values = {n: float(getattr(joint, n)) for n in ("inertia_scale", "damping", "gravity_scale")}
-    fitted = [n for n in joint.fitted if n != "gravity_scale" or links.cosine or links.sine]
+    fitted = [n for n in joint.fitted or () if n != "gravity_scale" or links.cosine or links.sine]
     band = band_of(records)
 
     def sets_in(one: Band) -> EffortSets:
@@ -106,7 +106,8 @@ def search_effort(study: Study, seed: int = 0) -> EffortAnswer:
     search: EffortSearch = Search(sets_in(band), lambda share, words: None)
     verdict = EffortVerdict(search)
     state = verdict.of(search.run())
-    others = [sets_in(replace(band, low=r * band.low, wide=max(band.wide, r * band.low))) for r in OTHER_BANDS]
+    bands = [replace(band, low=r * band.low, wide=max(band.wide, r * band.low)) for r in OTHER_BANDS]
+    others = [sets_in(one) for one in bands if has_rows(records, one)]
     nominal, extended = (_final(verdict, one, others) for one in (state.found.nominal, state.found.best))
     word = word_of(bool(state.names), state.weighed.lack_of_fit)
     if _moves(extended, state.found.best, others):
@@ -143,7 +144,7 @@ def _final(verdict: EffortVerdict, fitted: EffortFit, others: Sequence[EffortSet
 
 def near_to(some: np.ndarray) -> np.ndarray:
     """Return which rows are some, or neighbours of these, shape (m,) of bool."""
-    return np.asarray(np.convolve(some, np.ones(3), mode="same") > 0.5)
+    return np.asarray(np.convolve(some, [1, 1, 1], mode="same") > 0.5)
 
 
 def _with_noisy_regressor(fitted: EffortFit, rows: Rows) -> EffortFit:

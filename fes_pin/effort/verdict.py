@@ -22,6 +22,8 @@ PARTS = 4
 """Parts of a trial that are held out by themselves where there are fewer trials than `FOLDS`."""
 PLACES = 7
 """Places of the hat functions by which a residual is tested for a dependence on a variable."""
+KEPT_OF = 1e-3
+"""Share of a hat function, and of the largest direction of all, that the fitted parameters must leave."""
 
 EffortSearch = Search[EffortFit, EffortSets]
 EffortState = State[EffortFit, EffortSets, Weighed]
@@ -108,11 +110,11 @@ def _depends(fitted: EffortFit, variable: np.ndarray) -> float:
     places = np.unique(np.quantile(variable, np.linspace(0.0, 1.0, PLACES)))
     hats = np.stack([np.interp(variable, places, row) for row in np.eye(len(places))], axis=1)
     left = projection(hats)
-    keep = np.sum(left**2, axis=0) > 1e-3 * np.sum(hats**2, axis=0)
+    keep = np.sum(left**2, axis=0) > KEPT_OF * np.sum(hats**2, axis=0)
     if not keep.any():
         return 1.0
     basis, sizes, _ = np.linalg.svd(left[:, keep], full_matrices=False)
-    basis = basis[:, sizes > 1e-3 * sizes[0]]
+    basis = basis[:, sizes > KEPT_OF * sizes[0]]
     ends = np.cumsum([len(p.residual) for p in fitted.parts])[:-1]
     parts = [replace(p, jacobian=b) for p, b in zip(fitted.parts, np.split(basis, ends), strict=True)]
     scores = scores_of(parts)
