@@ -17,12 +17,12 @@ import numpy as np
 import pinocchio as pin
 from scipy.signal import bilinear, lfilter
 
-from fes_pin.effort.motion import Track
+from fes_pin.effort.motion import Motion
 from fes_pin.models.rigs.rigid import gravity_coefficients, joint_inertia, joint_is_revolute
 
 Values = Mapping[str, float]
 """Values by name; those of a cause as `cause.parameter`, within its own functions as `parameter`."""
-Torques = Callable[[Track, Values, "Sizes"], Sequence[np.ndarray]]
+Torques = Callable[[Motion, Values, "Sizes"], Sequence[np.ndarray]]
 
 SLOWLY = 0.05
 """Speed at which friction has most of its size, as a share of the usual speed, until data show another."""
@@ -101,13 +101,13 @@ class Links:
         return math.atan2(-self.cosine, self.sine) if self.turns and (self.cosine or self.sine) else 0.0
 
 
-def nominal_columns(track: Track, links: Links, tilt: float = 0.0) -> dict[str, np.ndarray]:
+def nominal_columns(track: Motion, links: Links, tilt: float = 0.0) -> dict[str, np.ndarray]:
     """Return the columns of the nominal model at the rows of a trial."""
     gravity = track.low(links.gravity(track.q, tilt)) if links.cosine or links.sine else np.zeros(len(track.rows))
     return {"inertia_scale": links.inertia * track.moved(2), "damping": track.moved(1), "gravity_scale": gravity}
 
 
-def coulomb_friction(track: Track, x: Values, sizes: Sizes) -> Sequence[np.ndarray]:
+def coulomb_friction(track: Motion, x: Values, sizes: Sizes) -> Sequence[np.ndarray]:
     """Return dry friction, with stiction that falls over the Stribeck speed, or that builds up over a way."""
     stiction = 1.0 + x["stiction"] * np.exp(-((track.v / x["stribeck_speed"]) ** 2))
     share = presliding(track.q, x["presliding"]) if x["presliding"] else np.tanh(track.v / x["creep_speed"])
@@ -126,17 +126,17 @@ def presliding(q: np.ndarray, way: float) -> np.ndarray:
     return out
 
 
-def quadratic_damping(track: Track, x: Values, sizes: Sizes) -> Sequence[np.ndarray]:
+def quadratic_damping(track: Motion, x: Values, sizes: Sizes) -> Sequence[np.ndarray]:
     """Return drag in proportion to the square of the speed."""
     return (track.low(track.v * np.abs(track.v)),)
 
 
-def effort_offset(track: Track, x: Values, sizes: Sizes) -> Sequence[np.ndarray]:
+def effort_offset(track: Motion, x: Values, sizes: Sizes) -> Sequence[np.ndarray]:
     """Return a constant effort in addition to the recorded one."""
     return (-np.ones(len(track.rows)),)
 
 
-def parallel_stiffness(track: Track, x: Values, sizes: Sizes) -> Sequence[np.ndarray]:
+def parallel_stiffness(track: Motion, x: Values, sizes: Sizes) -> Sequence[np.ndarray]:
     """Return a spring."""
     away = track.moved(0) - x["rest_angle_rad"]
     if x["hardening_per_rad2"]:
@@ -144,30 +144,30 @@ def parallel_stiffness(track: Track, x: Values, sizes: Sizes) -> Sequence[np.nda
     return (away,)
 
 
-def joint_stop(track: Track, x: Values, sizes: Sizes) -> Sequence[np.ndarray]:
+def joint_stop(track: Motion, x: Values, sizes: Sizes) -> Sequence[np.ndarray]:
     """Return a stiff limit at an angle."""
     return (track.low(x["side"] * np.maximum(x["side"] * (track.q - x["angle_rad"]), 0.0)),)
 
 
-def passive_relaxation(track: Track, x: Values, sizes: Sizes) -> Sequence[np.ndarray]:
+def passive_relaxation(track: Motion, x: Values, sizes: Sizes) -> Sequence[np.ndarray]:
     """Return a spring in series with a damper."""
     keeps = math.exp(-track.dt / x["relaxation_s"])
     rest = lfilter([1.0 - keeps], [1.0, -keeps], track.q - track.q[0]) + track.q[0]
     return (track.low(track.q - rest),)
 
 
-def periodic_torque(track: Track, x: Values, sizes: Sizes) -> Sequence[np.ndarray]:
+def periodic_torque(track: Motion, x: Values, sizes: Sizes) -> Sequence[np.ndarray]:
     """Return a torque that is periodic in time."""
     phase = 2.0 * math.pi * x["frequency_hz"] * track.time
     return track.low(-np.sin(phase)), track.low(-np.cos(phase))
 
 
-def cogging(track: Track, x: Values, sizes: Sizes) -> Sequence[np.ndarray]:
+def cogging(track: Motion, x: Values, sizes: Sizes) -> Sequence[np.ndarray]:
     """Return a torque that is periodic in the angle."""
     return track.low(-np.sin(x["waves"] * track.q)), track.low(-np.cos(x["waves"] * track.q))
 
 
-def frame_vibration(track: Track, x: Values, sizes: Sizes) -> Sequence[np.ndarray]:
+def frame_vibration(track: Motion, x: Values, sizes: Sizes) -> Sequence[np.ndarray]:
     """Return the effort that a swinging frame takes, to first order in its coupling.
 
     With H = s^2 / (s^2 + 2 zeta omega s + omega^2) the believed inertia has the effort coupling H q''.
@@ -177,34 +177,34 @@ def frame_vibration(track: Track, x: Values, sizes: Sizes) -> Sequence[np.ndarra
     return (track.low(sizes.links.inertia * lfilter(b, a, track.a)),)
 
 
-def sensor_offset(track: Track, x: Values, sizes: Sizes) -> np.ndarray:
+def sensor_offset(track: Motion, x: Values, sizes: Sizes) -> np.ndarray:
     """Return the reading without a constant."""
     return np.asarray(track.reading - x["offset"])
 
 
-def sensor_drift(track: Track, x: Values, sizes: Sizes) -> np.ndarray:
+def sensor_drift(track: Motion, x: Values, sizes: Sizes) -> np.ndarray:
     """Return the reading without a ramp in time."""
     return np.asarray(track.reading - x["rate_per_s"] * track.time)
 
 
-def _origin(track: Track, x: Values, sizes: Sizes) -> float:
+def _origin(track: Motion, x: Values, sizes: Sizes) -> float:
     return float((np.median(track.reading[:5]), sizes.links.idle, 0.0)[round(x["place"])])
 
 
-def sensor_gain(track: Track, x: Values, sizes: Sizes) -> np.ndarray:
+def sensor_gain(track: Motion, x: Values, sizes: Sizes) -> np.ndarray:
     """Return the reading with its deviations from a place divided by the gain."""
     origin = _origin(track, x, sizes)
     return np.asarray(origin + (track.reading - origin) / (1.0 + x["error"]))
 
 
-def sensor_nonlinearity(track: Track, x: Values, sizes: Sizes) -> np.ndarray:
+def sensor_nonlinearity(track: Motion, x: Values, sizes: Sizes) -> np.ndarray:
     """Return the y of which y + curvature y^2 is the deviation of the reading from a place."""
     origin = _origin(track, x, sizes)
     away = track.reading - origin
     return np.asarray(origin + 2.0 * away / (1.0 + np.sqrt(np.maximum(1.0 + 4.0 * x["curvature"] * away, 0.25))))
 
 
-def backlash(track: Track, x: Values, sizes: Sizes) -> np.ndarray:
+def backlash(track: Motion, x: Values, sizes: Sizes) -> np.ndarray:
     """Return the reading on the driven side of a play, which it crosses about where it reverses."""
     return np.asarray(track.reading + x["half_width"] * np.tanh(track.v / (SLOWLY * sizes.usual)))
 
@@ -231,7 +231,7 @@ class CauseOfEffort:
 
     name: str
     torques: Torques | None = None
-    view: Callable[[Track, Values, Sizes], np.ndarray] | None = None
+    view: Callable[[Motion, Values, Sizes], np.ndarray] | None = None
     amplitudes: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
     shapes: Sequence[Values] = ({},)
     free: Mapping[str, tuple[float, float]] = field(default_factory=dict)

@@ -127,7 +127,7 @@ class Record:
         return float(self.time[-1] - self.time[0]) / (len(self.time) - 1)
 
 
-class Track:
+class Motion:
     """One trial in a band: its motion, and the common low pass, at rows.
 
     Parameters
@@ -233,7 +233,7 @@ def band_of(records: Sequence[Record]) -> Band:
 
 def has_rows(records: Sequence[Record], band: Band) -> bool:
     """Return whether a trial is longer than the filter of a band."""
-    return any(len(Track(r, band).rows) for r in records)
+    return any(len(Motion(r, band).rows) for r in records)
 
 
 def noise_of_bend(band: Band) -> float:
@@ -247,7 +247,7 @@ def noise_of_bend(band: Band) -> float:
 def _noise_share(records: Sequence[Record], low: float, noise: float) -> float:
     """Return the share of the noise of the reading in the variance of the low-passed acceleration."""
     variance = noise_of_bend(Band(low, low, noise))
-    tracks = [Track(r, Band(low, WIDER * low)) for r in records]
+    tracks = [Motion(r, Band(low, WIDER * low)) for r in records]
     bends = [t.moved(2) for t in tracks if len(t.rows)]
     return variance / max(float(np.mean(np.concatenate(bends) ** 2)), 1e-300) if bends else math.inf
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fes_pin.effort.columns import Links, Sizes, Values, library, nominal_columns
-from fes_pin.effort.motion import Band, Record, Track
+from fes_pin.effort.motion import Band, Motion, Record
 from fes_pin.infer.optimum import Optimum
 from fes_pin.infer.problem import Linearized, Problem, Unknowns
 
@@ -19,13 +19,13 @@ FREEDOM = 6.0
 (Lange, Little and Taylor, J. Am. Stat. Assoc. 84:881, 1989, who find 4 to 8)."""
 HELD_ROWS = 0.5
 """Rows by which a command acts late that is held until the next."""
-ROUNDS, UNHEARD = 40, 1e-12
+ROUNDS, NEGLIGIBLE = 40, 1e-12
 """Steps of a variance under the weights of Student's t, and its least share of the mean square of the effort."""
 STEP = 1e-4
 """Step of a numerical derivative, as a share of the value or of the size at which a cause is tried."""
 KEPT_VIEWS = 24
 """Sets of tracks that are kept: one for each correction of the reading that is tried."""
-HEARD = 1.5
+PASSED = 1.5
 """Highest frequency of a frame that swings, in units of the band: the low pass leaves half of its amplitude."""
 HOLD = "hold_rows"
 """Rows by which an effort acts after it was recorded, a nuisance where the motion is imposed."""
@@ -47,12 +47,12 @@ class Rows:
 
     def __init__(self, records: Sequence[Record], band: Band, links: Links) -> None:
         self.band, self.links = band, links
-        tracks = [Track(r, band) for r in records]
+        tracks = [Motion(r, band) for r in records]
         self.tracks = [t for t in tracks if len(t.rows)]
         self.sizes = _sizes(self.tracks, links)
-        self.library = library(self.sizes, max(HEARD * band.low, 3.5))
+        self.library = library(self.sizes, max(PASSED * band.low, 3.5))
         self.reversing = [t.reversing(self.sizes.fast) for t in self.tracks]
-        self._views: OrderedDict[object, list[Track]] = OrderedDict()
+        self._views: OrderedDict[object, list[Motion]] = OrderedDict()
         self._made: dict[object, list[Sequence[np.ndarray]]] = {}
         self._nominal: dict[object, list[Columns]] = {}
 
@@ -61,7 +61,7 @@ class Rows:
         """Rows of each trial."""
         return [len(t.rows) for t in self.tracks]
 
-    def seen(self, values: Values, names: Sequence[str]) -> tuple[object, list[Track]]:
+    def seen(self, values: Values, names: Sequence[str]) -> tuple[object, list[Motion]]:
         """Return the tracks as sensor causes of a set have them, with a key."""
         views = [self.library[n] for n in names if self.library[n].view is not None]
         key = tuple((c.name, *own(values, c.name).items()) for c in views)
@@ -72,7 +72,7 @@ class Rows:
             for cause in views:
                 assert cause.view is not None
                 many = [(t, cause.view(t, own(values, cause.name), self.sizes)) for t in tracks]
-                tracks = [Track(t.record, t.band, reading) for t, reading in many]
+                tracks = [Motion(t.record, t.band, reading) for t, reading in many]
             self._views[key] = tracks
             if len(self._views) > KEPT_VIEWS:
                 self._views.popitem(last=False)
@@ -119,7 +119,7 @@ def own(values: Values, name: str) -> dict[str, float]:
     return {n.removeprefix(f"{name}."): v for n, v in values.items() if n.startswith(f"{name}.")}
 
 
-def _sizes(tracks: Sequence[Track], links: Links) -> Sizes:
+def _sizes(tracks: Sequence[Motion], links: Links) -> Sizes:
     q, v = (np.concatenate([getattr(t, n) for t in tracks]) for n in "qv")
     marks = (0.02, 0.07, 0.15, 0.3, 0.5, 0.7, 0.85, 0.93, 0.98)
     quantiles = dict(zip(marks, map(float, np.quantile(q, marks)), strict=True))
@@ -225,7 +225,7 @@ class EffortProblem(Problem):
         slow = np.concatenate([r & self.robust for r in self.rows.reversing])
         kept = np.ones(len(slow), bool) if self.kept is None else np.concatenate(list(self.kept))
         squares, variances = np.concatenate(left) ** 2, []
-        floor = max(UNHEARD * float(np.mean(np.concatenate(self.rows.efforts({HOLD: 0.0})) ** 2)), 1e-300)
+        floor = max(NEGLIGIBLE * float(np.mean(np.concatenate(self.rows.efforts({HOLD: 0.0})) ** 2)), 1e-300)
         for group in (~slow & kept, slow & kept):
             some = squares[group] if group.sum() > FREEDOM else squares[kept]
             variance = max(float(np.mean(some)), floor)

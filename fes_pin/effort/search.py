@@ -29,8 +29,10 @@ from fes_pin.models.rigs.rigid import load_urdf
 
 OTHER_BANDS = (0.7, 1.4)
 """Bands in which a set is fitted again, as shares of its own: half of the power of the acceleration apart."""
-REFUSED_BAND = "the band does not carry the inertia: it moves by more than its interval between 0.7 and 1.4 of the band"
+NOT_CARRIED = "the band does not carry the inertia: it moves by more than its interval between 0.7 and 1.4 of the band"
 """Why no values are given."""
+REJECTED = "rejected"
+"""Verdict where `refusal` says why nothing is claimed."""
 NO_EFFORT = "no effort was recorded: what drives the joint is not in the trials"
 """Why nothing is searched."""
 
@@ -93,7 +95,7 @@ def search_effort(study: Study, seed: int = 0) -> EffortAnswer:
         raise InputError(f"expected a study of a joint, found one of the rig {study.rig}", file=study.folder)
     trials = [t for t in study.trials if t.role != "held_out"]
     if any("effort" not in t.columns or "position" not in t.columns or not t["effort"].any() for t in trials):
-        return EffortAnswer("refused", refusal=NO_EFFORT)
+        return EffortAnswer(REJECTED, refusal=NO_EFFORT)
     records = [Record(t.name, t.time, t["position"], t["effort"], t.kind) for t in trials]
     joint, links = Joint.of_study(study), Links.of(load_urdf(study.urdf))
     values = {n: float(getattr(joint, n)) for n in ("inertia_scale", "damping", "gravity_scale")}
@@ -111,7 +113,7 @@ def search_effort(study: Study, seed: int = 0) -> EffortAnswer:
     nominal, extended = (_final(verdict, one, others) for one in (state.found.nominal, state.found.best))
     word = word_of(bool(state.names), state.weighed.lack_of_fit)
     if _moves(extended, state.found.best, others):
-        return EffortAnswer("refused", band_hz=band.low, refusal=REFUSED_BAND, remainder=state.weighed.lack_of_fit)
+        return EffortAnswer(REJECTED, band_hz=band.low, refusal=NOT_CARRIED, remainder=state.weighed.lack_of_fit)
     units = joint.units()
     return EffortAnswer(
         word,

@@ -51,7 +51,7 @@ class EffortVerdict(Verdict[EffortFit, EffortSets, Weighed]):
         return [final(fitted, [~fold[one] for one in self.units]) for fold in self.folds]
 
     def left(self, fitted: EffortFit) -> list[np.ndarray]:
-        """Return what is left of the effort of each trial by fits without the part of a row."""
+        """Return the residual of the effort of each trial by fits without the part of a row."""
         key = (fitted.names, *sorted(fitted.forms.items()))
         if key not in self._left:
             out = [np.zeros(len(one)) for one in self.units]

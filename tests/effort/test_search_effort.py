@@ -7,7 +7,7 @@ from bench import DAMPING, study, trial
 from fes_pin.data.errors import InputError
 from fes_pin.effort.columns import presliding
 from fes_pin.effort.motion import Record, band_of, deviation_of, kernel
-from fes_pin.effort.search import NO_EFFORT, search_effort
+from fes_pin.effort.search import NO_EFFORT, REJECTED, search_effort
 
 
 def inside(estimate, true):
@@ -50,10 +50,10 @@ def test_drag_is_not_taken_for_friction_of_another_form(tmp_path):
     assert {c.name for c in found.causes} == {"coulomb_friction", "quadratic_damping"}
 
 
-def test_no_effort_is_refused_in_words(tmp_path):
+def test_a_study_without_efforts_is_rejected_in_words(tmp_path):
     free = [trial(seed).without("effort") for seed in range(2)]
     found = search_effort(study(tmp_path, free))
-    assert (found.verdict, found.refusal, found.causes) == ("refused", NO_EFFORT, ())
+    assert (found.verdict, found.refusal, found.causes) == (REJECTED, NO_EFFORT, ())
 
 
 def test_a_motion_below_the_noise_is_an_error(tmp_path):
