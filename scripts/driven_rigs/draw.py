@@ -62,13 +62,17 @@ BASES = (
 
 @dataclass(frozen=True)
 class Drawn:
-    """A study and what is true of it; what acts `beside`, little, may be named as well."""
+    """A study and what is true of it; what acts `beside`, little, may be named as well.
+
+    `nearest` are the causes of the library that are nearest to what is hidden, where the library has no form of that.
+    """
 
     study: Path
     base: str
     causes: tuple[str, ...]
     truth: dict[str, float]
     beside: tuple[str, ...] = ()
+    nearest: tuple[str, ...] | None = None
 
 
 @dataclass(frozen=True)

@@ -65,8 +65,7 @@ class Bench:
         wanted_rate = np.gradient(self.wanted, self.dt, axis=0)
         wanted_bend = np.gradient(wanted_rate, self.dt, axis=0)
         for k in range(n):
-            read = q + self.noise * rng.standard_normal(trials)
-            read = np.round(read / self.count) * self.count if self.count else read
+            read = self.reads(k, q, rng)
             rate += min(1.0, self.dt / FILTER_S) * ((read - last) / self.dt - rate)
             last, error = read, self.wanted[k] - read
             gathered += self.integral * error * self.dt
@@ -74,9 +73,25 @@ class Bench:
             most = self.hidden.get("most", np.inf)
             effort[k], position[k] = np.clip(command, -most, most), read
             pushed = lasts * pushed + self.torque * np.sqrt(1.0 - lasts**2) * rng.standard_normal(trials)
+            acting = self.acts(k, effort[k], rng)
             for _ in range(max(1, round(self.dt / FINE_S))):
-                q, v, bristles = self._step(effort[k] + pushed, q, v, bristles)
+                q, v, bristles = self._step(acting + pushed, q, v, bristles)
         return effort, position
+
+    def reads(self, k: int, q: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        """What the encoder reads at a sample."""
+        read = q + self.noise * rng.standard_normal(len(q))
+        return np.round(read / self.count) * self.count if self.count else read
+
+    def acts(self, k: int, effort: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        """What of a commanded effort acts from a sample to the next."""
+        return effort
+
+    def numbers(
+        self, causes: tuple[str, ...], torque: float, position: np.ndarray, rng: np.random.Generator
+    ) -> dict[str, float]:
+        """Numbers of what is hidden, so that each acts with about this torque."""
+        return hidden_numbers(causes, torque, position, self.dt, self.base.reach, rng)
 
     def command(
         self,
@@ -126,8 +141,8 @@ class Bench:
         return torque / b.inertia
 
 
-def draw_laboratory(causes: tuple[str, ...], seed: int, folder: Path) -> Drawn:
-    """Draw a rig, hide causes in it, run it under its controller, and write the study."""
+def draw_laboratory(causes: tuple[str, ...], seed: int, folder: Path, kind: type[Bench] = Bench) -> Drawn:
+    """Draw a rig, hide causes in it, run it under its controller on a bench of a kind, and write the study."""
     rng = np.random.default_rng([seed, 77])
     base, dt = BASES[int(rng.integers(len(BASES)))], float(rng.choice(STEPS))
     trials = int(rng.choice([1, 2, 3, 4, 6]))
@@ -138,10 +153,10 @@ def draw_laboratory(causes: tuple[str, ...], seed: int, folder: Path) -> Drawn:
     bandwidth = base.bandwidth * float(rng.uniform(0.7, 1.3)) * min(1.0, 5e-3 / dt)
     own = Base(base.name, base.inertia, base.damping, base.weight, base.reach, bandwidth)
     slow = 0.08 * base.inertia * bandwidth**3 * (control == "integral" or float(rng.random() < 0.3))
-    bench = Bench(own, dt, control, wanted, slow)
+    bench = kind(own, dt, control, wanted, slow)
     effort, position = bench.run(np.random.default_rng([seed, 5]))
     usual = float(np.sqrt(np.mean(effort**2)))
-    bench.hidden = hidden_numbers(causes, float(rng.uniform(0.15, 0.4)) * usual, position, dt, base.reach, rng)
+    bench.hidden = bench.numbers(causes, float(rng.uniform(0.15, 0.4)) * usual, position, rng)
     bench.hidden["most"] = float(rng.choice([np.inf, np.inf, 1.1])) * max(float(np.abs(effort).max()), 2.0 * usual)
     bench.count = base.reach * float(np.exp(rng.uniform(*np.log([5e-5, 1.5e-3]))))
     bench.noise = base.reach * float(np.exp(rng.uniform(*np.log([2e-5, 6e-4]))))
@@ -149,7 +164,7 @@ def draw_laboratory(causes: tuple[str, ...], seed: int, folder: Path) -> Drawn:
     with np.errstate(all="ignore"):
         effort, position = bench.run(np.random.default_rng([seed, 5]))
     if not np.abs(position).max() < FARTHEST * base.reach:
-        return draw_laboratory(causes, seed + NEXT, folder)
+        return draw_laboratory(causes, seed + NEXT, folder, kind)
     effort = effort + usual * float(rng.choice([0.0, 0.003, 0.01])) * rng.standard_normal(effort.shape)
     step = usual * float(rng.choice([0.0, 0.005]))
     effort = np.round(effort / step) * step if step else effort

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from itertools import cycle
 from pathlib import Path
 
-from driven_rigs import arm, draw, laboratory, stimulated, swing_up
+from driven_rigs import arm, draw, laboratory, no_form, stimulated, swing_up
 
 import fes_pin as fp
 from harness.generator import Item, Truth
@@ -26,6 +26,7 @@ OTHERS = {
     "swing-up": (swing_up, swing_up.draw_swing_up),
     "arm": (arm, arm.draw_arm),
     "stimulated": (stimulated, stimulated.draw_stimulated),
+    "no-form": (no_form, no_form.draw_no_form),
 }
 """Generators with causes and dynamics of their own."""
 OUTSIDE = {*draw.OUTSIDE, *stimulated.OUTSIDE}
@@ -73,4 +74,5 @@ class Driven:
             way = RECORDINGS[self.name]
             drawn = draw.draw(item.hidden, SIZE, item.seed, folder, way.measured, way.cutoff_hz, way.every)
         truth = {n: float(v) for n, v in drawn.truth.items()}
-        return fp.read_study(drawn.study), Truth(truth, drawn.beside)
+        part = None if drawn.nearest is None else "".join(item.hidden)
+        return fp.read_study(drawn.study), Truth(truth, drawn.beside, part, nearest=drawn.nearest)

@@ -54,12 +54,16 @@ class Truth:
     unseen
         A trial that is not in the study, on which the answer's model is judged: `kind`, `dt`, `output`, `columns` and
         `conditions`, as a `Trial` has them; {} where there is none.
+    nearest
+        The causes of the library that are nearest to what is hidden, where the library has no form of that; None where
+        it has one.
     """
 
     parameters: Mapping[str, float] = field(default_factory=dict)
     beside: tuple[str, ...] = ()
     part: str | None = None
     unseen: Mapping[str, Any] = field(default_factory=dict)
+    nearest: tuple[str, ...] | None = None
 
 
 class Generator(Protocol):

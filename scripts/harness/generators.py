@@ -17,6 +17,7 @@ GENERATORS = {
     "swing-up": ("driven", "Driven", "swing-up"),
     "arm": ("driven", "Driven", "arm"),
     "stimulated": ("driven", "Driven", "stimulated"),
+    "no-form": ("driven", "Driven", "no-form"),
     "imposed": ("imposed", "Imposed"),
     "contrast": ("contrast", "Pairs"),
     "halved": ("contrast", "Halved"),

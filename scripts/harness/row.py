@@ -9,9 +9,9 @@ from typing import Any
 
 from harness.generator import Item, Truth
 
-KINDS = ("nothing", "one", "two", "outside")
-STOPPED = "stopped"
-"""The verdict of a search that a limit ended, or whose fits did not converge."""
+KINDS = ("nothing", "one", "two", "outside", "no form")
+ADEQUATE, STOPPED = "adequate", "stopped"
+"""The verdict where nothing is named nor left, and that of a search that a limit ended or that did not converge."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +38,8 @@ class Row:
         Of a study without an answer.
     unseen
         Error E of the answer's model on the trial that nobody was shown, percent; None where there is none.
+    nearest
+        See `Truth`.
     """
 
     key: str
@@ -54,6 +56,7 @@ class Row:
     cpu_s: float = 0.0
     error: str | None = None
     unseen: float | None = None
+    nearest: tuple[str, ...] | None = None
 
     @classmethod
     def of(cls, stored: Mapping[str, Any]) -> Row:
@@ -63,20 +66,35 @@ class Row:
     @property
     def kind(self) -> str:
         """One of `KINDS`."""
+        if self.hidden and self.nearest is not None:
+            return "no form"
         return "outside" if self.outside else KINDS[min(len(self.hidden), 2)]
 
     @property
     def right(self) -> bool:
         """Nothing is named where nothing is hidden; one cause stands in the first set, of more each in a set of its
-        own; of what the library does not have a lack of fit is reported."""
+        own; of what the library does not have a lack of fit is reported, or no wrong name and one of the nearest."""
         if self.outside:
             return self.left
+        if self.nearest is not None:
+            return not self.misnamed and self.near
         if not self.hidden:
             return not self.sets
         if len(self.hidden) == 1:
             return bool(self.sets) and self.hidden[0] in self.sets[0]
         found = [{k for k, names in enumerate(self.sets) if cause in names} for cause in self.hidden]
         return all(found) and len(set().union(*found)) >= len(found)
+
+    @property
+    def misnamed(self) -> bool:
+        """A set has none of the causes that are hidden or nearest."""
+        known = {*self.hidden, *(self.nearest or ())}
+        return not all(known & set(names) for names in self.sets)
+
+    @property
+    def near(self) -> bool:
+        """One of the nearest causes stands in a set, if there is one."""
+        return not self.nearest or any(set(self.nearest) & set(names) for names in self.sets)
 
     @property
     def first(self) -> bool:
@@ -90,12 +108,14 @@ class Row:
 
     @property
     def further(self) -> bool:
-        """More is named than is hidden."""
-        return len(self.sets) > len(self.hidden)
+        """More is named than is hidden, or than is nearest."""
+        return len(self.sets) > max(len(self.hidden), len(self.nearest or ()))
 
     @property
     def exact(self) -> bool:
-        """The extended model has the causes that are hidden, and no other."""
+        """The extended model has the causes that are hidden, and no other; where they have no form it is right."""
+        if self.nearest is not None:
+            return self.right
         return sorted(names[0] for names in self.sets) == sorted(self.hidden)
 
 
@@ -119,17 +139,18 @@ def _is_left(remainder: Mapping[str, Any]) -> bool:
 
 def judged(item: Item, truth: Truth, record: Mapping[str, Any], **known: Any) -> Row:
     """An answer, as JSON has it, beside the truth."""
-    beside = set(truth.beside) - set(item.hidden)
+    beside, nearest = set(truth.beside) - set(item.hidden), set(truth.nearest or ())
     return Row(
         item.key,
         item.hidden,
         truth.part or item.part,
         item.outside,
         verdict=record["verdict"],
-        sets=tuple(names for names in sets_of(record) if not beside & set(names)),
+        sets=tuple(names for names in sets_of(record) if nearest & set(names) or not beside & set(names)),
         left=bool(record["verdict"] == "unexplained" or _is_left(record["remainder"])),
         estimates=tuple(_estimates(truth.parameters, record)),
         errors=dict(_errors(record)),
+        nearest=truth.nearest,
         **known,
     )
 

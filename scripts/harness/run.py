@@ -13,6 +13,7 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import ExitStack, contextmanager
 from dataclasses import asdict
 from functools import partial
+from importlib import import_module, util
 from pathlib import Path
 from typing import Any
 
@@ -20,21 +21,18 @@ import numpy as np
 
 import fes_pin as fp
 from fes_pin.data.sources import code_hash
-from fes_pin.effort import search as effort
-from harness import regression as regressions
-from harness import ten_lines
 from harness.generator import Generator, Item, Truth
 from harness.generators import generator_of
 from harness.row import Row, judged
 
 TRUTH = "truth.json"
 REGRESSION, TEN_LINES, EFFORT = "regression", "ten lines", "effort"
-ESTIMATORS: dict[str, tuple[Callable[[fp.Study], Any], Any]] = {
-    REGRESSION: (regressions.regressed, regressions),
-    TEN_LINES: (ten_lines.solved, ten_lines),
-    EFFORT: (effort.search_effort, effort),
+ESTIMATORS = {
+    REGRESSION: ("harness.regression", "regressed"),
+    TEN_LINES: ("harness.ten_lines", "solved"),
+    EFFORT: ("fes_pin.effort.search", "search_effort"),
 }
-"""What answers instead of the package, and the module that holds it."""
+"""What answers instead of a diagnosis: the module that holds it, which is imported where it answers, and its name."""
 GRACE = 3.0
 """An answer that has not come after so many times its limit, and as many tens of seconds, is an error."""
 
@@ -100,8 +98,17 @@ def run(
 
 def code_of(by: str, limit: float | None) -> str:
     """Hash of the code that answers, with the limit of time that it had."""
-    made = hashlib.sha256(Path(ESTIMATORS[by][1].__file__).read_bytes()).hexdigest() if by else code_hash()
-    return made if limit is None or by else f"{made} {limit:g} s"
+    if by in (REGRESSION, TEN_LINES):
+        found = util.find_spec(ESTIMATORS[by][0])
+        return hashlib.sha256(Path(str(found and found.origin)).read_bytes()).hexdigest()
+    return code_hash() if limit is None or by else f"{code_hash()} {limit:g} s"
+
+
+def estimator_of(by: str) -> Callable[[fp.Study], Any]:
+    """What answers instead of a diagnosis."""
+    module, name = ESTIMATORS[by]
+    answers: Callable[[fp.Study], Any] = getattr(import_module(module), name)
+    return answers
 
 
 def each_of(ask: Callable[[Any], Any], items: Sequence[Any], workers: int) -> Iterable[Any]:
@@ -148,7 +155,7 @@ def answered(name: str, item: Item, studies: Path | None = None, by: str = "", l
         began = time.process_time()
         try:
             with ended_after(limit):
-                found = ESTIMATORS[by][0](study) if by else generator.ask(study, **limited(limit))
+                found = estimator_of(by)(study) if by else generator.ask(study, **limited(limit))
         except Exception as error:
             said = f"{type(error).__name__}: {error}"
             return Row(item.key, item.hidden, truth.part or item.part, item.outside, error=said, **known)

@@ -8,7 +8,7 @@ from typing import Any
 
 from scipy.stats import binomtest, fisher_exact, norm
 
-from harness.row import KINDS, STOPPED, Row
+from harness.row import ADEQUATE, KINDS, STOPPED, Row
 
 COLUMNS = ("studies", "right", "first", "alone", "further", "left")
 HEAD = ("hidden", "right", "named first", "alone", "further names", "something left")
@@ -33,7 +33,8 @@ def counts(rows: Iterable[Row]) -> dict[str, Any]:
         `rows`: of each kind, and of its parts, how many studies there are and of how many what `COLUMNS` say holds;
         `intervals`: how many of so many 95 % intervals hold the truth, where the model has the causes that are hidden;
         `off`: by parameter how far it is off in percent, in the median, of the nominal model and of the extended one;
-        `errors`: by kind the median error of both; `cpu_s`: median; `unanswered`.
+        `errors`: by kind the median error of both; `cpu_s`: median; `unanswered`; `no_form`: of studies whose hidden
+        mechanism the library has no form of, and of their nulls, what holds of how many of how many; see `_no_form`.
     """
     rows = list(rows)
     good = [row for row in rows if row.error is None]
@@ -53,7 +54,22 @@ def counts(rows: Iterable[Row]) -> dict[str, Any]:
         "off": _off(good),
         "errors": _errors(good),
         "cpu_s": round(median([row.cpu_s for row in good] or [0.0]), 1),
+        **_no_form([row for row in good if row.nearest is not None]),
     }
+
+
+def _no_form(good: Sequence[Row]) -> dict[str, dict[str, list[int]]]:
+    """Counts of studies of no form: without a wrong name; one of the nearest named, where there is one; adequate."""
+    near = [row.near for row in good if row.nearest]
+    nulls = [row.verdict == ADEQUATE for row in good if not row.hidden]
+    faults = [row.verdict == ADEQUATE for row in good if row.hidden and not row.nearest]
+    shares = {
+        "no wrong name": [not row.misnamed for row in good],
+        "one of the nearest causes is named": near,
+        "adequate where nothing is hidden": nulls,
+        "adequate where nothing is near": faults,
+    }
+    return {"no_form": {words: [sum(some), len(some)] for words, some in shares.items() if some}} if good else {}
 
 
 def _off(good: Sequence[Row]) -> dict[str, list[float]]:
@@ -102,6 +118,7 @@ def notes(found: Counts) -> list[str]:
     """What is counted beside the table, a line each."""
     held, count = found["intervals"]
     lines = [f"95 % intervals that hold the truth: {interval(held, count)}"] if count else []
+    lines += [f"{words}: {interval(*share)}" for words, share in found.get("no_form", {}).items()]
     for kind, (before, after) in found["errors"].items():
         words = "over the horizon" if kind == "horizon" else "held out"
         lines.append(f"error E {words}, where something is hidden, median: {before:g} % nominal, {after:g} % extended")
