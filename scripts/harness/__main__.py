@@ -17,7 +17,7 @@ from harness.generator import Item
 from harness.generators import GENERATORS, generator_of
 from harness.row import Row
 from harness.run import EFFORT, REGRESSION, TEN_LINES, rows_of, run
-from harness.table import HEAD, against, counts, families, lines_of, notes, table, totals, worse, wrong
+from harness.table import HEAD, against, counts, families, lines_of, never_worse, notes, table, totals, worse, wrong
 
 
 def planned(name: str, count: int, seed: int, nulls: bool, only: list[str]) -> list[Item]:
@@ -52,6 +52,9 @@ def main(
         bool, typer.Option("--effort", help="The answers of inverse dynamics, `fes_pin.effort`.")
     ] = False,
     by_ten_lines: Annotated[bool, typer.Option("--ten-lines", help="Beside a ten-line fit of the motion.")] = False,
+    withholds: Annotated[
+        bool, typer.Option("--never-worse", help="Withhold trials; errors against the believed model and a regression.")
+    ] = False,
     limit: Annotated[float | None, typer.Option(min=0.0, help="Seconds that the search of a study may take.")] = None,
     draws: Annotated[int, typer.Option(min=2, help="Of `starts`: starts of each study.")] = varied.DRAWS,
     onto_page: Annotated[bool, typer.Option("--page", help="Write the counts into docs/accuracy.md.")] = False,
@@ -73,15 +76,17 @@ def main(
             continue
         items = planned(name, count, seed, nulls, only or [])
         by = EFFORT if by_effort else REGRESSION * regression
-        label = Path(name).name + f", {by}" * bool(by)
+        label = Path(name).name + f", {by}" * bool(by) + ", withheld" * withholds
         file = store / f"{label}.jsonl" if store else None
         known = rows_of(file, None)
         rows = (
             [known[i.key] for i in items if i.key in known]
             if stored
-            else run(name, items, file, studies, workers, by, limit)
+            else run(name, items, file, studies, workers, by, limit, withholds)
         )
         typer.echo(f"\n{label}\n\n{shown(rows)}")
+        if withholds:
+            typer.echo("\n".join(["", *never_worse(rows)]))
         if by_ten_lines:
             place = store / f"{label}, {TEN_LINES}.jsonl" if store else None
             others = (

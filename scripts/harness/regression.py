@@ -16,6 +16,12 @@ import fes_pin as fp
 
 WINDOW_S = 0.08
 """Window of the cubic that smooths the position and the effort, as analysis/servo_pendulum.py takes it or shorter."""
+PLAIN = ("coulomb_friction", "effort_offset")
+"""Causes that `plain` has without asking whether data show them."""
+WINDOWS_S = (0.04, 0.08, 0.16)
+"""Windows of which `plain` takes the best."""
+PARTS = 4
+"""Parts of a single trial that are left out in turn."""
 SHARP = 0.05
 """Speed over which friction changes its sign, as a share of the speed's root mean square."""
 
@@ -78,9 +84,43 @@ def regressed(study: fp.Study) -> Regressed:
     return Regressed(tuple(chosen), fits[0][0], fits[-1][0])
 
 
-def _trial(study: fp.Study, trial: fp.Trial) -> tuple[NDArray[np.float64], Columns, Columns]:
+def plain(study: fp.Study) -> Regressed:
+    """Return inertia, damping, dry friction, a constant torque and gravity, with the best of three windows.
+
+    The best one predicts the effort of trials that are left out in turn, or of parts of a single one, smoothed by the
+    longest window.
+    """
+    trials = [trial for trial in study.trials if trial.role != "held_out"]
+
+    def rows(window: float) -> tuple[NDArray[np.float64], Columns, NDArray[np.int64]]:
+        parts = [_trial(study, trial, window) for trial in trials]
+        columns = [base | {n: others[n] for n in PLAIN} for _, base, others in parts]
+        unit = [
+            np.full(len(p[0]), k) if len(parts) > 1 else PARTS * np.arange(len(p[0])) // len(p[0])
+            for k, p in enumerate(parts)
+        ]
+        whole = {n: np.concatenate([one[n] for one in columns]) for n in columns[0]}
+        return np.concatenate([p[0] for p in parts]), whole, np.concatenate(unit)
+
+    measured, judged, places = rows(WINDOWS_S[-1])
+
+    def missed(window: float) -> float:
+        effort, columns, unit = rows(window)
+        total = 0.0
+        for k in np.unique(unit):
+            found, _ = _least_squares(effort[unit != k], {n: x[unit != k] for n, x in columns.items()})
+            left = measured - sum(found[n]["value"] * x for n, x in judged.items())
+            total += float(np.sum(left[places == k] ** 2))
+        return total
+
+    effort, columns, _ = rows(min(WINDOWS_S, key=missed))
+    base = {n: x for n, x in columns.items() if n not in PLAIN}
+    return Regressed(PLAIN, *(_least_squares(effort, some)[0] for some in (base, columns)))
+
+
+def _trial(study: fp.Study, trial: fp.Trial, window: float = WINDOW_S) -> tuple[NDArray[np.float64], Columns, Columns]:
     """Return the effort of a trial without known gravity, its nominal columns, and those of causes."""
-    length = max(2 * round(0.5 * WINDOW_S / trial.dt) + 1, 5)
+    length = max(2 * round(0.5 * window / trial.dt) + 1, 5)
     q, v, a = (savgol_filter(trial["position"], length, 3, k, trial.dt)[length::length] for k in range(3))
     effort = savgol_filter(trial["effort"], length, 3)[length::length]
     model = pin.buildModelFromUrdf(str(study.files["urdf"]))

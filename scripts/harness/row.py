@@ -40,6 +40,8 @@ class Row:
         Error E of the answer's model on the trial that nobody was shown, percent; None where there is none.
     nearest
         See `Truth`.
+    against
+        Errors of the answer's model, of the believed model and of a regression, percent; see `never_worse`.
     """
 
     key: str
@@ -57,6 +59,7 @@ class Row:
     error: str | None = None
     unseen: float | None = None
     nearest: tuple[str, ...] | None = None
+    against: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
 
     @classmethod
     def of(cls, stored: Mapping[str, Any]) -> Row:

@@ -21,6 +21,7 @@ import numpy as np
 
 import fes_pin as fp
 from fes_pin.data.sources import code_hash
+from harness import never_worse
 from harness.generator import Generator, Item, Truth
 from harness.generators import generator_of
 from harness.row import Row, judged
@@ -64,6 +65,7 @@ def run(
     workers: int,
     by: str = "",
     limit: float | None = None,
+    withholds: bool = False,
 ) -> list[Row]:
     """Answers to the studies of a generator, in their order; those that the store has of this code are not made again.
 
@@ -79,11 +81,13 @@ def run(
         One of `ESTIMATORS`, which answers instead of the package.
     limit
         Seconds that the search of an answer may take.
+    withholds
+        See `answered`.
     """
     done = rows_of(store, code_of(by, limit))
     todo = [item for item in items if item.key not in done]
     began = time.monotonic()
-    one = partial(answered, name, studies=studies, by=by, limit=limit)
+    one = partial(answered, name, studies=studies, by=by, limit=limit, withholds=withholds)
     for count, row in enumerate(each_of(one, todo, workers), 1):
         done[row.key] = row
         if store:
@@ -141,8 +145,21 @@ def ended_after(limit: float | None) -> Iterator[None]:
         signal.signal(signal.SIGALRM, before)
 
 
-def answered(name: str, item: Item, studies: Path | None = None, by: str = "", limit: float | None = None) -> Row:
-    """Make a study, or read it where it was made before, ask for its answer, and judge that."""
+def answered(
+    name: str,
+    item: Item,
+    studies: Path | None = None,
+    by: str = "",
+    limit: float | None = None,
+    withholds: bool = False,
+) -> Row:
+    """Make a study, or read it where it was made before, ask for its answer, and judge that.
+
+    Parameters
+    ----------
+    withholds
+        Withhold trials from the answer, and compare the errors of its model on them with those of others.
+    """
     generator = generator_of(name)
     with ExitStack() as stack:
         scratch = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="accuracy")))
@@ -151,7 +168,7 @@ def answered(name: str, item: Item, studies: Path | None = None, by: str = "", l
             made(generator, item, folder)
         truth = Truth(**json.loads((folder / TRUTH).read_text(encoding="utf-8")))
         known = {"study": _hashed(folder), "code": code_of(by, limit)}
-        study = fp.read_study(folder)
+        study, unseen = never_worse.withheld(fp.read_study(folder)) if withholds else (fp.read_study(folder), ())
         began = time.process_time()
         try:
             with ended_after(limit):
@@ -161,6 +178,8 @@ def answered(name: str, item: Item, studies: Path | None = None, by: str = "", l
             return Row(item.key, item.hidden, truth.part or item.part, item.outside, error=said, **known)
         seconds = time.process_time() - began
         known["unseen"] = unseen_percent(found, truth)
+        if withholds:
+            known["against"] = never_worse.errors_against(study, found, unseen)
     return judged(item, truth, json.loads(found.to_json()), cpu_s=round(seconds, 2), **known)
 
 

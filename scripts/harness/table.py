@@ -17,6 +17,8 @@ WORSE = 0.01
 """Level at which counts are worse than those of another run."""
 WORSE_ERROR = 1.02
 """An error of prediction is worse than another that is so many times smaller."""
+NO_MODEL_PERCENT = 50.0
+"""An error E of a motion from which the mean of the trial is hardly worse, percent."""
 LEAST_PERCENT = 1e-3
 """Errors E below that are alike, percent: what remains is rounding."""
 
@@ -204,6 +206,42 @@ def against(ours: Sequence[Row], others: Sequence[Row]) -> list[str]:
         f"{sum(row.error is not None for row, _, _ in odd)} of these",
     ]
     return [*lines, *(f"  {one_line(row)}: E {a:.3g} %, ten lines {b:.3g} %" for row, a, b in odd)]
+
+
+def never_worse(rows: Sequence[Row]) -> list[str]:
+    """Errors of our models over those of the believed model and of the regression, by measure, lines of text.
+
+    Errors below `LEAST_PERCENT` are taken for it. A measure is passed over where each of the models leaves more than
+    `NO_MODEL_PERCENT`: there is nothing to choose. A study without an answer counts as worse.
+    """
+    ratios: dict[str, list[tuple[float, Row]]] = {}
+    worst: dict[str, float] = {}
+    for row in rows:
+        if row.error is not None:
+            worst[row.key] = float("inf")
+        for measure, (ours, *others) in row.against.items():
+            if min(ours, *others) > NO_MODEL_PERCENT:
+                continue
+            for name, theirs in zip(("believed", "regression"), others, strict=True):
+                ratio = _percent(ours) / _percent(theirs) if ours < float("inf") else ours
+                ratios.setdefault(f"{measure}, ours over {name}", []).append((ratio, row))
+                worst[row.key] = max(worst.get(row.key, 0.0), ratio)
+    lines = []
+    for name, some in sorted(ratios.items()):
+        most, where = max(some, key=lambda one: one[0])
+        good = sum(ratio <= WORSE_ERROR for ratio, _ in some)
+        middle = median(ratio for ratio, _ in some)
+        share = f"at most {WORSE_ERROR} in {interval(good, len(some))}"
+        lines.append(f"{name}: median {middle:.3g}, {share}; largest {most:.3g} ({where.key})")
+    if worst:
+        good = sum(ratio <= WORSE_ERROR for ratio in worst.values())
+        lines.append(
+            f"every error at most {WORSE_ERROR} times: {interval(good, len(worst))}; largest {max(worst.values()):.3g}"
+        )
+    return [
+        *lines,
+        *(f"  {one_line(row)}: {worst[row.key]:.3g}" for row in rows if worst.get(row.key, 0.0) > WORSE_ERROR),
+    ]
 
 
 def _percent(unseen: float | None) -> float:
