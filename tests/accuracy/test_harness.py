@@ -2,6 +2,7 @@
 
 import json
 from collections import Counter
+from dataclasses import asdict
 from itertools import islice
 from types import SimpleNamespace
 
@@ -44,6 +45,57 @@ def test_who_is_right(hidden, sets, right, first, alone):
 
 def test_what_no_library_has_is_answered_by_what_is_left():
     assert row(outside=True, sets=(), left=True).right and not row(outside=True).right
+
+
+NEAREST = ("coulomb_friction", "effort_offset")
+
+
+@pytest.mark.parametrize(
+    ("hidden", "nearest", "names", "right", "misnamed", "near"),
+    [
+        (("uneven",), NEAREST, [], False, False, False),
+        (("uneven",), NEAREST, ["effort_offset"], True, False, True),
+        (("uneven",), NEAREST, ["effort_offset", "coulomb_friction"], True, False, True),
+        (("uneven",), NEAREST, ["effort_offset", "cogging"], True, False, True),
+        (("uneven",), NEAREST, ["effort_offset", "joint_stop"], False, True, True),
+        (("bursts",), (), [], True, False, True),
+        (("bursts",), (), ["cogging"], True, False, True),
+        (("bursts",), (), ["joint_stop"], False, True, True),
+        ((), (), [], True, False, True),
+        ((), (), ["joint_stop"], False, True, True),
+    ],
+)
+def test_of_no_form_a_nearest_cause_is_right_and_another_is_wrong(hidden, nearest, names, right, misnamed, near):
+    causes = [{"name": name, "equivalents": []} for name in names]
+    truth = Truth(beside=("cogging",), part="".join(hidden), nearest=nearest)
+    one = judged(Item("k", 1, hidden), truth, {**RECORD, "causes": causes}, code="x")
+    assert (one.right, one.misnamed, one.near) == (right, misnamed, near)
+    assert one.kind == ("no form" if hidden else "nothing") and Row.of(json.loads(json.dumps(asdict(one)))) == one
+
+
+def test_a_set_that_holds_a_nearest_cause_counts_whatever_else_could_be_it():
+    causes = [{"name": "cogging", "equivalents": ["effort_offset"]}]
+    truth = Truth(beside=("cogging",), nearest=NEAREST)
+    assert judged(Item("k", 1, ("uneven",)), truth, {**RECORD, "causes": causes}, code="x").near
+
+
+def test_studies_of_no_form_are_counted_by_themselves():
+    rows = [
+        row("a", hidden=("uneven",), nearest=NEAREST, sets=(("effort_offset",),)),
+        row("b", hidden=("uneven",), nearest=NEAREST, sets=(("joint_stop",),)),
+        row("c", hidden=("bursts",), nearest=(), sets=(), verdict="unexplained"),
+        row("d", hidden=(), nearest=(), sets=(), verdict="adequate"),
+        row("e", hidden=(), sets=(), verdict="unexplained"),
+    ]
+    found = counts(rows)
+    assert found["no_form"] == {
+        "no wrong name": [3, 4],
+        "one of the nearest causes is named": [1, 2],
+        "adequate where nothing is hidden": [1, 1],
+        "adequate where nothing is near": [0, 1],
+    }
+    assert found["rows"]["no form"][:2] == [3, 2] and "no_form" not in counts(rows[4:])
+    assert f"no wrong name: {interval(3, 4)}" in notes(found) and "b: uneven" in wrong(rows)[0]
 
 
 RECORD = {

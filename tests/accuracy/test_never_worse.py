@@ -1,0 +1,100 @@
+"""Errors against the believed model and a regression: the true model has the least, and trials are withheld."""
+
+import json
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from driven_rigs.laboratory import draw_laboratory
+from harness.never_worse import errors_against, model_of, values_of, withheld
+from harness.regression import plain
+from harness.table import never_worse
+from test_harness import row
+
+import fes_pin as fp
+
+SEED = 1600003
+"""Of a rig of the laboratory with dry friction."""
+MEASURES = ("free", "0.3 s", "1 s", "effort")
+
+
+@pytest.fixture(scope="module")
+def drawn(tmp_path_factory):
+    made = draw_laboratory(("coulomb_friction",), SEED, tmp_path_factory.mktemp("laboratory"))
+    return fp.read_study(made.study), made.truth
+
+
+def true_model(study, truth):
+    nominal = fp.nominal_model(study).with_parameters({n: truth[n] for n in ("inertia_scale", "damping")})
+    return nominal + fp.effects.CoulombFriction(torque_nm=truth["coulomb_friction"])
+
+
+def test_the_last_trial_is_withheld_or_the_end_of_a_single_one_or_what_is_held_out(drawn):
+    study, _ = drawn
+    shown, unseen = withheld(study)
+    assert shown.trials == study.trials[:-1] and unseen == study.trials[-1:]
+    single, (end,) = withheld(replace(study, trials=study.trials[:1]))
+    whole = study.trials[0]
+    assert len(single.trials[0]) + len(end) == len(whole) and end.time[0] > single.trials[0].time[-1]
+    assert np.array_equal(np.concatenate([single.trials[0]["effort"], end["effort"]]), whole["effort"])
+    held = replace(study, trials=(replace(whole, role="held_out"), *study.trials[1:]))
+    assert withheld(held) == (held, held.trials[:1])
+
+
+def test_the_true_model_is_better_than_the_believed_one_in_every_error(drawn):
+    study, truth = drawn
+    shown, unseen = withheld(study)
+    found = errors_against(shown, SimpleNamespace(model=true_model(shown, truth)), unseen)
+    assert {*found} == {f"{m}, {on}" for m in MEASURES for on in ("fitted", "unseen")}
+    for true, believed, regressed in found.values():
+        assert true < 0.3 * believed and regressed < 0.5 * believed
+
+
+def test_the_believed_model_has_its_own_errors(drawn):
+    study, _ = drawn
+    shown, unseen = withheld(study)
+    found = errors_against(shown, SimpleNamespace(model=fp.nominal_model(shown)), unseen)
+    assert all(own == believed for own, believed, _ in found.values())
+
+
+def test_an_answer_without_a_model_is_one_by_its_causes_and_values(drawn):
+    study, truth = drawn
+    found = plain(study)
+    model = model_of(study, found)
+    assert {*model.structure()} == {"joint", "effort_offset", "coulomb_friction"}
+    assert model.parameters()["coulomb_friction.torque_nm"] == pytest.approx(truth["coulomb_friction"], rel=0.2)
+    assert model.parameters()["inertia_scale"] == pytest.approx(1.0, rel=0.1)
+
+
+def test_a_stop_is_on_the_side_where_it_is(drawn):
+    study, _ = drawn
+    high = max(float(t["position"].max()) for t in study.trials)
+    parameters = {"stiffness": {"value": 3.0}, "angle_rad": {"value": 0.9 * high}}
+    record = {"causes": [{"name": "joint_stop", "parameters": parameters}], "extended": {"parameters": {}}}
+    answer = SimpleNamespace(to_json=lambda: json.dumps(record))
+    assert values_of(study, answer)["joint_stop.side"] == 1.0
+    (stop,) = model_of(study, answer).effects
+    assert (stop.stiffness, stop.side) == (3.0, 1.0)
+
+
+def test_nothing_is_measured_where_no_effort_was_recorded():
+    study = SimpleNamespace(rig="muscle", trials=())
+    assert errors_against(study, SimpleNamespace(), ()) == {}
+
+
+def test_ratios_are_counted():
+    inf = float("inf")
+    rows = [
+        row("a", against={"free, unseen": (1.0, 2.0, 1.0), "effort, unseen": (1.0, 2.0, 0.5)}),
+        row("b", against={"free, unseen": (60.0, 70.0, 80.0), "effort, unseen": (1.0, 4.0, 2.0)}),
+        row("c", against={"free, unseen": (inf, 2.0, 4.0)}),
+        row("d", error="E: x"),
+    ]
+    text = never_worse(rows)
+    assert text[0].startswith("effort, unseen, ours over believed: median 0.375, at most 1.02 in 2 of 2")
+    assert text[1].startswith("effort, unseen, ours over regression: median 1.25, at most 1.02 in 1 of 2")
+    assert "largest 2 (a)" in text[1]
+    assert text[2].startswith("free, unseen, ours over believed: median inf, at most 1.02 in 1 of 2")
+    assert text[4].startswith("every error at most 1.02 times: 1 of 4") and text[4].endswith("largest inf")
+    assert [line.split(":")[0].strip() for line in text[5:]] == ["a", "c", "d"]
