@@ -7,7 +7,7 @@ import pytest
 from driven_rigs.draw import BASES, urdf
 from harness import page
 from harness.generator import Item, Truth
-from harness.regression import regressed
+from harness.regression import plain, regressed
 from harness.row import judged
 
 import fes_pin as fp
@@ -40,6 +40,14 @@ def test_friction_is_named_where_it_is_and_its_size_is_right(tmp_path, friction)
     if friction:
         assert found.extended["coulomb_friction"]["value"] == pytest.approx(friction, rel=0.1)
         assert found.nominal["damping"]["value"] > 1.5 * ARM.damping
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.1])
+def test_the_plain_one_has_friction_and_an_offset_without_asking(tmp_path, friction):
+    found = plain(arm(tmp_path, friction))
+    sizes = {"inertia_scale": 1.0, "damping": ARM.damping, "coulomb_friction": friction, "effort_offset": 0.0}
+    for name, size in sizes.items():
+        assert found.extended[name]["value"] == pytest.approx(size, rel=0.05, abs=0.005)
 
 
 def test_its_answer_is_judged_like_the_packages(tmp_path):
