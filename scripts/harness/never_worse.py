@@ -2,8 +2,8 @@
 
 All three predict in one simulator and in one model of the low-passed effort:
 
-- `free`: the motion of a whole trial from its effort;
-- `0.3 s`, `1 s`: the motion that far ahead, from the position and speed that a cubic reads off the recorded motion;
+- `free`: the motion of a whole trial from its effort, from the position and speed that a cubic reads off its start;
+- `0.3 s`, `1 s`: the motion that far ahead of the readings, whose filter assumes the same noise for every model;
 - `effort`: the low-passed effort of the recorded motion.
 """
 
@@ -13,6 +13,7 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -24,12 +25,20 @@ from fes_pin.models.simulate import Simulator
 from harness.regression import plain
 
 HORIZONS_S = (0.3, 1.0)
-EVERY_S = 0.075
-"""From the start of a prediction to the next; its last quarter of the shortest horizon counts."""
+RANDOM, RANDOM_S = 0.02, 0.05
+"""Random effort that a filter assumes, as a share of the effort's root mean square, and its time constant, s."""
+MOST = 1e100
+"""A larger error of a position is that of a simulation that diverges."""
 WITHHELD = 0.3
 """Share of a single trial, its end, that is withheld."""
 WINDOW_S = 0.1
 """Of the cubic that reads a start."""
+CHOICES = {
+    "joint_stop.side": (1.0, -1.0),
+    "sensor_gain.place": (1.0, 0.0, 2.0),
+    "sensor_nonlinearity.place": (1.0, 0.0, 2.0),
+}
+"""What an answer by efforts chooses and does not state."""
 SEEN_AS = {"creep_speed": None, "presliding": "stretch"}
 """Shapes of dry friction in a regression of efforts that a simulation does not have, or has by another name."""
 
@@ -51,21 +60,21 @@ def _part(trial: fp.Trial, rows: slice, **more: np.ndarray) -> fp.Trial:
 
 
 def values_of(study: fp.Study, found: Any) -> dict[str, float]:
-    """Every value of an answer by name: of the rig, and `cause.parameter`; those of a regression are amplitudes."""
+    """Every value of an answer by name: of the rig, as believed where none is given, and `cause.parameter`.
+
+    Those of a regression are amplitudes.
+    """
     from fes_pin.models.effects import effect_named  # noqa: PLC0415
 
     record, rig = json.loads(found.to_json()), fp.nominal_model(study).parameters()
     known = {n: one["value"] for n, one in record["extended"]["parameters"].items()}
-    out = {n: value for n, value in known.items() if n in rig}
+    out = {n: known.get(n, value) for n, value in rig.items()}
     for cause in record["causes"]:
         name = cause["name"]
         own = {n: one["value"] for n, one in cause.get("parameters", {}).items()}
         own = own or {effect_named(name).amplitudes()[0]: known[name]}
         if name == "parallel_stiffness":
             own.setdefault("rest_angle_rad", 0.0)
-        if name == "joint_stop":
-            ends = [(t["position"].min(), t["position"].max()) for t in study.trials]
-            own["side"] = 1.0 if own["angle_rad"] > np.mean(ends) else -1.0
         out |= {f"{name}.{n}": value for n, value in own.items()}
     return out
 
@@ -96,6 +105,19 @@ def _of_model(model: fp.Model) -> dict[str, float]:
     return {**values, "coulomb_friction.presliding": way} if "coulomb_friction.torque_nm" in values else values
 
 
+def _likeliest(
+    study: fp.Study, shown: Sequence[fp.Trial], model: fp.Model, values: Mapping[str, float]
+) -> tuple[fp.Model, Mapping[str, float]]:
+    """The model and its values with the choices that an answer does not state, as they leave the least effort."""
+    unstated = [n for n in CHOICES if n.partition(".")[0] in {e.name for e in model.effects} and n not in values]
+    if not unstated:
+        return model, values
+    every = [dict(zip(unstated, one, strict=True)) for one in product(*(CHOICES[n] for n in unstated))]
+    found = _efforts(study, shown, shown, [{**values, **one} for one in every])
+    _, best = min(zip(found, every, strict=True), key=lambda one: one[0].get("effort", math.inf))
+    return model.with_parameters(best), {**values, **best}
+
+
 def errors_against(study: fp.Study, found: Any, unseen: Sequence[fp.Trial]) -> dict[str, tuple[float, float, float]]:
     """Errors E of the model of an answer, of the believed model and of the regression, percent, by measure.
 
@@ -109,6 +131,7 @@ def errors_against(study: fp.Study, found: Any, unseen: Sequence[fp.Trial]) -> d
     models = [model_of(study, found), fp.nominal_model(study), model_of(study, regressed)]
     own = _of_model(models[0]) if hasattr(found, "model") else values_of(study, found)
     values = [own, models[1].parameters(), values_of(study, regressed)]
+    models[0], values[0] = _likeliest(study, shown, models[0], own)
     out = {}
     for word, trials in (("fitted", shown), ("unseen", list(unseen))):
         each = [_moved(model, trials) for model in models]
@@ -119,33 +142,45 @@ def errors_against(study: fp.Study, found: Any, unseen: Sequence[fp.Trial]) -> d
 
 
 def _moved(model: fp.Model, trials: Sequence[fp.Trial]) -> dict[str, float]:
-    """Errors of the simulated motion by measure; none where the motion is imposed."""
-    moving = [t for t in trials if t.kind != "imposed"]
-    ways = {"free": [(t, slice(0, len(t)), 1) for t in moving]}
+    """Errors of the predicted motion by measure; none where the motion is imposed."""
+    from fes_pin.identify.ahead import over_horizon, reach_of  # noqa: PLC0415
+
+    moving, out = [_begun(t) for t in trials if t.kind != "imposed"], dict[str, float]()
+    if not moving:
+        return out
+    free = [one.readings[:, 0] for one in Simulator(model, moving).run(model.parameters())]
+    out["free"] = _error(moving, free, [0] * len(moving))
     for horizon in HORIZONS_S:
-        each = [(t, round(horizon / t.dt), max(1, round(EVERY_S / t.dt))) for t in moving]
-        starts = [(t, start, n, every) for t, n, every in each for start in range(0, len(t) - n, every)]
-        ways[f"{horizon:g} s"] = [(t, slice(k, k + n + 1), n + 1 - min(n, every)) for t, k, n, every in starts]
-    return {name: _ahead(model, many) for name, many in ways.items() if many}
+        seen = [replace(t, columns={n: t[n] for n in ("position", "effort")}) for t in moving]
+        if all(len(t) > sum(reach_of(t, horizon)) for t in seen):
+            ahead = [over_horizon(model, t, _noise(t), horizon)["position"] for t in seen]
+            out[f"{horizon:g} s"] = _error(moving, ahead, [sum(reach_of(t, horizon)) for t in seen])
+    return out
 
 
-def _ahead(model: fp.Model, many: Sequence[tuple[fp.Trial, slice, int]]) -> float:
-    """Error of parts of trials that are predicted from their starts, from a sample of each on."""
-    smooth = {id(t): (_smooth(t, 0), _smooth(t, 1)) for t, _, _ in many}
-    parts = []
-    for trial, rows, _ in many:
-        begun, speed = (one[rows].copy() for one in smooth[id(trial)])
-        begun[1:] = trial["position"][rows][1:]
-        parts.append(_part(trial, rows, position=begun, velocity=speed))
+def _error(trials: Sequence[fp.Trial], predicted: Sequence[np.ndarray], first: Sequence[int]) -> float:
+    """E of predicted positions of trials, from a sample of each on, percent; infinite where they are not finite."""
     squares = spread = 0.0
-    with np.errstate(all="ignore"):
-        for (trial, _, first), part, one in zip(
-            many, parts, Simulator(model, parts).run(model.parameters()), strict=True
-        ):
-            read = part["position"][first:]
-            squares += float(np.sum((read - one.readings[first:, 0]) ** 2))
-            spread += float(np.sum((read - trial["position"].mean()) ** 2))
+    for trial, one, k in zip(trials, predicted, first, strict=True):
+        read = trial["position"]
+        squares += float(np.sum(np.minimum(np.abs(read - one)[k:], MOST) ** 2))
+        spread += float(np.sum((read - read.mean())[k:] ** 2))
     return _percent(squares, spread)
+
+
+def _noise(trial: fp.Trial) -> Any:
+    """The noise of a filter that starts predictions of every model: of the reading, and a small random effort."""
+    from fes_pin.models.predictor import StateSpaceNoise  # noqa: PLC0415
+
+    white = math.sqrt(float(np.mean(np.diff(trial["position"], 2) ** 2)) / 6.0)
+    effort = RANDOM * math.sqrt(float(np.mean(trial["effort"] ** 2)))
+    return StateSpaceNoise({"position": max(white, 1e-9)}, {"effort": max(effort, 1e-9)}, {"effort": RANDOM_S})
+
+
+def _begun(trial: fp.Trial) -> fp.Trial:
+    """The trial with the position and the speed of its start that a cubic reads off the recorded motion."""
+    position = np.append(_smooth(trial, 0)[:1], trial["position"][1:])
+    return _part(trial, slice(None), position=position, velocity=_smooth(trial, 1))
 
 
 def _smooth(trial: fp.Trial, order: int) -> np.ndarray:

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from driven_rigs.laboratory import draw_laboratory
-from harness.never_worse import errors_against, model_of, values_of, withheld
+from harness.never_worse import errors_against, model_of, withheld
 from harness.regression import plain
 from harness.table import never_worse
 from test_harness import row
@@ -69,15 +69,25 @@ def test_an_answer_without_a_model_is_one_by_its_causes_and_values(drawn):
     assert model.parameters()["effort_offset.offset"] == values["effort_offset"]
 
 
-def test_a_stop_is_on_the_side_where_it_is(drawn):
-    study, _ = drawn
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_stop_whose_side_is_not_stated_is_on_the_side_where_it_is(drawn, side):
+    study, truth = drawn
     high = max(float(t["position"].max()) for t in study.trials)
-    parameters = {"stiffness": {"value": 3.0}, "angle_rad": {"value": 0.9 * high}}
-    record = {"causes": [{"name": "joint_stop", "parameters": parameters}], "extended": {"parameters": {}}}
+    stop = fp.effects.JointStop(stiffness=20.0, angle_rad=0.3 * side * high, side=side)
+    trials = [fp.simulate(true_model(study, truth) + stop, t) for t in study.trials]
+    stopped = replace(
+        study, trials=tuple(replace(t, columns={n: t[n] for n in ("position", "effort")}) for t in trials)
+    )
+    known = {n: {"value": truth[n]} for n in ("inertia_scale", "damping")}
+    parameters = {"stiffness": {"value": stop.stiffness}, "angle_rad": {"value": stop.angle_rad}}
+    causes = [
+        {"name": "joint_stop", "parameters": parameters},
+        {"name": "coulomb_friction", "parameters": {"torque_nm": {"value": truth["coulomb_friction"]}}},
+    ]
+    record = {"causes": causes, "extended": {"parameters": known}}
     answer = SimpleNamespace(to_json=lambda: json.dumps(record))
-    assert values_of(study, answer)["joint_stop.side"] == 1.0
-    (stop,) = model_of(study, answer).effects
-    assert (stop.stiffness, stop.side) == (3.0, 1.0)
+    found = errors_against(stopped, answer, ())
+    assert found["free, fitted"][0] < 0.1 and found["effort, fitted"][0] < 1.0
 
 
 def test_nothing_is_measured_where_no_effort_was_recorded():
