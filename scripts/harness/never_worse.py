@@ -21,7 +21,7 @@ from scipy.signal import savgol_filter
 
 import fes_pin as fp
 from fes_pin.data.trial import derived_trial
-from fes_pin.models.simulate import Simulator
+from fes_pin.models.simulate import Simulator, max_step, substeps
 from harness.regression import plain
 
 HORIZONS_S = (0.3, 1.0)
@@ -39,8 +39,6 @@ CHOICES = {
     "sensor_nonlinearity.place": (1.0, 0.0, 2.0),
 }
 """What an answer by efforts chooses and does not state."""
-SEEN_AS = {"creep_speed": None, "presliding": "stretch"}
-"""Shapes of dry friction in a regression of efforts that a simulation does not have, or has by another name."""
 
 
 def withheld(study: fp.Study) -> tuple[fp.Study, tuple[fp.Trial, ...]]:
@@ -90,11 +88,30 @@ def model_of(study: fp.Study, found: Any) -> fp.Model:
         kind = effect_named(cause)
         own = {n.partition(".")[2]: v for n, v in values.items() if n.startswith(f"{cause}.")}
         if cause == "coulomb_friction" and all(t.kind != "imposed" for t in study.trials):
-            own = {SEEN_AS.get(n, n): v for n, v in own.items()}
+            own = _simulated_friction(study, model, own)
         info = kind.parameters()
         model += kind(**{n: info[n].nearest(v) for n, v in own.items() if n in info})
     info = model.parameter_info()
     return model.with_parameters({n: info[n].nearest(v) for n, v in values.items() if "." not in n})
+
+
+def _simulated_friction(study: fp.Study, model: fp.Model, values: Mapping[str, float]) -> dict[str, float]:
+    """Values of dry friction of a regression of efforts as a simulation has them.
+
+    What builds up over a way is a contact that stretches. With stiction, or with a creep speed of its own, friction
+    changes its sign as tanh(v / creep speed): its corners are as wide as `effects.CoulombFriction` says.
+    """
+    from fes_pin.effort.columns import SLOWLY  # noqa: PLC0415
+    from fes_pin.models.effects.coulomb_friction import STIFFEST, CoulombFriction  # noqa: PLC0415
+
+    own = {{"presliding": "stretch"}.get(n, n): v for n, v in values.items() if n != "creep_speed"}
+    if not {"stiction", "creep_speed"} & {*values}:
+        return own
+    usual = math.sqrt(float(np.mean(np.concatenate([_smooth(t, 1) for t in study.trials]) ** 2)))
+    step = max(t.dt / substeps(model, t.dt, max_step(model)) for t in study.trials)
+    stopping = STIFFEST * model.parameters()["inertia_scale"] * model.rig.constants["inertia"] / step
+    most = own["torque_nm"] * (1.0 + own.get("stiction", 0.0)) + stopping * CoulombFriction().creep_speed
+    return {**own, "softness": values.get("creep_speed", SLOWLY * usual) * stopping / most}
 
 
 def _of_model(model: fp.Model) -> dict[str, float]:
