@@ -27,14 +27,14 @@ NEAREST: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "warming": (("coulomb_friction",), ()),
     "lost_packets": ((), ("sensor_lag",)),
     "bursts": ((), ()),
-    "wander": ((), ("effort_offset", "periodic_torque", "base_tilt")),
+    "wander": ((), ("effort_offset", "zero_by_trial", "periodic_torque", "base_tilt")),
     "quantised_current": ((), ()),
 }
 """Of what is hidden: the nearest causes, and others that describe a part of it, so that they are no wrong names.
 
 Bristles are springs that slip, as a relaxing one; friction that rises along the way resists as teeth do where the joint
-moves one way; a command that is lost acts late; a torque that wanders has a mean and a slowest wave, as has a base that
-tilts.
+moves one way; a command that is lost acts late; a torque that wanders has a mean, of all trials or of each, and a
+slowest wave, and a base that tilts has a mean too.
 """
 CAUSES = tuple(NEAREST)
 PAIRS = ((),)
