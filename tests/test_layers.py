@@ -25,7 +25,7 @@ ALLOWED = {
     "search": {"prepare", "remainder", "identify", "models", "data"},
     "prepare": {"identify", "models", "data"},
     "faults": {"search", "prepare", "identify", "models", "data"},
-    "diagnosis": {"faults", "prepare", "search", "remainder", "identify", "models", "data"},
+    "diagnosis": {"effort", "faults", "prepare", "search", "remainder", "identify", "models", "data"},
     "contrasts": {"faults", "prepare", "search", "remainder", "identify", "models", "data"},
     "comparison": {"prepare", "search", "identify", "models", "data"},
     "effort": {"models", "data"},

@@ -77,6 +77,12 @@ def same_motion(trial: Trial, other: Trial, further: float = 0.0) -> Trial:
     return trial
 
 
+def moved_along(trial: Trial, values: np.ndarray) -> Trial:
+    """A trial with a known imposed motion: position, velocity and acceleration, shape (3, n)."""
+    vars(trial)[_KNOWN] = ImposedMotion(values, (0.0, 0.0, 0.0), float("inf"))
+    return trial
+
+
 def driving_values(trial: Trial, name: str, columns: tuple[str, ...]) -> np.ndarray:
     """What drives a model under one name, shape (n,): a column, or a part of the imposed motion."""
     return imposed_motion(trial, columns).values[MOTION.index(name)] if name in MOTION else trial[name]

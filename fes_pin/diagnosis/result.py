@@ -8,6 +8,7 @@ from typing import Any
 from fes_pin.data.log import Log
 from fes_pin.data.results import ModelResult
 from fes_pin.data.trial import Trial
+from fes_pin.diagnosis.along_motion import effort_band
 from fes_pin.diagnosis.errors_ahead import AheadErrors, RandomPart
 from fes_pin.diagnosis.experiment import NextExperiment
 from fes_pin.identify.error_measures import FREE, ONE_STEP
@@ -166,9 +167,13 @@ class Diagnosis(ModelResult):
         library = {Path(where).name: names for where, names in self.catalogue.origins().items()}
         seen = {n: {"size": shown(p.value), "unit": p.unit} for n, p in self.seen.items()}
         own = {"absent_beyond": seen, "left_out_samples": left_out, "reason": self.reason}
-        own |= {"log": log_table(self.log), "library": library}
+        own |= {"log": log_table(self.log), "library": library, "effort_band_hz": self._effort_band_hz()}
         models = self.models_record(self._model("nominal"), self._model("extended"), noise)
         return {**models, **{n: value for n, value in own.items() if value}, **self._ahead_record()}
+
+    def _effort_band_hz(self) -> float | None:
+        band = effort_band(self.model.rig, self.study.trials)
+        return None if band is None else shown(band.low)
 
     def _ahead_record(self) -> dict[str, Any]:
         """Return the horizon, and of a driven rig its process noise; no key without errors over a horizon."""

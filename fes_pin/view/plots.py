@@ -200,7 +200,7 @@ def missing_drawing(
     panel = axes[0, 0]
     panel.set_xmargin(0.03)
     panel.axhline(color=COLOURS["faint"], linewidth=0.8)
-    chosen = _spread(x, value)
+    chosen = instants(x, value)
     panel.plot(x[chosen], factor * value[chosen], ".", color=COLOURS["nominal"], markersize=2.4)
     at, middle, share_of = binned(value, x)
     panel.plot(at, factor * middle, color=COLOURS["measured"], linewidth=1.8)
@@ -233,7 +233,7 @@ def _joined(many: Sequence[Missing], name: str) -> tuple[np.ndarray, np.ndarray]
     return np.concatenate([m.value for m in many]), np.concatenate([m.against[name] for m in many])
 
 
-def _spread(x: np.ndarray, value: np.ndarray) -> np.ndarray:
+def instants(x: np.ndarray, value: np.ndarray) -> np.ndarray:
     """Instants at about equal distances along the curve in a panel: rest is drawn once, motion in full."""
     across, up = (np.abs(np.diff(one)) / max(float(np.ptp(one)), 1e-300) for one in (x, value))
     steps = across + up

@@ -11,6 +11,7 @@ from fes_pin.infer.result import ParameterEstimate
 from fes_pin.models.outside import origin
 from fes_pin.view.page import Content, Markup, element, figure, html_table, section, unit_text
 from fes_pin.view.plots import MODELS, stimulus_drawing
+from fes_pin.view.report_effort import effort_section
 from fes_pin.view.report_trials import missing_section, position_unit, trials_section
 from fes_pin.view.sections import Parts, not_testable, value_and_interval
 from fes_pin.view.style import quantity
@@ -32,6 +33,7 @@ def _sections(diagnosis: Diagnosis) -> list[Markup]:
         not_testable(diagnosis, diagnosis.absorbed, why),
         section("Next experiment", *_next(diagnosis)),
         section("Missing torque and force", *missing_section(diagnosis, replays)),
+        section("Effort along the measured motion", *effort_section(diagnosis)),
         section("Trials", *trials_section(replays, MODELS, position_unit(diagnosis), ahead)),
         section("Parameters and noise", *_parameters(diagnosis)),
         section("The model, to be used", *_use(diagnosis)),

@@ -1,0 +1,164 @@
+"""Efforts along the measured motion of a joint: as recorded, and as models predict them by inverse dynamics.
+
+A model predicts the effort by its own equations, as of an imposed motion: along the smoothed reading, corrected by what
+the model says of the sensor. What was recorded passes the same filters as what is predicted; see `effort.motion`.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fes_pin.data.errors import InputError
+from fes_pin.data.imposed import moved_along
+from fes_pin.data.schema import IMPOSED
+from fes_pin.data.trial import Trial, derived_trial
+from fes_pin.effort.motion import Band, Motion, Record, band_of
+from fes_pin.models.model import Model
+from fes_pin.models.rigs.base import Rig
+from fes_pin.models.rigs.joint import Joint
+from fes_pin.models.simulate import Simulator
+from fes_pin.models.stage import Effect
+
+DRAG, LAG = "quadratic_damping", "sensor_lag"
+"""Friction that acts on the torque, and the cause of a reading that is late."""
+OF_TORQUE = ("gravity_angle", "torque", "friction", "effort")
+"""Signals that a motion which is measured and one which is imposed have in common."""
+
+
+@dataclass(frozen=True, eq=False)
+class AlongMotion:
+    """Efforts of one trial at the rows of its band.
+
+    Attributes
+    ----------
+    name
+        Of the trial.
+    time, position, velocity
+        Shape (m,); s, and rad and rad/s or m and m/s.
+    measured
+        The recorded effort, shape (m,), N m or N.
+    predicted, friction
+        Effort of each model, and what of it is damping, dry friction and drag; shape (m,) by the model's name.
+    """
+
+    name: str
+    time: np.ndarray
+    position: np.ndarray
+    velocity: np.ndarray
+    measured: np.ndarray
+    predicted: Mapping[str, np.ndarray]
+    friction: Mapping[str, np.ndarray]
+
+    def residual(self, of: str) -> np.ndarray:
+        """Return the measured effort minus that of a model, shape (m,)."""
+        return self.measured - self.predicted[of]
+
+    def without_others(self, of: str) -> np.ndarray:
+        """Return the measured effort minus all of a model's but friction, shape (m,)."""
+        return self.residual(of) + self.friction[of]
+
+
+def has_effort(rig: Rig, trial: Trial) -> bool:
+    """Return whether a trial is of a joint, with an effort and a position at every sample."""
+    known = isinstance(rig, Joint) and {"effort", "position"} <= {*trial.columns} and trial["effort"].any()
+    return bool(known and np.isfinite(trial["effort"] + trial["position"]).all())
+
+
+def effort_band(rig: Rig, trials: Sequence[Trial]) -> Band | None:
+    """Return the band of the motion of trials with efforts; None without one, or where it is not above the noise."""
+    records = [_record(t) for t in trials if has_effort(rig, t) and t.role != "held_out"]
+    try:
+        return band_of(records) if records else None
+    except InputError:
+        return None
+
+
+def along_motion(models: Mapping[str, Model], trials: Sequence[Trial], band: Band) -> list[AlongMotion]:
+    """Return the efforts of trials, in their order, without those that are shorter than the filter.
+
+    Parameters
+    ----------
+    models
+        By name, all of the same joint.
+    trials
+        Trials with efforts.
+    band
+        Their band.
+    """
+    kept = [t for t in trials if len(Motion(_record(t), band).rows)]
+    read = [Motion(_record(t), band) for t in kept]
+    predicted = {n: _efforts(model, kept, band) for n, model in models.items()}
+    others = {n: _efforts(_without_friction(model), kept, band) for n, model in models.items()}
+    out = []
+    for k, (trial, track) in enumerate(zip(kept, read, strict=True)):
+        here = {n: one[k] for n, one in predicted.items()}
+        friction = {n: one - others[n][k] for n, one in here.items()}
+        motion = track.time[track.rows], track.moved(0), track.moved(1)
+        out.append(AlongMotion(trial.name, *motion, _measured(trial, band), here, friction))
+    return out
+
+
+def left_out(model: Model, trials: Sequence[Trial]) -> list[str]:
+    """Return the causes of a model that are not in the efforts along a measured motion."""
+    free = any(t.kind != IMPOSED for t in trials)
+    return [e.name for e in model.effects if e.each_trial or (free and not (e.signal in OF_TORQUE or _is_view(e)))]
+
+
+def _record(trial: Trial) -> Record:
+    return Record(trial.name, trial.time, trial["position"], trial["effort"], trial.kind)
+
+
+def _measured(trial: Trial, band: Band) -> np.ndarray:
+    """Return the recorded effort at the rows: a command is held until the next, on average half a sample."""
+    from fes_pin.effort.problem import HELD_ROWS  # noqa: PLC0415 - half a second of SciPy, for joints with efforts
+
+    record = _record(trial)
+    smooth = Motion(record, band, record.effort).wide(0)
+    late = 0.0 if trial.kind == IMPOSED else HELD_ROWS * record.dt
+    return Motion(replace(record, effort=smooth), band).effort(late, 0.0)
+
+
+def _efforts(model: Model, trials: Sequence[Trial], band: Band) -> list[np.ndarray]:
+    """Return the effort of a model at the rows of each trial."""
+    out = []
+    for trial in trials:
+        track, acting = Motion(_record(trial), band), model
+        if trial.kind != IMPOSED:
+            track = _seen(model, track)
+            acting = Model(model.rig, tuple(e for e in model.effects if e.signal in OF_TORQUE))
+        given = derived_trial(trial, kind=IMPOSED, low_pass_hz=None)
+        (run,) = Simulator(acting, [moved_along(given, np.stack([track.q, track.v, track.a]))]).run(acting.parameters())
+        out.append(track.low(run.readings[:, 0]))
+    return out
+
+
+def _seen(model: Model, track: Motion) -> Motion:
+    """Return the motion of the joint by the reading that a model's sensor gives of it."""
+    from fes_pin.effort.columns import Links  # noqa: PLC0415 - as above
+    from fes_pin.effort.problem import Rows  # noqa: PLC0415
+
+    views, values, record, rig = [e for e in model.effects if _is_view(e)], model.parameters(), track.record, model.rig
+    if not views:
+        return track
+    if f"{LAG}.lag_s" in values:
+        lag, shift = values[f"{LAG}.lag_s"], values[f"{LAG}.shift"]
+        earlier = np.interp(record.time + shift * lag, record.time, record.reading)
+        reading = earlier + (1.0 - shift) * lag * np.gradient(earlier, record.dt)
+        record = replace(record, reading=reading)
+    inertia, cosine, sine, turns = (float(rig.constants[n]) for n in rig.needed)
+    links = Links(inertia, cosine, sine, bool(turns))
+    names = [e.name for e in reversed(views) if e.name != LAG]
+    return Rows([record], track.band, links).seen(values, names)[1][0]
+
+
+def _is_view(effect: Effect) -> bool:
+    """Return whether a cause is of the reading, and can be taken off it."""
+    return effect.name in (LAG, "backlash", "sensor_drift", "sensor_gain", "sensor_nonlinearity", "sensor_offset")
+
+
+def _without_friction(model: Model) -> Model:
+    """Return a model without damping, dry friction and drag."""
+    rubs = (e.signal == "friction" or e.name == DRAG for e in model.effects)
+    kept = tuple(e for e, rubbing in zip(model.effects, rubs, strict=True) if not rubbing)
+    return Model(model.with_parameters({"damping": 0.0}).rig, kept)
