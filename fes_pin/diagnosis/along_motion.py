@@ -25,6 +25,9 @@ DRAG, LAG = "quadratic_damping", "sensor_lag"
 OF_TORQUE = ("gravity_angle", "torque", "friction", "effort")
 """Signals that a motion which is measured and one which is imposed have in common."""
 
+FEWEST = 12
+"""Rows that a figure of a trial has at least: a smooth curve needs them (`view.missing.smooth`)."""
+
 
 @dataclass(frozen=True, eq=False)
 class AlongMotion:
@@ -75,7 +78,7 @@ def effort_band(rig: Rig, trials: Sequence[Trial]) -> Band | None:
 
 
 def along_motion(models: Mapping[str, Model], trials: Sequence[Trial], band: Band) -> list[AlongMotion]:
-    """Return the efforts of trials, in their order, without those that are shorter than the filter.
+    """Return the efforts of trials, in their order, without those that have fewer than `FEWEST` rows.
 
     Parameters
     ----------
@@ -86,7 +89,7 @@ def along_motion(models: Mapping[str, Model], trials: Sequence[Trial], band: Ban
     band
         Their band.
     """
-    kept = [t for t in trials if len(Motion(_record(t), band).rows)]
+    kept = [t for t in trials if len(Motion(_record(t), band).rows) >= FEWEST]
     read = [Motion(_record(t), band) for t in kept]
     predicted = {n: _efforts(model, kept, band) for n, model in models.items()}
     others = {n: _efforts(_without_friction(model), kept, band) for n, model in models.items()}

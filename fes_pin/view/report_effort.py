@@ -10,7 +10,7 @@ from fes_pin.models.model import Model
 from fes_pin.view.drawing import Drawing, panels, rows_csv, svg
 from fes_pin.view.missing import Missing, binned
 from fes_pin.view.page import Markup, element, figure, folded, joined, key
-from fes_pin.view.plots import MODELS, OVER_RESIDUAL, add_legend, instants, missing_drawing, over_residual
+from fes_pin.view.plots import MODELS, NARROW, OVER_RESIDUAL, add_legend, instants, missing_drawing, over_residual
 from fes_pin.view.report_trials import OPEN
 from fes_pin.view.style import COLOURS, WIDTHS, label, milli, quantity
 
@@ -26,7 +26,8 @@ def effort_section(diagnosis: Diagnosis) -> list[Markup]:
     if (band := effort_band(rig, trials)) is None:
         return []
     models = {"nominal": diagnosis.nominal.model} | ({"extended": diagnosis.model} if diagnosis.causes else {})
-    shown = along_motion(models, [t for t in trials if has_effort(rig, t)], band)
+    if not (shown := along_motion(models, [t for t in trials if has_effort(rig, t)], band)):
+        return []
     names = left_out(diagnosis.model, trials)
     absent = f" Not in the prediction of the extended model: {', '.join(names)}." * bool(names)
     text = (
@@ -62,7 +63,8 @@ def _against(shown: list[AlongMotion], models: Mapping[str, Model], units: Mappi
         key(("nominal", "nominal, instants"), ("measured", "nominal, median"), *extended),
         element("div", grid, class_="grid three"),
         element("h3", "Friction map"),
-        figure(friction_drawing(shown, last, unit, q), words, "narrow", "friction_map"),
+        key((last, f"fitted, {last}"), *((colour, f"{name} third") for name, colour in THIRDS.items())),
+        element("div", figure(friction_drawing(shown, last, unit, q), words, file="friction_map"), class_="grid three"),
     ]
 
 
@@ -104,7 +106,7 @@ def friction_drawing(shown: list[AlongMotion], of: str, unit: str, position_unit
     value = np.concatenate([one.without_others(of) for one in shown])
     fitted = np.concatenate([one.friction[of] for one in shown])
     factor, small = milli(value, unit)
-    drawing, axes = panels([190.0])
+    drawing, axes = panels([150.0], NARROW, 58.0)
     panel = axes[0, 0]
     panel.axhline(color=COLOURS["faint"], linewidth=0.8)
     groups = np.array_split(np.argsort(velocity), min(GROUPS, len(velocity)))
@@ -115,14 +117,13 @@ def friction_drawing(shown: list[AlongMotion], of: str, unit: str, position_unit
     for k, (name, colour) in enumerate(THIRDS.items()):
         for side in (velocity < 0.0, velocity >= 0.0):  # friction jumps between them
             x, y = (v[side & (thirds == k)] for v in (velocity, value))
-            if not len(x):
+            if len(x) < 2:
                 continue
             chosen, (there, middle, _) = instants(x, y), binned(y, x)
             panel.plot(x[chosen], factor * y[chosen], ".", color=COLOURS[colour], markersize=2.4, alpha=0.6)
             panel.plot(there, factor * middle, color=COLOURS[colour], linewidth=1.4)
             rows += [(name, *pair) for pair in zip(x[chosen], y[chosen], strict=True)]
     panel.set(xlabel=label("velocity", position_unit), ylabel=f"friction ({small})")
-    add_legend(drawing, {of: (of, "fitted"), **{n: (c, f"{n} third") for n, c in THIRDS.items()}})
     against, place = label("velocity", position_unit), quantity("position", position_unit)[0]
     words = f"Friction against {against}, by thirds of the {place}; "
     words += f"fitted from {curve.min():.3g} to {curve.max():.3g} {unit}."
