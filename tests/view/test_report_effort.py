@@ -97,6 +97,22 @@ def test_what_a_sensor_does_is_taken_off_the_reading(tmp_path, recorded, name, v
     assert error < 0.1 * uncorrected
 
 
+def test_a_play_is_crossed_from_rest_while_the_reading_stands(tmp_path, recorded):
+    """A view that changes side at once has larger errors than no correction."""
+    read, followed = [], recorded["position"][0]
+    for q in recorded["position"]:
+        followed = min(max(followed, q - 0.02), q + 0.02)
+        read.append(followed)
+    rng = np.random.default_rng(4)
+    one = recorded.with_columns(position=np.array(read) + 1e-4 * rng.standard_normal(len(read)))
+    right, without = arm(tmp_path, backlash={"half_width": 0.02}), arm(tmp_path)
+    band = effort_band(right.rig, [recorded])
+    (true,), (found,) = along_motion({"": without}, [recorded], band), along_motion({"": right}, [one], band)
+    (wrong,) = along_motion({"": without}, [one], band)
+    error, uncorrected = (np.std(x.predicted[""] - true.predicted[""]) for x in (found, wrong))
+    assert error < 0.5 * uncorrected
+
+
 def test_an_imposed_motion_is_predicted_as_the_model_predicts_it(tmp_path, recorded):
     one = derived_trial(recorded, kind="imposed")
     model = arm(tmp_path, **true_effects(), sensor_offset={"offset": 0.3})
