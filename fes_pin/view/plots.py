@@ -21,7 +21,7 @@ from fes_pin.infer.result import Named
 from fes_pin.infer.text import WHOLE, percent
 from fes_pin.view.drawing import LEFT, RIGHT, TOP, WIDE, Drawing, panels, rows_csv, svg
 from fes_pin.view.missing import Missing, binned, smoothed
-from fes_pin.view.style import COLOURS, WIDTHS, label, milli, quantity
+from fes_pin.view.style import COLOURS, WIDTHS, label, quantity, short_unit
 
 DOTS = 500
 """Dots of one panel."""
@@ -121,14 +121,15 @@ def over_residual(
     """
     upper, lower = pair
     colour = {n: legend[n][0] for n in curves}
+    what, unit = of
+    scale, long_unit = min((1.0, unit), short_unit(curves["measured"], unit))
     for n in sorted(curves, key=lambda n: -WIDTHS.get(colour[n], WIDTHS["nominal"])):  # what was measured is thinnest
         width = WIDTHS.get(colour[n], WIDTHS["nominal"])
-        upper.plot(time, curves[n], color=COLOURS[colour[n]], linewidth=width)
-    what, unit = of
-    upper.set_ylabel(f"{what} ({unit})" if unit else what)
+        upper.plot(time, scale * curves[n], color=COLOURS[colour[n]], linewidth=width)
+    upper.set_ylabel(f"{what} ({long_unit})" if unit else what)
     residuals = {n: curves["measured"] - values for n, values in curves.items() if n != "measured"}
     largest = max(residuals.values(), key=lambda r: float(np.abs(r).max()))
-    factor, small = milli(largest, unit)
+    factor, small = short_unit(largest, unit)
     lower.axhspan(-2.0 * factor * std, 2.0 * factor * std, color=COLOURS["band"])
     lower.axhline(color=COLOURS["faint"], linewidth=0.8)
     for n, residual in residuals.items():
@@ -195,7 +196,7 @@ def missing_drawing(
         As in `trial_drawing`.
     """
     value, x = _joined(before, name)
-    factor, unit = milli(value, before[0].unit)
+    factor, unit = short_unit(value, before[0].unit)
     drawing, axes = panels([150.0], NARROW, 58.0)
     panel = axes[0, 0]
     panel.set_xmargin(0.03)

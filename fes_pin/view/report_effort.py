@@ -12,12 +12,10 @@ from fes_pin.view.missing import Missing, binned
 from fes_pin.view.page import Markup, element, figure, folded, joined, key
 from fes_pin.view.plots import MODELS, NARROW, OVER_RESIDUAL, add_legend, instants, missing_drawing, over_residual
 from fes_pin.view.report_trials import OPEN
-from fes_pin.view.style import COLOURS, WIDTHS, label, milli, quantity
+from fes_pin.view.style import COLOURS, WIDTHS, label, quantity, short_unit
 
-THIRDS = {"lower": "stage-nerve", "middle": "stage-joint", "upper": "stage-muscle"}
+THIRDS = {"lower": "stage-sensor", "middle": "stage-joint", "upper": "stage-muscle"}
 """Colours of the dots of a friction map, by the third of the positions that they are in."""
-GROUPS = 60
-"""Groups of equal size, by speed, of the fitted friction, whose medians its curve joins."""
 
 
 def effort_section(diagnosis: Diagnosis) -> list[Markup]:
@@ -56,7 +54,7 @@ def _against(shown: list[AlongMotion], models: Mapping[str, Model], units: Mappi
     words = (
         f"Friction: the measured effort without all that the {last} model has but damping, dry friction and drag. Dots "
         f"are instants, thin lines their medians, by thirds of the {quantity('position', q)[0]}. Where the thirds "
-        "differ, friction is uneven."
+        "differ, friction depends on the position, or on the way since the joint turned."
     )
     return [
         element("h3", "Missing effort: measured minus predicted"),
@@ -93,7 +91,8 @@ def effort_drawing(one: AlongMotion, unit: str) -> Drawing:
 def friction_drawing(shown: list[AlongMotion], of: str, unit: str, position_unit: str) -> Drawing:
     """Friction map: what a model leaves of the effort but friction, against speed, with the model's friction.
 
-    Dots are rows of all trials, in colours by thirds of the positions; thin lines are medians of each third.
+    Small dots are rows of all trials, in colours by thirds of the positions, thin lines their medians; large dots are
+    the fitted friction, a curve where it depends on the speed alone.
 
     Parameters
     ----------
@@ -105,14 +104,12 @@ def friction_drawing(shown: list[AlongMotion], of: str, unit: str, position_unit
     velocity, position = (np.concatenate([getattr(one, n) for one in shown]) for n in ("velocity", "position"))
     value = np.concatenate([one.without_others(of) for one in shown])
     fitted = np.concatenate([one.friction[of] for one in shown])
-    factor, small = milli(value, unit)
+    factor, small = short_unit(value, unit)
     drawing, axes = panels([150.0], NARROW, 58.0)
     panel = axes[0, 0]
     panel.axhline(color=COLOURS["faint"], linewidth=0.8)
-    groups = np.array_split(np.argsort(velocity), min(GROUPS, len(velocity)))
-    at, curve = (np.array([float(np.median(x[g])) for g in groups]) for x in (velocity, fitted))
-    panel.plot(at, factor * curve, color=COLOURS[of], linewidth=WIDTHS["extended"])
-    rows: list[tuple[str | float, ...]] = [(f"fitted_{of}", *one) for one in zip(at, curve, strict=True)]
+    panel.plot(velocity, factor * fitted, "o", color=COLOURS[of], markersize=WIDTHS["extended"], markeredgewidth=0.0)
+    rows: list[tuple[str | float, ...]] = [("fitted", velocity[k], fitted[k]) for k in instants(velocity, fitted)]
     thirds = np.searchsorted(np.quantile(position, (1.0 / 3.0, 2.0 / 3.0)), position)
     for k, (name, colour) in enumerate(THIRDS.items()):
         for side in (velocity < 0.0, velocity >= 0.0):  # friction jumps between them
@@ -126,5 +123,5 @@ def friction_drawing(shown: list[AlongMotion], of: str, unit: str, position_unit
     panel.set(xlabel=label("velocity", position_unit), ylabel=f"friction ({small})")
     against, place = label("velocity", position_unit), quantity("position", position_unit)[0]
     words = f"Friction against {against}, by thirds of the {place}; "
-    words += f"fitted from {curve.min():.3g} to {curve.max():.3g} {unit}."
+    words += f"fitted from {fitted.min():.3g} to {fitted.max():.3g} {unit}."
     return Drawing(svg(drawing, words), rows_csv(("what", against, f"friction ({unit})"), rows))

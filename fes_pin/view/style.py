@@ -46,7 +46,13 @@ def label(column: str, position_unit: str = "rad") -> str:
     return f"{name} ({unit})" if unit else name
 
 
-def milli(values: np.ndarray, unit: str) -> tuple[float, str]:
-    """Factor and unit in which small values have short numbers: thousandths where they are below a twentieth."""
-    largest = float(np.quantile(np.abs(values), 0.995)) if len(values) else 0.0
-    return (1e3, f"m{unit}") if 0.0 < largest < 0.05 and unit else (1.0, unit)
+LARGE, SMALL = 2000.0, 0.05
+"""Values from which on, and below which, an axis counts in thousands or thousandths."""
+
+
+def short_unit(values: np.ndarray, unit: str) -> tuple[float, str]:
+    """Factor and unit in which large and small values have short numbers: thousands or thousandths."""
+    largest = float(np.quantile(np.abs(values), 0.995)) if len(values) and unit else 0.0
+    if largest >= LARGE:
+        return 1e-3, f"k{unit}"
+    return (1e3, f"m{unit}") if 0.0 < largest < SMALL else (1.0, unit)

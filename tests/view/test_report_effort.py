@@ -18,6 +18,7 @@ from fes_pin.models.nominal import nominal_model
 from fes_pin.models.simulate import simulated_trial
 from fes_pin.view.report import report_html
 from fes_pin.view.report_effort import effort_drawing, effort_section, friction_drawing
+from fes_pin.view.style import short_unit
 
 HIDDEN = {"friction": 0.1, "offset": 0.08, "drag": 0.05}
 TORQUE_NOISE = 0.003 / np.sqrt(1.0 - 0.97**2)
@@ -150,7 +151,7 @@ def test_a_friction_map_shows_friction_that_depends_on_the_angle():
     one = AlongMotion("", np.arange(600.0), q, v, friction, {"nominal": np.sign(v)}, {"nominal": np.sign(v)})
     rows = rows_of(friction_drawing([one], "nominal", "N m", "rad"))
     size = {n: np.median([abs(float(y)) for what, _, y in rows if what == n]) for n in {r[0] for r in rows}}
-    assert size == {"fitted_nominal": 1.0, "lower": 1.0, "middle": 1.0, "upper": 2.0}
+    assert size == {"fitted": 1.0, "lower": 1.0, "middle": 1.0, "upper": 2.0}
 
 
 def test_the_report_of_a_joint_has_its_efforts_and_their_numbers(tmp_path):
@@ -164,6 +165,12 @@ def test_the_report_of_a_joint_has_its_efforts_and_their_numbers(tmp_path):
     assert "fitted, nominal" in of_nominal
 
 
+def test_large_efforts_are_in_thousands(recorded):
+    here = {"nominal": 3e3 * np.ones(20)}
+    drawn = effort_drawing(AlongMotion("", np.arange(20.0), *np.ones((2, 20)), 1e4 * np.ones(20), here, here), "N").svg
+    assert "effort (kN)" in drawn and ">(kN)<" in drawn
+
+
 def test_measured_efforts_are_in_front(tmp_path, recorded):
     found = efforts({"nominal": arm(tmp_path), "extended": arm(tmp_path, **true_effects())}, recorded)
     drawn = effort_drawing(found, "N m").svg
@@ -172,6 +179,21 @@ def test_measured_efforts_are_in_front(tmp_path, recorded):
     assert "N m off" in drawn
     table = rows_of(effort_drawing(found, "N m"))
     assert [float(r[1]) for r in table] == pytest.approx(found.measured, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("largest", "expected"),
+    [
+        (1e4, (1e-3, "kN")),
+        (2000.0, (1e-3, "kN")),
+        (1999.0, (1.0, "N")),
+        (0.05, (1.0, "N")),
+        (0.04, (1e3, "mN")),
+        (0, (1, "N")),
+    ],
+)
+def test_an_axis_has_short_numbers(largest, expected):
+    assert short_unit(np.array([-largest]), "N") == expected
 
 
 @pytest.mark.parametrize("samples", [8, 12, 40])
