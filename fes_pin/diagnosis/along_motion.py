@@ -16,6 +16,7 @@ from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial, derived_trial
 from fes_pin.effort.motion import Band, Motion, Record, band_of
 from fes_pin.models.model import Model
+from fes_pin.models.outside import origin
 from fes_pin.models.rigs.base import Rig
 from fes_pin.models.rigs.joint import Joint
 from fes_pin.models.simulate import Simulator
@@ -67,7 +68,7 @@ class AlongMotion:
 
 def has_effort(rig: Rig, trial: Trial) -> bool:
     """Return whether a trial is of a joint, with an effort and a position at every sample."""
-    known = isinstance(rig, Joint) and {"effort", "position"} <= {*trial.columns} and trial["effort"].any()
+    known = type(rig) is Joint and {"effort", "position"} <= {*trial.columns} and trial["effort"].any()
     return bool(known and np.isfinite(trial["effort"] + trial["position"]).all())
 
 
@@ -107,8 +108,8 @@ def along_motion(models: Mapping[str, Model], trials: Sequence[Trial], band: Ban
 
 def left_out(model: Model, trials: Sequence[Trial]) -> list[str]:
     """Return the causes of a model that are not in the efforts along a measured motion."""
-    free = any(t.kind != IMPOSED for t in trials)
-    return [e.name for e in model.effects if e.each_trial or (free and not (e.signal in OF_TORQUE or _is_view(e)))]
+    acting = [_acting(model, t) for t in trials if t.kind != IMPOSED]
+    return [e.name for e in model.effects if e.each_trial or not (_is_view(e) or all(e.name in one for one in acting))]
 
 
 def _record(trial: Trial) -> Record:
@@ -132,10 +133,28 @@ def _efforts(model: Model, trials: Sequence[Trial], band: Band) -> list[np.ndarr
         track, acting = Motion(_record(trial), band), model
         if trial.kind != IMPOSED:
             track = _seen(model, track)
-            acting = Model(model.rig, tuple(e for e in model.effects if e.signal in OF_TORQUE))
-        given = derived_trial(trial, kind=IMPOSED, low_pass_hz=None)
-        (run,) = Simulator(acting, [moved_along(given, np.stack([track.q, track.v, track.a]))]).run(acting.parameters())
+            names = _acting(model, trial)
+            acting = Model(model.rig, tuple(e for e in model.effects if e.name in names))
+        given = moved_along(_imposed(trial), np.stack([track.q, track.v, track.a]))
+        (run,) = Simulator(acting, [given]).run(acting.parameters())
         out.append(track.low(run.readings[:, 0]))
+    return out
+
+
+def _imposed(trial: Trial) -> Trial:
+    return derived_trial(trial, kind=IMPOSED, low_pass_hz=None)
+
+
+def _acting(model: Model, trial: Trial) -> set[str]:
+    """Return the causes that act alike in a trial and along its motion: a user's own may read the recorded effort."""
+    out = set()
+    for effect in (e for e in model.effects if e.signal in OF_TORQUE):
+        try:
+            if origin(type(effect)):
+                Simulator(Model(model.rig, (effect,)), [moved_along(_imposed(trial), np.zeros((3, len(trial))))])
+            out.add(effect.name)
+        except InputError:
+            continue
     return out
 
 

@@ -20,11 +20,12 @@ THIRDS = {"lower": "stage-sensor", "middle": "stage-joint", "upper": "stage-musc
 
 def effort_section(diagnosis: Diagnosis) -> list[Markup]:
     """Efforts along the measured motion of a joint whose effort was recorded; nothing of another rig."""
-    rig, trials = diagnosis.model.rig, diagnosis.study.trials
+    rig = diagnosis.model.rig
+    trials = [t for t in diagnosis.study.trials if has_effort(rig, t)]
     if (band := effort_band(rig, trials)) is None:
         return []
     models = {"nominal": diagnosis.nominal.model} | ({"extended": diagnosis.model} if diagnosis.causes else {})
-    if not (shown := along_motion(models, [t for t in trials if has_effort(rig, t)], band)):
+    if not (shown := along_motion(models, trials, band)):
         return []
     names = left_out(diagnosis.model, trials)
     absent = f" Not in the prediction of the extended model: {', '.join(names)}." * bool(names)

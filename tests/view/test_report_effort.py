@@ -10,6 +10,7 @@ from effort.bench import DAMPING, study, trial
 from scipy.signal import bilinear, lfilter
 from view.reported import ankle_diagnosis, diagnosed, joint_study
 
+import fes_pin as fp
 from fes_pin.data.trial import derived_trial
 from fes_pin.diagnosis.along_motion import AlongMotion, along_motion, effort_band, left_out
 from fes_pin.effort.motion import Motion, Record
@@ -129,6 +130,31 @@ def test_an_imposed_motion_is_predicted_as_the_model_predicts_it(tmp_path, recor
 def test_causes_that_no_torque_or_reading_has_are_named(tmp_path, recorded):
     model = arm(tmp_path, frame_vibration={"coupling": 0.1}, sensor_lag={"lag_s": 0.01})
     assert left_out(model, [recorded]) == ["frame_vibration"]
+
+
+OWN = """
+from dataclasses import dataclass
+from fes_pin.models.stage import Effect, Stage, parameter
+
+@dataclass(frozen=True)
+class {title}(Effect):
+    size: float = parameter(0.1, null=0.0, lower=-1.0, upper=1.0, scale=0.1)
+    name, stage, signal, rigs = "{name}", Stage.JOINT, "torque", ("joint",)
+
+    def apply(self, value, s):
+        return value - self.size * s.{read}
+"""
+
+
+@pytest.mark.parametrize(("read", "absent"), [("q", []), ("u.effort", ["mine"])])
+def test_a_cause_of_the_user_acts_where_it_reads_the_motion_alone(tmp_path, recorded, read, absent):
+    (tmp_path / "mine.py").write_text(OWN.format(title="Mine", name="mine", read=read))
+    (kind,) = (e for e in fp.load_library(tmp_path / "mine.py").effects if e.name == "mine")
+    model = arm(tmp_path)
+    found = efforts({"without": model, "with": model + kind(size=0.1)}, recorded)
+    assert left_out(model + kind(size=0.1), [recorded]) == absent
+    added = found.predicted["with"] - found.predicted["without"]
+    assert added == pytest.approx(0.1 * found.position * (not absent), abs=1e-3)
 
 
 def test_no_band_is_no_section(tmp_path, recorded):
