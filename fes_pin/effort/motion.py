@@ -43,6 +43,8 @@ ROWS_EACH = 2.5
 """Rows in a period of the band: the kernel passes 2 % of the amplitude at their Nyquist frequency plus one fifth."""
 REVERSING, AROUND_S = 0.04, 0.02
 """Speed, as a share of a fast one, below which a joint reverses, and the time around it, s: friction is uncertain."""
+RESTS = 2.0
+"""Time on either side for which a joint that rests is slow, in deviations of the kernel: 95 % of its weight."""
 SEGMENT_S = 4.0
 """Segments of a spectrum, s: they resolve a quarter of a hertz."""
 
@@ -138,6 +140,8 @@ class Motion:
         The band of all trials.
     reading
         Another reading in the place of the recorded one, shape (n,).
+    rows
+        Samples of the rows; by default all that are free of the ends, as many as the band needs.
 
     Attributes
     ----------
@@ -147,14 +151,16 @@ class Motion:
         Samples of the rows, shape (m,).
     """
 
-    def __init__(self, record: Record, band: Band, reading: np.ndarray | None = None) -> None:
+    def __init__(
+        self, record: Record, band: Band, reading: np.ndarray | None = None, rows: np.ndarray | None = None
+    ) -> None:
         self.record, self.band, self.dt = record, band, record.dt
         self.reading = record.reading if reading is None else reading
         self.time = record.time - record.time[0]
         self._narrow, self._wide = deviation_of(band.low), deviation_of(band.wide)
         edge = math.ceil(WIDTHS * (self._narrow + self._wide) / self.dt)
         stride = max(1, round(1.0 / (ROWS_EACH * band.low * self.dt)))
-        self.rows = np.arange(edge, len(self.reading) - edge, stride)
+        self.rows = np.arange(edge, len(self.reading) - edge, stride) if rows is None else rows
 
     @cached_property
     def q(self) -> np.ndarray:
@@ -195,10 +201,24 @@ class Motion:
         return np.asarray(windows[self.rows] @ weights)
 
     def reversing(self, fast: float) -> np.ndarray:
-        """Return at which rows the joint reverses, or rests, shape (m,) of bool."""
-        slow = (np.abs(self.v) < REVERSING * fast).astype(float)
-        around = np.ones(2 * round(AROUND_S / self.dt) + 1)
-        return np.asarray(np.convolve(slow, around, mode="same")[self.rows] > 0.5)
+        """Return at which rows the joint reverses, shape (m,) of bool."""
+        return self._near(self.slow(fast), AROUND_S)
+
+    def resting(self, fast: float) -> np.ndarray:
+        """Return at which rows the joint stands as long as the kernel lasts, shape (m,) of bool.
+
+        Dry friction holds a joint that stands by any torque up to its limit.
+        """
+        return ~self._near(~self.slow(fast), RESTS * self._narrow)
+
+    def slow(self, fast: float) -> np.ndarray:
+        """Return at which samples the joint is hardly moved, shape (n,) of bool."""
+        return np.asarray(np.abs(self.v) < REVERSING * fast)
+
+    def _near(self, some: np.ndarray, seconds: float) -> np.ndarray:
+        """Return which rows are at most so far from some samples, shape (m,) of bool."""
+        around = np.ones(2 * round(seconds / self.dt) + 1)
+        return np.asarray(np.convolve(some, around, mode="same")[self.rows] > 0.5)
 
 
 def band_of(records: Sequence[Record]) -> Band:

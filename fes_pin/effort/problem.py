@@ -47,9 +47,9 @@ class Rows:
 
     def __init__(self, records: Sequence[Record], band: Band, links: Links) -> None:
         self.band, self.links = band, links
-        tracks = [Motion(r, band) for r in records]
-        self.tracks = [t for t in tracks if len(t.rows)]
-        self.sizes = _sizes(self.tracks, links)
+        tracks = [t for t in (Motion(r, band) for r in records) if len(t.rows)]
+        self.sizes = _sizes(tracks, links)
+        self.tracks = _moving(tracks, self.sizes.fast)
         self.library = library(self.sizes, max(PASSED * band.low, 3.5))
         self.reversing = [t.reversing(self.sizes.fast) for t in self.tracks]
         self._views: OrderedDict[object, list[Motion]] = OrderedDict()
@@ -72,7 +72,7 @@ class Rows:
             for cause in views:
                 assert cause.view is not None
                 many = [(t, cause.view(t, own(values, cause.name), self.sizes)) for t in tracks]
-                tracks = [Motion(t.record, t.band, reading) for t, reading in many]
+                tracks = [Motion(t.record, t.band, reading, t.rows) for t, reading in many]
             self._views[key] = tracks
             if len(self._views) > KEPT_VIEWS:
                 self._views.popitem(last=False)
@@ -117,6 +117,12 @@ class Rows:
 def own(values: Values, name: str) -> dict[str, float]:
     """Return the values of a cause by its own names."""
     return {n.removeprefix(f"{name}."): v for n, v in values.items() if n.startswith(f"{name}.")}
+
+
+def _moving(tracks: Sequence[Motion], fast: float) -> list[Motion]:
+    """Return trials at the rows in which the joint does not rest: there friction may have any size below its limit."""
+    moving = [Motion(t.record, t.band, None, t.rows[~t.resting(fast)]) for t in tracks]
+    return [t for t in moving if len(t.rows)]
 
 
 def _sizes(tracks: Sequence[Motion], links: Links) -> Sizes:
