@@ -59,6 +59,7 @@ class EffortSets(FittedSets[EffortFit, Values]):
     def __init__(self, rows: Rows, nominal_values: Values, fitted: Sequence[str], seed: int = 0) -> None:
         super().__init__()
         self.rows, self.seed, self.takes_forms = rows, seed, False
+        self._formed: set[tuple[Names, frozenset[Hashable]]] = set()
         imposed = all(t.record.kind == "imposed" for t in rows.tracks)
         self.values = {**nominal_values, HOLD: HELD_ROWS * (not imposed)}
         self.base = {n: NOMINAL[n] for n in fitted} | ({HOLD: (0.0, HELD_ROWS)} if imposed else {})
@@ -192,7 +193,10 @@ class EffortSets(FittedSets[EffortFit, Values]):
         return frozenset((n, k) for n, many in fitted.forms.items() for k in many)
 
     def without(self, names: Names, name: str) -> EffortFit:
-        """Return the fit of a set without one cause, in the forms that the others have in it."""
+        """Return the fit of a set without one cause, in the forms that the others have in it, or in better ones.
+
+        A cause must gain more than a further form of the others does: a spring that hardens looks like a second cause.
+        """
         whole, rest = self.fits[names], tuple(n for n in names if n != name)
         forms = {n: k for n, k in whole.forms.items() if n != name}
         if rest not in self.fits or dict(self.fits[rest].forms) != forms:
@@ -200,6 +204,9 @@ class EffortSets(FittedSets[EffortFit, Values]):
             known = self.fits.get(rest)
             if known is None or less.criterion < known.criterion:
                 self.fits[rest] = less
+        while (key := (rest, self.form_of(self.fits[rest]))) not in self._formed:
+            self._formed.add(key)
+            self.fits[rest] = self.better_form(self.fits[rest]) or self.fits[rest]
         return self.fits[rest]
 
     def is_possible(self, fitted: EffortFit) -> bool:
