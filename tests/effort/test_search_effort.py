@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
-from bench import DAMPING, study, trial
+from bench import DAMPING, DT, study, trial
 
+import fes_pin as fp
 from fes_pin.data.errors import InputError
 from fes_pin.effort.columns import presliding
-from fes_pin.effort.motion import Record, band_of, deviation_of, kernel
+from fes_pin.effort.motion import Band, Motion, Record, band_of, deviation_of, kernel
 from fes_pin.effort.search import NO_EFFORT, REJECTED, search_effort
 
 
@@ -91,3 +92,29 @@ def test_the_band_narrows_where_an_encoder_is_coarse():
         return band_of([Record(one.name, one.time, one["position"], one["effort"], one.kind)])
 
     assert band(5e-3).low < band(0.0).low
+
+
+def test_a_joint_that_is_held_still_says_nothing_of_its_friction():
+    """Friction balances any torque of a joint that stands: rows of rest are left out, those of a reversal are not."""
+    still = np.sin(np.linspace(0.0, 6.0 * np.pi, 1500))
+    stopped = np.concatenate([still, np.full(1500, still[-1]), still])
+    record = Record("a", np.arange(len(stopped)) * 0.004, stopped, stopped, "motion")
+    track = Motion(record, Band(4.0, 16.0))
+    rests = track.resting(3.0)
+    inside = (track.rows > 1600) & (track.rows < 2900)
+    assert rests[inside].all() and not rests[(track.rows < 1400) | (track.rows > 3100)].any()
+
+
+def test_the_torque_that_holds_a_joint_still_is_no_spring(tmp_path):
+    """A push that friction balances, after the joint has stopped, changes nothing of what is named."""
+    moves = [trial(seed, friction=0.1) for seed in range(3)]
+    pushed = []
+    for k, one in enumerate(moves):
+        n = round(4.0 / DT)
+        rest = one["effort"][-1] + 0.05 * (-1.0) ** k * np.sin(np.pi * np.arange(n) / n)
+        columns = {
+            "effort": np.append(one["effort"], rest),
+            "position": np.append(one["position"], np.full(n, one["position"][-1])),
+        }
+        pushed.append(fp.Trial(one.name, one.kind, columns, np.arange(len(one) + n) * DT))
+    assert [c.name for c in search_effort(study(tmp_path, pushed)).causes] == ["coulomb_friction"]
