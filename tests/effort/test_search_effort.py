@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-from bench import DAMPING, DT, study, trial
+from bench import DAMPING, study, trial
 
-import fes_pin as fp
 from fes_pin.data.errors import InputError
 from fes_pin.effort.columns import presliding
 from fes_pin.effort.motion import Band, Motion, Record, band_of, deviation_of, kernel
@@ -103,18 +102,3 @@ def test_a_joint_that_is_held_still_says_nothing_of_its_friction():
     rests = track.resting(3.0)
     inside = (track.rows > 1600) & (track.rows < 2900)
     assert rests[inside].all() and not rests[(track.rows < 1400) | (track.rows > 3100)].any()
-
-
-def test_the_torque_that_holds_a_joint_still_is_no_spring(tmp_path):
-    """A push that friction balances, after the joint has stopped, changes nothing of what is named."""
-    moves = [trial(seed, friction=0.1) for seed in range(3)]
-    pushed = []
-    for k, one in enumerate(moves):
-        n = round(4.0 / DT)
-        rest = one["effort"][-1] + 0.05 * (-1.0) ** k * np.sin(np.pi * np.arange(n) / n)
-        columns = {
-            "effort": np.append(one["effort"], rest),
-            "position": np.append(one["position"], np.full(n, one["position"][-1])),
-        }
-        pushed.append(fp.Trial(one.name, one.kind, columns, np.arange(len(one) + n) * DT))
-    assert [c.name for c in search_effort(study(tmp_path, pushed)).causes] == ["coulomb_friction"]
