@@ -14,6 +14,7 @@ from fes_pin.data.provenance import provenance_now
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.by_trial import Ask, Ran, with_fault, with_faults
+from fes_pin.diagnosis.by_effort import begun_by_effort
 from fes_pin.diagnosis.likelihood_models import Found, LikelihoodModels, LikelihoodSearch, NominalFitError
 from fes_pin.diagnosis.logged import (
     ASKED_OF_EFFORTS,
@@ -163,7 +164,8 @@ class _Work:
             def run(trials: Sequence[Trial]) -> tuple[LikelihoodSearch, Found]:
                 own = (known, answered, self.seed, study.horizon_s, first_noise(trials, answered))
                 parts = trials if model.effects else in_parts(model.rig, trials, answered)
-                ran.append(LikelihoodSearch(LikelihoodModels(model, parts, *own), self.tell))
+                models = LikelihoodModels(model, parts, *own)
+                ran.append(LikelihoodSearch(models, self.tell, begun_by_effort(models, trials)))
                 return ran[-1], ran[-1].run()
 
             conditions = StudyConditions(model, run)

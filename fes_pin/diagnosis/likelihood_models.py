@@ -4,6 +4,7 @@ import math
 
 from fes_pin.diagnosis.errors_ahead import are_large, random_parts
 from fes_pin.diagnosis.held_out import Fold, Found, gains_of
+from fes_pin.effort.search import Searched
 from fes_pin.identify.afar import is_rounding
 from fes_pin.identify.likelihood import is_simulated
 from fes_pin.identify.likelihood_fit import LikelihoodFit
@@ -23,7 +24,15 @@ class NominalFitError(ArithmeticError):
 
 
 class LikelihoodModels(LikelihoodFits):
-    """Fits of sets of causes to one set of trials, and the rules by which a search judges them."""
+    """Fits of sets of causes to one set of trials, and the rules by which a search judges them.
+
+    Attributes
+    ----------
+    by_effort
+        What inverse dynamics found in the same trials; None where it does not apply.
+    """
+
+    by_effort: Searched | None = None
 
     def nominal(self) -> LikelihoodFit:
         """Fit the nominal model, and simulate the family of score tests of all causes in it.

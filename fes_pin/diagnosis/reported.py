@@ -8,6 +8,7 @@ import numpy as np
 
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
+from fes_pin.diagnosis.by_effort import InverseDynamics
 from fes_pin.diagnosis.decide.chosen_again import share_of
 from fes_pin.diagnosis.decide.rivals import estimates, experiment, not_identifiable, ranking, seen_sizes
 from fes_pin.diagnosis.errors_ahead import AheadErrors, free_errors, noise_that_is_small
@@ -46,7 +47,8 @@ def diagnosis_of(
 ) -> Diagnosis:
     """Return the diagnosis of a rig from a search by the likelihood that has run."""
     first, white = RigVerdict(search, trials[1]).of(found), WhiteProcessNoise(trials[1])
-    state: RigState = choose(first, (white, LeastSquares(trials[1])), search.models.seed)
+    others = (InverseDynamics(trials[1]), white, LeastSquares(trials[1]))
+    state: RigState = choose(first, others, search.models.seed)
     verdict, found = state.verdict, state.found
     assert isinstance(verdict, RigVerdict)
     left, best = verdict.lack_of_fit(state), _with_intervals(state, white.fit if state is first else first.found.best)

@@ -33,6 +33,10 @@ from fes_pin.infer.verdict import State, Verdict, Weighed
 from fes_pin.remainder.lack_of_fit import lack_of_fit
 
 
+EFFORT = "the low-passed effort"
+"""What inverse dynamics predicts."""
+
+
 @dataclass(frozen=True)
 class RigWeighed(Weighed):
     """Evidence of trials on a set of causes.
@@ -121,12 +125,21 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
         return not is_chosen(share_of(self.chosen(state), self.models.alike(state.found, name)))
 
     @property
-    def currencies(self) -> tuple[str]:
-        """Predictions over the horizon of a rig in closed loop or of imposed motion, else free simulations."""
-        return (FREE if (ahead_s := self.models.judged_s) is None else f"predictions {ahead_s:g} s ahead",)
+    def currencies(self) -> tuple[str, ...]:
+        """Predictions over the horizon of a rig in closed loop or of imposed motion, else free simulations.
 
-    def errors_in(self, state: RigState, currency: str, unit: State[Any, Any, Any]) -> Errors:
-        """Return cross-validated errors of a set on the fitted trials; of a single trial, those of the fit itself."""
+        Where the effort of a joint was recorded, the low-passed effort that its motion takes as well.
+        """
+        motion = FREE if (ahead_s := self.models.judged_s) is None else f"predictions {ahead_s:g} s ahead"
+        return (motion, EFFORT) if self.models.by_effort is not None else (motion,)
+
+    def errors_in(self, state: RigState, currency: str, unit: State[Any, Any, Any]) -> Errors | None:
+        """Return cross-validated errors of a set on the fitted trials; of a single trial, those of the fit itself.
+
+        A set with a cause of which inverse dynamics knows no column has no error of effort.
+        """
+        if currency == EFFORT and self.models.by_effort is not None:
+            return self.models.by_effort.errors(state.found.best.names)
         best, train, folds = state.found.best, self.models.trials, self.folds(state)
         if not (folds and folds[0].within):
             folds = make_folds(replace(state.found, nominal=best, without={}), train, (), self.refitted)

@@ -14,11 +14,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-import pinocchio as pin
-from scipy.signal import bilinear, lfilter
 
 from fes_pin.effort.motion import Motion
-from fes_pin.models.rigs.rigid import gravity_coefficients, joint_inertia, joint_is_revolute
+from fes_pin.models.rigs.joint import Joint
 
 Values = Mapping[str, float]
 """Values by name; those of a cause as `cause.parameter`, within its own functions as `parameter`."""
@@ -86,9 +84,10 @@ class Links:
     turns: bool
 
     @classmethod
-    def of(cls, model: pin.Model) -> Links:
-        """Return the links of a Pinocchio model of one joint."""
-        return cls(joint_inertia(model), *gravity_coefficients(model), joint_is_revolute(model))
+    def of_rig(cls, rig: Joint) -> Links:
+        """Return the links of a joint as its URDF has them."""
+        inertia, cosine, sine, turns = (float(rig.constants[n]) for n in rig.needed)
+        return cls(inertia, cosine, sine, bool(turns))
 
     def gravity(self, q: np.ndarray, tilt: float = 0.0) -> np.ndarray:
         """Return the torque of gravity at positions, shape (n,), the base tilted."""
@@ -151,6 +150,8 @@ def joint_stop(track: Motion, x: Values, sizes: Sizes) -> Sequence[np.ndarray]:
 
 def passive_relaxation(track: Motion, x: Values, sizes: Sizes) -> Sequence[np.ndarray]:
     """Return a spring in series with a damper."""
+    from scipy.signal import lfilter  # half a second, which other rigs do not need
+
     keeps = math.exp(-track.dt / x["relaxation_s"])
     rest = lfilter([1.0 - keeps], [1.0, -keeps], track.q - track.q[0]) + track.q[0]
     return (track.low(track.q - rest),)
@@ -172,6 +173,8 @@ def frame_vibration(track: Motion, x: Values, sizes: Sizes) -> Sequence[np.ndarr
 
     With H = s^2 / (s^2 + 2 zeta omega s + omega^2) the believed inertia has the effort coupling H q''.
     """
+    from scipy.signal import bilinear, lfilter
+
     omega = 2.0 * math.pi * x["frequency_hz"]
     b, a = bilinear([1.0, 0.0, 0.0], [1.0, 2.0 * x["damping_ratio"] * omega, omega**2], 1.0 / track.dt)
     return (track.low(sizes.links.inertia * lfilter(b, a, track.a)),)

@@ -60,9 +60,9 @@ class EffortSets(FittedSets[EffortFit, Values]):
         super().__init__()
         self.rows, self.seed, self.takes_forms = rows, seed, False
         self._formed: set[tuple[Names, frozenset[Hashable]]] = set()
-        imposed = all(t.record.kind == "imposed" for t in rows.tracks)
-        self.values = {**nominal_values, HOLD: HELD_ROWS * (not imposed)}
-        self.base = {n: NOMINAL[n] for n in fitted} | ({HOLD: (0.0, HELD_ROWS)} if imposed else {})
+        self.is_imposed = all(t.record.kind == "imposed" for t in rows.tracks)
+        self.values = {**nominal_values, HOLD: HELD_ROWS * (not self.is_imposed)}
+        self.base = {n: NOMINAL[n] for n in fitted} | ({HOLD: (0.0, HELD_ROWS)} if self.is_imposed else {})
         self.library = rows.library
 
     @property
@@ -99,6 +99,18 @@ class EffortSets(FittedSets[EffortFit, Values]):
         begun = {**found.values, **{n: start[n] for n in unseen}}
         held = fit_of(EffortProblem(self.rows, names, limits, problem.variances), begun, forms)
         return held if held.sse < found.sse + SEPARABLE else found
+
+    def fitted_set(self, names: Names) -> EffortFit:
+        """Return the fit of a set; of one that no search fitted, from the best of its subsets, a cause at a time."""
+        while names not in self.fits:
+            base = min((k for k in self.fits if {*k} < {*names}), key=self._by)
+            known = {n: c for n, c in self.candidates(self.fits[base]).items() if n in names}
+            start = max(known, key=lambda n: known[n].gain, default=None)
+            more = start or next(n for n in names if n not in base)
+            begun = known[more].start if start else self._tried[more][0]
+            larger = tuple(sorted((*base, more)))
+            self.fits |= self.begin(self.fits[base], {larger: begun})
+        return self.fits[names]
 
     def nominal(self) -> EffortFit:
         """Fit the nominal model."""

@@ -12,20 +12,25 @@ import numpy as np
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.study import Study
+from fes_pin.data.trial import Trial
 from fes_pin.effort.columns import Links
 from fes_pin.effort.fits import EffortSets
 from fes_pin.effort.motion import Band, Record, band_of, has_rows, noise_of_bend
-from fes_pin.effort.problem import HOLD, EffortFit, Rows
+from fes_pin.effort.problem import HOLD, EffortFit, Rows, own
 from fes_pin.effort.verdict import EffortSearch, EffortState, EffortVerdict
 from fes_pin.infer.covariance import covariance_of
+from fes_pin.infer.fits import Names
+from fes_pin.infer.held_out import Errors
 from fes_pin.infer.problem import normal_equations
 from fes_pin.infer.result import Cause, ParameterEstimate, Remainder
 from fes_pin.infer.scatter import as_wide_as_estimates_differ, as_wide_as_trials_differ, with_honest_intervals
 from fes_pin.infer.search import Search
 from fes_pin.infer.verdict import share_in, word_of
 from fes_pin.models.effects import effect_named
+from fes_pin.models.model import Model
+from fes_pin.models.rigs.base import Rig
 from fes_pin.models.rigs.joint import Joint
-from fes_pin.models.rigs.rigid import load_urdf
+from fes_pin.models.stage import Effect
 
 OTHER_BANDS = (0.7, 1.4)
 """Bands in which a set is fitted again, as shares of its own: half of the power of the acceleration apart."""
@@ -78,6 +83,103 @@ class EffortAnswer:
         return json.dumps(record)
 
 
+@dataclass(frozen=True, eq=False)
+class Searched:
+    """What a search of efforts found, before its values are final.
+
+    Attributes
+    ----------
+    rig
+        The joint, with the start values of its nominal parameters.
+    state
+        The state to which no claim objects.
+    others
+        Sets of the same trials in other bands; see `OTHER_BANDS`.
+    """
+
+    rig: Joint
+    state: EffortState
+    others: Sequence[EffortSets]
+
+    @property
+    def models(self) -> EffortSets:
+        """The sets that were searched."""
+        return self.state.search.models
+
+    @property
+    def band_hz(self) -> float:
+        """Cut-off frequency of the low pass, Hz."""
+        return self.models.rows.band.low
+
+    @property
+    def names(self) -> Names:
+        """Names of the causes, in alphabetical order."""
+        return tuple(sorted(self.state.names))
+
+    def errors(self, names: Names) -> Errors | None:
+        """Return cross-validated errors of the low-passed effort of a set; None where a cause has no column there."""
+        if {*names} - {*self.models.library}:
+            return None
+        verdict = self.state.verdict
+        assert isinstance(verdict, EffortVerdict)
+        return verdict.errors_of(self.models.fitted_set(names), self.state.found.best)
+
+    def model(self) -> Model:
+        """Return the set as a model of the catalogue."""
+        fitted, info = self.state.found.best, self.rig.parameters()
+        effects = (self._effect(fitted, n) for n in fitted.names)
+        nominal = {n: one.nearest(fitted.values[n]) for n, one in info.items() if n in fitted.free}
+        return Model(self.rig, tuple(effects)).with_parameters(nominal)
+
+    def _effect(self, fitted: EffortFit, name: str) -> Effect:
+        """Return a cause of a fit as the catalogue has it, with the forms that were significant."""
+        kind, forms = effect_named(name), self.models.library[name].forms
+        unused = {n for k, one in enumerate(forms) if k not in fitted.forms.get(name, ()) for n in one}
+        known = {n: v for n, v in own(fitted.values, name).items() if n not in unused}
+        if not self.models.is_imposed:  # the velocity is estimated, with an uncertainty that rounds friction
+            known = {n: v for n, v in known.items() if n != "creep_speed"}
+            known |= {"stretch": known.pop("presliding")} if "presliding" in known else {}
+        values: dict[str, Any] = {n: x.nearest(known[n]) for n, x in kind.parameters().items() if n in known}
+        return kind(**values)
+
+
+def has_efforts(rig: Rig, trials: Sequence[Trial]) -> bool:
+    """Return whether trials have what inverse dynamics takes: efforts and positions of a joint, without gaps."""
+    wanted = ("effort", "position")
+    known = (all(n in t.columns and np.isfinite(t[n]).all() for n in wanted) and t["effort"].any() for t in trials)
+    return isinstance(rig, Joint) and bool(trials) and all(known)
+
+
+def searched(rig: Joint, trials: Sequence[Trial], seed: int = 0) -> Searched:
+    """Search the causes of a joint by least squares of its low-passed efforts.
+
+    Parameters
+    ----------
+    rig
+        The nominal model with its start values.
+    trials
+        For which `has_efforts` is true.
+
+    Raises
+    ------
+    InputError
+        The motion is not above the noise of its reading, or trials are shorter than the filter.
+    """
+    records = [Record(t.name, t.time, t["position"], t["effort"], t.kind) for t in trials]
+    links = Links.of_rig(rig)
+    values = {n: float(getattr(rig, n)) for n in rig.parameters()}
+    fitted = [n for n in rig.fitted_parameters() if n != "gravity_scale" or links.cosine or links.sine]
+    band = band_of(records)
+
+    def sets_in(one: Band) -> EffortSets:
+        return EffortSets(Rows(records, one, links), values, fitted, seed)
+
+    search: EffortSearch = Search(sets_in(band), lambda share, words: None)
+    state = EffortVerdict(search).of(search.run())
+    bands = [replace(band, low=r * band.low, wide=max(band.wide, r * band.low)) for r in OTHER_BANDS]
+    return Searched(rig, state, [sets_in(one) for one in bands if has_rows(records, one)])
+
+
 def search_effort(study: Study, seed: int = 0) -> EffortAnswer:
     """Return the causes of a joint by least squares of its low-passed efforts.
 
@@ -91,37 +193,26 @@ def search_effort(study: Study, seed: int = 0) -> EffortAnswer:
     InputError
         The study is not of a joint, or its motion is not above the noise.
     """
-    if study.rig != "joint" or study.urdf is None:
+    if study.rig != "joint":
         raise InputError(f"expected a study of a joint, found one of the rig {study.rig}", file=study.folder)
-    trials = [t for t in study.trials if t.role != "held_out"]
-    if any("effort" not in t.columns or "position" not in t.columns or not t["effort"].any() for t in trials):
+    trials, joint = [t for t in study.trials if t.role != "held_out"], Joint.of_study(study)
+    if not has_efforts(joint, trials):
         return EffortAnswer(REJECTED, refusal=NO_EFFORT)
-    records = [Record(t.name, t.time, t["position"], t["effort"], t.kind) for t in trials]
-    joint, links = Joint.of_study(study), Links.of(load_urdf(study.urdf))
-    values = {n: float(getattr(joint, n)) for n in ("inertia_scale", "damping", "gravity_scale")}
-    fitted = [n for n in joint.fitted or () if n != "gravity_scale" or links.cosine or links.sine]
-    band = band_of(records)
-
-    def sets_in(one: Band) -> EffortSets:
-        return EffortSets(Rows(records, one, links), values, fitted, seed)
-
-    search: EffortSearch = Search(sets_in(band), lambda share, words: None)
-    verdict = EffortVerdict(search)
-    state = verdict.of(search.run())
-    bands = [replace(band, low=r * band.low, wide=max(band.wide, r * band.low)) for r in OTHER_BANDS]
-    others = [sets_in(one) for one in bands if has_rows(records, one)]
-    nominal, extended = (_final(verdict, one, others) for one in (state.found.nominal, state.found.best))
-    word = word_of(bool(state.names), state.weighed.lack_of_fit)
-    if _moves(extended, state.found.best, others):
-        return EffortAnswer(REJECTED, band_hz=band.low, refusal=NOT_CARRIED, remainder=state.weighed.lack_of_fit)
+    found = searched(joint, trials, seed)
+    state, verdict = found.state, found.state.verdict
+    assert isinstance(verdict, EffortVerdict)
+    left, many = state.weighed.lack_of_fit, (state.found.nominal, state.found.best)
+    nominal, extended = (_final(verdict, one, found.others) for one in many)
+    if _moves(extended, state.found.best, found.others):
+        return EffortAnswer(REJECTED, band_hz=found.band_hz, refusal=NOT_CARRIED, remainder=left)
     units = joint.units()
     return EffortAnswer(
-        word,
+        word_of(bool(state.names), left),
         tuple(_causes(state, extended, units)),
         _estimates(nominal, "", units),
         _estimates(extended, "", units),
-        state.weighed.lack_of_fit,
-        band.low,
+        left,
+        found.band_hz,
     )
 
 

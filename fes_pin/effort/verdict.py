@@ -80,6 +80,13 @@ class EffortVerdict(Verdict[EffortFit, EffortSets, Weighed]):
             evidence[name] = Evidence(added.added / scatter, added.squares / scatter)
         return Weighed(gains, evidence, remainder, is_robust=True)
 
+    def errors_of(self, fitted: EffortFit, best: EffortFit) -> Errors:
+        """Return squared errors of the low-passed effort by fits without the part of a row, at the weights of a set."""
+        roots, efforts = self.search.models.roots(best), self.search.models.rows.efforts(fitted.values)
+        errors = self._errors([r * w for r, w in zip(self.left(fitted), roots, strict=True)])
+        spread = self._errors([(u - u.mean()) * w for u, w in zip(efforts, roots, strict=True)])
+        return replace(errors, spread=spread.squares)
+
     def _errors(self, left: Sequence[np.ndarray]) -> Errors:
         """Return squared errors by units of evidence; the spread is that of the effort's noise."""
         unit, flat = np.concatenate(list(self.units)), np.concatenate(list(left))

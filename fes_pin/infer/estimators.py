@@ -1,18 +1,19 @@
 """Estimators of the same data: each searches and is judged by its own claims, and the one that predicts better answers.
 
 Their fits need have nothing in common. Two estimators are compared by cross-validated errors of the same data, by the
-same units, in the first currency of the first that the other has too: what is predicted, as free motion.
+same units, in each currency that both have: what is predicted, as free motion.
 """
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from fes_pin.infer.held_out import Errors, held_out_gain
 from fes_pin.infer.levels import NOTHING_PERCENT
+from fes_pin.infer.result import Gain
 from fes_pin.infer.text import percent
 from fes_pin.infer.verdict import State, Step
 
@@ -22,34 +23,76 @@ CHOICE = "choose"
 
 
 class Estimator(ABC):
-    """A way to estimate data that another estimator was asked about first."""
+    """A way to estimate data that another estimator was asked about first.
+
+    Attributes
+    ----------
+    prefers_smaller
+        Whether its set answers if it is smaller, where neither predicts better.
+    """
+
+    prefers_smaller = False
 
     @abstractmethod
     def state(self, first: AnyState) -> AnyState | None:
         """Return the state to which none of its claims objects; None where it does not apply or time is up."""
 
 
+@dataclass(frozen=True)
+class Compared:
+    """The sets of two estimators in one currency.
+
+    Attributes
+    ----------
+    before, after
+        Errors of the first and of the other.
+    gain, loss
+        Share of the squared error that the other removes from the first, and the first from the other.
+    """
+
+    currency: str
+    before: Errors
+    after: Errors
+    gain: Gain
+    loss: Gain
+
+    def __str__(self) -> str:
+        errors = f"{percent(self.before.error_percent())} -> {percent(self.after.error_percent())}"
+        return f"E of {self.currency} {errors}, gain {self.gain}"
+
+
 def choose(first: AnyState, others: Sequence[Estimator], seed: int = 0) -> AnyState:
     """Return the state of the first estimator, or of one that predicts materially better; the first such one.
 
     It predicts better where the 95 % interval of the share of the squared error that it removes is above
-    `NOTHING_PERCENT`. Noise is not subtracted: each estimator has its own, and that of a wrong model is large. Data
-    that the study itself holds out are not used: gains on them would be optimistic.
+    `NOTHING_PERCENT` in one currency, and in none that of the share which the first removes is. Noise is not
+    subtracted: each estimator has its own, and that of a wrong model is large. Data that the study itself holds out are
+    not used: gains on them would be optimistic.
     """
     for estimator in others:
         other = estimator.state(first)
         if other is None:
             continue
-        both = (one for one in first.verdict.currencies if one in other.verdict.currencies)
-        if (currency := next(both, None)) is None:
-            continue
-        before, after = (one.verdict.errors_in(one, currency, first) for one in (first, other))
-        gain = held_out_gain(before, before, _without_noise(after), seed)
-        if gain.low > NOTHING_PERCENT:
-            errors = f"E of {currency} {percent(before.error_percent())} -> {percent(after.error_percent())}"
-            step = Step(CHOICE, words=f"{other.search.sets.estimator} predicts better: {errors}, gain {gain}")
-            return replace(other, steps=(*first.steps, *other.steps, step))
+        compared = _compared(first, other, seed)
+        better = [c for c in compared if c.gain.low > NOTHING_PERCENT]
+        worse = [c for c in compared if c.loss.low > NOTHING_PERCENT]
+        smaller = estimator.prefers_smaller and len(other.names) < len(first.names) and bool(compared)
+        if not worse and (better or smaller):
+            said = "predicts better" if better else "predicts as well with fewer causes"
+            words = f"{other.search.sets.estimator} {said}: {'; '.join(map(str, better or compared))}"
+            return replace(other, steps=(*first.steps, *other.steps, Step(CHOICE, words=words)))
     return first
+
+
+def _compared(first: AnyState, other: AnyState, seed: int) -> list[Compared]:
+    """Return the comparison of two states in each currency that both have."""
+    out = []
+    for currency in (one for one in first.verdict.currencies if one in other.verdict.currencies):
+        before, after = (one.verdict.errors_in(one, currency, first) for one in (first, other))
+        if before is not None and after is not None:
+            gains = (held_out_gain(a, a, _without_noise(b), seed) for a, b in ((before, after), (after, before)))
+            out.append(Compared(currency, before, after, *gains))
+    return out
 
 
 def _without_noise(errors: Errors) -> Errors:

@@ -32,14 +32,16 @@ class Policy:
         Number of sets of a size that are judged, lowest criterion first, until one is accepted; and that are extended
         after.
     fitted
-        Number of candidates of largest score that are fitted together with a set; None for all. With the nominal model
-        all are fitted.
+        Number of candidates of largest score that are fitted together with a set; None for all.
+    fitted_first
+        The same together with the nominal model.
     given
         A set that is judged without a search and without further rivals; None for a search.
     """
 
     beam: int = BEAM
     fitted: int | None = FITTED
+    fitted_first: int | None = None
     given: Names | None = None
 
 
@@ -93,7 +95,7 @@ class Search(Generic[F, M]):
             self.sets.nominal()
         self._kept: Names = ()
         try:
-            self._kept = self.sets.first()
+            self._kept = self._backward(self.sets.first())
             given = self.policy.given
             return self.settle(self._backward(self._found_forward() if given is None else given))
         except OutOfTime:
@@ -129,11 +131,15 @@ class Search(Generic[F, M]):
             if best and not self._worth_extending(best):
                 break
             for names in self.sets.near(size - 1)[: self.policy.beam]:
-                self.sets.extend(names, None if size == 1 else self.policy.fitted)
+                self.sets.extend(names, self._most_with(names))
             larger = self._first_accepted(size, best)
             if larger is None:
                 break
             self._kept = larger
+
+    def _most_with(self, names: Names) -> int | None:
+        """Return how many candidates are fitted together with a set; None for all."""
+        return self.policy.fitted if names else self.policy.fitted_first
 
     def improves(self, larger: F, smaller: F, gain: float, explained: float) -> bool:
         """Return whether a larger set improves on a smaller one by a gain in twice the log-likelihood.
@@ -255,7 +261,7 @@ class Search(Generic[F, M]):
         for name in filter(self.sets.is_claimed, names):
             rest = tuple(n for n in names if n != name)
             self.sets.without(names, name)
-            self.sets.extend(rest, None if len(names) == 1 else self.policy.fitted)
+            self.sets.extend(rest, self._most_with(rest))
             self.sets.converge_rivals(names, name)
         return next(n for n in self.sets.ranked(len(names)) if n == names or self._may_be(n, rejected))
 

@@ -219,8 +219,8 @@ class Verdict(ABC, Generic[F, M, W]):
         """What its models predict, in words, in the order in which estimators are compared by errors of it."""
         return ()
 
-    def errors_in(self, state: State[F, M, W], currency: str, unit: State[Any, Any, Any]) -> Errors:
-        """Return cross-validated errors of a set on the fitted data, by units of evidence.
+    def errors_in(self, state: State[F, M, W], currency: str, unit: State[Any, Any, Any]) -> Errors | None:
+        """Return cross-validated errors of a set on the fitted data, by units of evidence; None where it has none.
 
         Parameters
         ----------

@@ -4,6 +4,7 @@ import copy
 import math
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Self
 
 from fes_pin.data.schema import IMPOSED
@@ -96,6 +97,8 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         Fits by names in alphabetical order.
     calm
         Fits of sets to the same trials without process noise, where there are any.
+    proposed
+        The set that another estimator found, with its values; None without one.
     library
         The causes, with their score tests.
     """
@@ -112,6 +115,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
     ) -> None:
         super().__init__()
         self.calm: dict[Names, LikelihoodFit] = {}
+        self.proposed: Model | None = None
         self.model, self.trials, self.answered, self.noise = model, tuple(trials), answered, noise
         self.seed, self.horizon_s = seed, horizon_s or default_horizon(self.trials)
         if any(t.kind == IMPOSED for t in self.trials):  # imposed motion excites a rig most, and a muscle is several
@@ -140,7 +144,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
     def begun_with(self, fits: Sequence[LikelihoodFit]) -> Self:
         """Return the same trials and causes with some fits to start from; the process noise is timed as in these."""
         other = copy.copy(self)
-        other.fits = {f.names: f for f in fits}
+        other.fits, other.proposed = {f.names: f for f in fits}, None
         other._converged, other._begun, other._compared = set(), set(), {}
         return other
 
@@ -283,17 +287,38 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         return self._rough
 
     def first(self) -> Names:
-        """Return the set that a search begins with: where the nominal model is far, the set nearest by least squares.
+        """Return the set that a search begins with: the proposed one, or one nearer to the data than the nominal model.
 
         A likelihood with autoregressive noise compares small deviations. Far from the data the noise takes up every
         error, and least squares compare.
         """
+        if begun := self._from_proposed():
+            return begun
         if self.noise == WHITE or not self.is_far(self.fits[()]):
             return ()
         best, rough = self.least_squares.approach(), self.least_squares.fits
         for names in sorted((n for n in rough if n and set(n) <= set(best)), key=len):
             self.fits[names] = self._from_least_squares(rough[names])
         return best
+
+    def _from_proposed(self) -> Names:
+        """Return the proposed set, or the own best candidate if that is likelier; none without a proposal."""
+        if self.proposed is None or not self.proposed.effects:
+            return ()
+        if self.noise == PROCESS:
+            noises = [self.fits[()].noise, self._guess()]
+            fits = in_parallel(partial(self._maximum, self.proposed), noises)
+        else:
+            fits = [self.from_least_squares(self.proposed)]
+        best = min(fits, key=lambda f: f.criterion)
+        if not math.isfinite(best.criterion) or self.is_far(best):
+            return ()
+        self.fits[best.names] = best
+        self._converge([best.names])
+        while (better := self.better_form(self.fits[best.names])) is not None:
+            self.fits[best.names] = better
+        self.extend((), FITTED)
+        return min((best.names, self.ranked(1)[0]), key=lambda n: self.fits[n].criterion)
 
     def approach(self, least: float = NOTHING_PERCENT) -> Names:
         """Return the smallest set whose E is no more than the least, or the nearest set of at most `MOST_CAUSES`.
