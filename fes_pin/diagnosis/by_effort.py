@@ -11,7 +11,7 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.estimators import RigEstimator
 from fes_pin.diagnosis.likelihood_models import Found, LikelihoodModels, LikelihoodSearch
 from fes_pin.diagnosis.verdict import RigState, RigVerdict
-from fes_pin.effort.search import Searched, has_efforts, searched
+from fes_pin.effort.search import has_efforts, searched
 from fes_pin.infer.search import FITTED, Policy
 from fes_pin.infer.verdict import State
 from fes_pin.models.rigs.joint import Joint

@@ -13,8 +13,8 @@ from fes_pin.data.log import EFFORT, Log
 from fes_pin.data.provenance import provenance_now
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.by_trial import Ask, Ran, with_fault, with_faults
 from fes_pin.diagnosis.by_effort import begun_by_effort
+from fes_pin.diagnosis.by_trial import Ask, Ran, with_fault, with_faults
 from fes_pin.diagnosis.likelihood_models import Found, LikelihoodModels, LikelihoodSearch, NominalFitError
 from fes_pin.diagnosis.logged import (
     ASKED_OF_EFFORTS,

@@ -4,7 +4,7 @@ import math
 
 from fes_pin.diagnosis.errors_ahead import are_large, random_parts
 from fes_pin.diagnosis.held_out import Fold, Found, gains_of
-from fes_pin.effort.search import Searched
+from fes_pin.effort.search import FoundByEffort
 from fes_pin.identify.afar import is_rounding
 from fes_pin.identify.likelihood import is_simulated
 from fes_pin.identify.likelihood_fit import LikelihoodFit
@@ -32,7 +32,7 @@ class LikelihoodModels(LikelihoodFits):
         What inverse dynamics found in the same trials; None where it does not apply.
     """
 
-    by_effort: Searched | None = None
+    by_effort: FoundByEffort | None = None
 
     def nominal(self) -> LikelihoodFit:
         """Fit the nominal model, and simulate the family of score tests of all causes in it.

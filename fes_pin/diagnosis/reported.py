@@ -47,8 +47,8 @@ def diagnosis_of(
 ) -> Diagnosis:
     """Return the diagnosis of a rig from a search by the likelihood that has run."""
     first, white = RigVerdict(search, trials[1]).of(found), WhiteProcessNoise(trials[1])
-    others = (InverseDynamics(trials[1]), white, LeastSquares(trials[1]))
-    state: RigState = choose(first, others, search.models.seed)
+    estimators = (InverseDynamics(trials[1]), white, LeastSquares(trials[1]))
+    state: RigState = choose(first, estimators, search.models.seed)
     verdict, found = state.verdict, state.found
     assert isinstance(verdict, RigVerdict)
     left, best = verdict.lack_of_fit(state), _with_intervals(state, white.fit if state is first else first.found.best)

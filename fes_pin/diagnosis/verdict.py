@@ -32,7 +32,6 @@ from fes_pin.infer.result import FITTED, Gain, Remainder
 from fes_pin.infer.verdict import State, Verdict, Weighed
 from fes_pin.remainder.lack_of_fit import lack_of_fit
 
-
 EFFORT = "the low-passed effort"
 """What inverse dynamics predicts."""
 

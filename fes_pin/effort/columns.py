@@ -150,7 +150,7 @@ def joint_stop(track: Motion, x: Values, sizes: Sizes) -> Sequence[np.ndarray]:
 
 def passive_relaxation(track: Motion, x: Values, sizes: Sizes) -> Sequence[np.ndarray]:
     """Return a spring in series with a damper."""
-    from scipy.signal import lfilter  # half a second, which other rigs do not need
+    from scipy.signal import lfilter  # noqa: PLC0415 - half a second, which other rigs do not need
 
     keeps = math.exp(-track.dt / x["relaxation_s"])
     rest = lfilter([1.0 - keeps], [1.0, -keeps], track.q - track.q[0]) + track.q[0]
@@ -173,7 +173,7 @@ def frame_vibration(track: Motion, x: Values, sizes: Sizes) -> Sequence[np.ndarr
 
     With H = s^2 / (s^2 + 2 zeta omega s + omega^2) the believed inertia has the effort coupling H q''.
     """
-    from scipy.signal import bilinear, lfilter
+    from scipy.signal import bilinear, lfilter  # noqa: PLC0415 - as above
 
     omega = 2.0 * math.pi * x["frequency_hz"]
     b, a = bilinear([1.0, 0.0, 0.0], [1.0, 2.0 * x["damping_ratio"] * omega, omega**2], 1.0 / track.dt)

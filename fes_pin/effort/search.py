@@ -84,7 +84,7 @@ class EffortAnswer:
 
 
 @dataclass(frozen=True, eq=False)
-class Searched:
+class FoundByEffort:
     """What a search of efforts found, before its values are final.
 
     Attributes
@@ -150,7 +150,7 @@ def has_efforts(rig: Rig, trials: Sequence[Trial]) -> bool:
     return isinstance(rig, Joint) and bool(trials) and all(known)
 
 
-def searched(rig: Joint, trials: Sequence[Trial], seed: int = 0) -> Searched:
+def searched(rig: Joint, trials: Sequence[Trial], seed: int = 0) -> FoundByEffort:
     """Search the causes of a joint by least squares of its low-passed efforts.
 
     Parameters
@@ -177,7 +177,7 @@ def searched(rig: Joint, trials: Sequence[Trial], seed: int = 0) -> Searched:
     search: EffortSearch = Search(sets_in(band), lambda share, words: None)
     state = EffortVerdict(search).of(search.run())
     bands = [replace(band, low=r * band.low, wide=max(band.wide, r * band.low)) for r in OTHER_BANDS]
-    return Searched(rig, state, [sets_in(one) for one in bands if has_rows(records, one)])
+    return FoundByEffort(rig, state, [sets_in(one) for one in bands if has_rows(records, one)])
 
 
 def search_effort(study: Study, seed: int = 0) -> EffortAnswer:
