@@ -56,6 +56,16 @@ class Compared:
     gain: Gain
     loss: Gain
 
+    @property
+    def is_better(self) -> bool:
+        """Whether the other predicts materially better, with certainty."""
+        return self.gain.low > NOTHING_PERCENT
+
+    @property
+    def is_worse(self) -> bool:
+        """Whether the first does."""
+        return self.loss.low > NOTHING_PERCENT
+
     def __str__(self) -> str:
         errors = f"{percent(self.before.error_percent())} -> {percent(self.after.error_percent())}"
         return f"E of {self.currency} {errors}, gain {self.gain}"
@@ -64,22 +74,21 @@ class Compared:
 def choose(first: AnyState, others: Sequence[Estimator], seed: int = 0) -> AnyState:
     """Return the state of the first estimator, or of one that predicts materially better; the first such one.
 
-    It predicts better where the 95 % interval of the share of the squared error that it removes is above
-    `NOTHING_PERCENT` in one currency, and in none that of the share which the first removes is. Noise is not
-    subtracted: each estimator has its own, and that of a wrong model is large. Data that the study itself holds out are
-    not used: gains on them would be optimistic.
+    It predicts better where the share of the squared error that it removes is above `NOTHING_PERCENT` in every
+    currency, and in one with its 95 % interval: what improves one currency alone is an error of form of another. Noise
+    is not subtracted: each estimator has its own, and that of a wrong model is large. Data that the study itself holds
+    out are not used: gains on them would be optimistic.
     """
     for estimator in others:
         other = estimator.state(first)
         if other is None:
             continue
         compared = _compared(first, other, seed)
-        better = [c for c in compared if c.gain.low > NOTHING_PERCENT]
-        worse = [c for c in compared if c.loss.low > NOTHING_PERCENT]
-        smaller = estimator.prefers_smaller and len(other.names) < len(first.names) and bool(compared)
-        if not worse and (better or smaller):
+        better = all(c.gain.percent > NOTHING_PERCENT for c in compared) and any(c.is_better for c in compared)
+        smaller = estimator.prefers_smaller and len(other.names) < len(first.names)
+        if better or (smaller and compared and not any(c.is_worse for c in compared)):
             said = "predicts better" if better else "predicts as well with fewer causes"
-            words = f"{other.search.sets.estimator} {said}: {'; '.join(map(str, better or compared))}"
+            words = f"{other.search.sets.estimator} {said}: {'; '.join(map(str, compared))}"
             return replace(other, steps=(*first.steps, *other.steps, Step(CHOICE, words=words)))
     return first
 
