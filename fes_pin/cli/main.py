@@ -67,6 +67,9 @@ def diagnose(
     out: Annotated[Path, output("Folder for diagnosis.json, model.toml and report.html.")],
     seed: Seed = 0,
     limit: Limit = None,
+    thorough: Annotated[
+        bool, typer.Option("--thorough", help="Both estimators of a joint with recorded efforts search.")
+    ] = False,
     tables: Annotated[
         str | None, typer.Option(help="csv or parquet: also trajectories.csv, samples and predictions of both models.")
     ] = None,
@@ -108,7 +111,7 @@ def diagnose(
             tell(DIAGNOSING * share, words)
 
         brought = None if measured.schema.owner is None else catalogue
-        found = find(measured, library=brought, seed=seed, limit=limit, progress=report)
+        found = find(measured, library=brought, seed=seed, limit=limit, progress=report, thorough=thorough)
         tell(DIAGNOSING, "report")
         files = answer_files(found.by_command(this_command()))
         if table is not None and isinstance(found, Diagnosis):

@@ -8,19 +8,21 @@ from collections.abc import Sequence
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.estimators import RigEstimator
-from fes_pin.diagnosis.likelihood_models import Found, LikelihoodModels, LikelihoodSearch
+from fes_pin.diagnosis.likelihood_models import LikelihoodModels
 from fes_pin.diagnosis.verdict import RigState, RigVerdict
 from fes_pin.effort.search import has_efforts, searched
+from fes_pin.identify.likelihood_fit import LikelihoodFit
+from fes_pin.infer.estimators import AnyState, Estimator
+from fes_pin.infer.scatter import as_wide_as_estimates_differ
 from fes_pin.infer.search import FITTED, Policy
 from fes_pin.infer.verdict import State
 from fes_pin.models.rigs.joint import Joint
 
 
-def begun_by_effort(models: LikelihoodModels, trials: Sequence[Trial]) -> Policy:
+def begun_by_effort(models: LikelihoodModels, trials: Sequence[Trial], thorough: bool = False) -> Policy:
     """Search by inverse dynamics where it applies, and return the options of a search that begins there.
 
-    Sets of one cause are then fitted by their scores alone.
+    Of sets of one cause those of largest score are fitted then. A thorough search begins with none, and fits all.
     """
     rig = models.model.rig
     if models.model.effects or not isinstance(rig, Joint) or not has_efforts(rig, trials):
@@ -29,14 +31,30 @@ def begun_by_effort(models: LikelihoodModels, trials: Sequence[Trial]) -> Policy
         models.by_effort = searched(rig, trials, models.seed)
     except InputError:  # the motion is not above the noise of its reading
         return Policy()
+    if thorough:
+        return Policy()
     models.proposed = models.by_effort.model()
     return Policy(fitted_first=FITTED)
 
 
-class InverseDynamics(RigEstimator):
-    """Least squares of the low-passed effort, for a joint whose effort was recorded."""
+class InverseDynamics(Estimator):
+    """Least squares of the low-passed effort, for a joint whose effort was recorded.
+
+    Parameters
+    ----------
+    test
+        Trials that the study itself holds out.
+    """
+
+    def __init__(self, test: Sequence[Trial]) -> None:
+        self.test = test
 
     prefers_smaller = True
+
+    def words(self, state: AnyState) -> str:
+        """Return how it found a set, in words."""
+        by_effort = state.search.models.by_effort
+        return by_effort.models.estimator if by_effort else ""
 
     def state(self, first: RigState) -> RigState | None:
         """Return the state of its set, fitted by the likelihood; None where the first state has the same."""
@@ -44,13 +62,41 @@ class InverseDynamics(RigEstimator):
         by_effort = models.by_effort
         if by_effort is None or search.was_stopped or {*by_effort.names} == first.names:
             return None
-        fitted = models.fits.get(by_effort.names)
-        if fitted is None or not models.is_possible(fitted):
+        if by_effort.names not in models.fits:
+            models.fit_model(by_effort.model())
+        if not models.is_possible(models.fits[by_effort.names]):
             return None
         verdict = RigVerdict(search, self.test)
         found = search.result(by_effort.names)
         return State(verdict, found, verdict.weigh(found), {}, frozenset(by_effort.names), replaced=first)
 
-    def searched(self, first: RigState) -> tuple[LikelihoodSearch, Found] | None:
-        """Return None: its search has run before that of the likelihood."""
-        return None
+
+def as_wide_as_efforts(fitted: LikelihoodFit, models: LikelihoodModels) -> LikelihoodFit:
+    """Return a fit with intervals that include the estimates of inverse dynamics where these differ significantly."""
+    other = models.by_effort.final(fitted.names) if models.by_effort is not None else None
+    return fitted if other is None else as_wide_as_estimates_differ(fitted, other)
+
+
+def named_by_one(first: RigState, answer: RigState) -> list[str]:
+    """Return a line for each cause that only one of two estimators names, where both know it.
+
+    Parameters
+    ----------
+    first
+        The state of the likelihood, of which inverse dynamics is the other estimator.
+    answer
+        The state that answers.
+    """
+    models = first.search.models
+    if (by_effort := models.by_effort) is None:
+        return []
+    alike = {n: {*models.alike(answer.found, n)} for n in answer.names}
+    by_motion, others = {*first.names}, {*by_effort.names}
+    words = []
+    for name in sorted((by_motion ^ others) & {*by_effort.models.library}):
+        one, other = ("motion", "effort") if name in by_motion else ("effort", "motion")
+        near = alike.get(name, {name} | {n for n, many in alike.items() if name in many})
+        if not (near & by_motion and near & others):
+            left = "" if name in alike else "; it is not in the answer"
+            words.append(f"{name} is named by {one}, not by {other}{left}")
+    return words

@@ -56,6 +56,7 @@ def diagnose_joint(
     seed: int = 0,
     limit: float | None = None,
     progress: Progress | None = None,
+    thorough: bool = False,
 ) -> Diagnosis:
     """Find the causes that explain the error of a study's nominal model.
 
@@ -74,6 +75,8 @@ def diagnose_joint(
         of the nominal model and the judgement of that set take time in addition.
     progress
         Called with the share that is done and a few words.
+    thorough
+        Whether both estimators of a joint with recorded efforts search by themselves.
 
     Returns
     -------
@@ -94,7 +97,7 @@ def diagnose_joint(
         warnings += given_away(measured.study)
     warnings += [UNCHECKED] * bool(unchecked)
     with one_thread_each(), noting_stops() as stops:
-        work = _Work(catalogue, seed, tell, math.inf if limit is None else time.perf_counter() + limit, stops)
+        work = _Work(catalogue, seed, tell, math.inf if limit is None else time.perf_counter() + limit, stops, thorough)
         diagnosis = work.diagnosis_of_log(measured.study)
     tell(1.0, "done")
     warnings += diagnosis.warnings
@@ -114,6 +117,8 @@ class _Work:
         Time at which searches stop, of `time.perf_counter`.
     stops
         Not empty once a search was stopped; see `noting_stops`.
+    thorough
+        As of `diagnose_joint`.
 
     Attributes
     ----------
@@ -123,8 +128,11 @@ class _Work:
 
     tests: list[Correction]
 
-    def __init__(self, catalogue: Catalogue, seed: int, tell: Progress, end: float, stops: list[float]) -> None:
+    def __init__(
+        self, catalogue: Catalogue, seed: int, tell: Progress, end: float, stops: list[float], thorough: bool = False
+    ) -> None:
         self.catalogue, self.seed, self.tell, self.end, self.stops = catalogue, seed, tell, end, stops
+        self.thorough = thorough
 
     def diagnosis_of_log(self, study: Study) -> Diagnosis:
         """Return the diagnosis of a study as recorded, with the faults of its log corrected where that is possible."""
@@ -165,7 +173,7 @@ class _Work:
                 own = (known, answered, self.seed, study.horizon_s, first_noise(trials, answered))
                 parts = trials if model.effects else in_parts(model.rig, trials, answered)
                 models = LikelihoodModels(model, parts, *own)
-                ran.append(LikelihoodSearch(models, self.tell, begun_by_effort(models, trials)))
+                ran.append(LikelihoodSearch(models, self.tell, begun_by_effort(models, trials, self.thorough)))
                 return ran[-1], ran[-1].run()
 
             conditions = StudyConditions(model, run)

@@ -8,7 +8,7 @@ import numpy as np
 
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.by_effort import InverseDynamics
+from fes_pin.diagnosis.by_effort import InverseDynamics, as_wide_as_efforts, named_by_one
 from fes_pin.diagnosis.decide.chosen_again import share_of
 from fes_pin.diagnosis.decide.rivals import estimates, experiment, not_identifiable, ranking, seen_sizes
 from fes_pin.diagnosis.errors_ahead import AheadErrors, free_errors, noise_that_is_small
@@ -52,13 +52,15 @@ def diagnosis_of(
     verdict, found = state.verdict, state.found
     assert isinstance(verdict, RigVerdict)
     left, best = verdict.lack_of_fit(state), _with_intervals(state, white.fit if state is first else first.found.best)
+    best = as_wide_as_efforts(best, search.models)
     fitted, *others = verdict.errors(state)
     held = others[0] if others else None
     on = HELD_OUT if trials[1] else CROSS_VALIDATED if held else FITTED
     fits = verdict.gains_fitted(found) if state.weighed.folds else state.weighed.gains
     causes = [_cause(verdict, state, e, best, (fits[e.name], on)) for e in best.model.effects if not e.is_fault]
     causes.sort(key=lambda c: -c.gain_held_out.percent)
-    said = (*words_of_reading(best.noise, best.model.rig, trials[0]), *_words_of_far(search.models, found.nominal))
+    said = [*named_by_one(first, state), *words_of_reading(best.noise, best.model.rig, trials[0])]
+    said += _words_of_far(search.models, found.nominal)
     reached = [e for e in (fitted[1].free, held and held[1].free) if e is not None]
     word = word_of(bool(causes), left)
     return Diagnosis(
@@ -75,7 +77,7 @@ def diagnosis_of(
         next_experiment=experiment(best, found.rivals, causes, study),
         ranking=ranking(best, found.rivals),
         held_out_by=on,
-        warnings=(*said, WHITE_PROCESS_NOISE) if best.noise.timed else said,
+        warnings=(*said, *[WHITE_PROCESS_NOISE] * bool(best.noise.timed)),
         seen=_seen(search.models, found.nominal, word),
         random=state.weighed.random,
         is_driven=search.models.judged_s is not None,
@@ -104,7 +106,7 @@ def _with_intervals(state: RigState, other: LikelihoodFit | None) -> LikelihoodF
     best = as_wide_as_trials_differ(with_honest_intervals(state.found.best), again)
     if other is None or other.names != best.names:
         return best
-    return as_wide_as_estimates_differ(best, other)
+    return as_wide_as_estimates_differ(best, with_honest_intervals(other))
 
 
 def _words_of_far(models: LikelihoodFits, nominal: LikelihoodFit) -> list[str]:

@@ -124,6 +124,14 @@ class FoundByEffort:
         assert isinstance(verdict, EffortVerdict)
         return verdict.errors_of(self.models.fitted_set(names), self.state.found.best)
 
+    def final(self, names: Names) -> EffortFit | None:
+        """Return the final values of a set, with their intervals; None where a cause has no column."""
+        if {*names} - {*self.models.library}:
+            return None
+        verdict = self.state.verdict
+        assert isinstance(verdict, EffortVerdict)
+        return _final(verdict, self.models.fitted_set(names), self.others)
+
     def model(self) -> Model:
         """Return the set as a model of the catalogue."""
         fitted, info = self.state.found.best, self.rig.parameters()
@@ -231,7 +239,7 @@ def _final(verdict: EffortVerdict, fitted: EffortFit, others: Sequence[EffortSet
     if all(one.sum() > len(plain.free) for one in moving):
         again.append(sets.final(fitted, moving))
     for other in again:
-        wide = as_wide_as_estimates_differ(wide, other)
+        wide = as_wide_as_estimates_differ(wide, with_honest_intervals(other))
     return _with_noisy_regressor(wide, sets.rows)
 
 

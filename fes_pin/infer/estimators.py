@@ -33,6 +33,10 @@ class Estimator(ABC):
 
     prefers_smaller = False
 
+    def words(self, state: AnyState) -> str:
+        """Return how it estimated a state, in words."""
+        return str(state.search.sets.estimator)
+
     @abstractmethod
     def state(self, first: AnyState) -> AnyState | None:
         """Return the state to which none of its claims objects; None where it does not apply or time is up."""
@@ -88,7 +92,7 @@ def choose(first: AnyState, others: Sequence[Estimator], seed: int = 0) -> AnySt
         smaller = estimator.prefers_smaller and len(other.names) < len(first.names)
         if better or (smaller and compared and not any(c.is_worse for c in compared)):
             said = "predicts better" if better else "predicts as well with fewer causes"
-            words = f"{other.search.sets.estimator} {said}: {'; '.join(map(str, compared))}"
+            words = f"{estimator.words(other)} {said}: {'; '.join(map(str, compared))}"
             return replace(other, steps=(*first.steps, *other.steps, Step(CHOICE, words=words)))
     return first
 

@@ -92,9 +92,10 @@ def as_wide_as_estimates_differ(fitted: F, other: Optimum) -> F:
     Parameters
     ----------
     other
-        A fit to the same data by a less efficient estimator. What both have must mean the same in both.
+        A fit to the same data by a less efficient estimator, with honest intervals. What both have must mean the same
+        in both.
     """
-    known = dict(zip(other.free, np.diag(with_honest_intervals(other).covariance), strict=True))
+    known = dict(zip(other.free, np.diag(other.covariance), strict=True))
     varies = np.array([known.get(n, np.inf) for n in fitted.free])
     apart = np.array([other.values.get(n, fitted.values[n]) - fitted.values[n] for n in fitted.free])
     with np.errstate(all="ignore"):

@@ -305,20 +305,24 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         """Return the proposed set, or the own best candidate if that is likelier; none without a proposal."""
         if self.proposed is None or not self.proposed.effects:
             return ()
-        if self.noise == PROCESS:
-            noises = [self.fits[()].noise, self._guess()]
-            fits = in_parallel(partial(self._maximum, self.proposed), noises)
-        else:
-            fits = [self.from_least_squares(self.proposed)]
-        best = min(fits, key=lambda f: f.criterion)
-        if not math.isfinite(best.criterion) or self.is_far(best):
+        names = self.fit_model(self.proposed)
+        if not math.isfinite(self.fits[names].criterion) or self.is_far(self.fits[names]):
             return ()
+        self.extend((), FITTED)
+        return min((names, self.ranked(1)[0]), key=lambda n: self.fits[n].criterion)
+
+    def fit_model(self, model: Model) -> Names:
+        """Fit a model from its values, in the form of its causes that is significant, and return its names."""
+        if self.noise == PROCESS:
+            fits = in_parallel(partial(self._maximum, model), [self.fits[()].noise, self._guess()])
+        else:
+            fits = [self.from_least_squares(model)]
+        best = min(fits, key=lambda f: f.criterion)
         self.fits[best.names] = best
         self._converge([best.names])
         while (better := self.better_form(self.fits[best.names])) is not None:
             self.fits[best.names] = better
-        self.extend((), FITTED)
-        return min((best.names, self.ranked(1)[0]), key=lambda n: self.fits[n].criterion)
+        return best.names
 
     def approach(self, least: float = NOTHING_PERCENT) -> Names:
         """Return the smallest set whose E is no more than the least, or the nearest set of at most `MOST_CAUSES`.

@@ -62,6 +62,7 @@ def diagnose(
     seed: int = 0,
     limit: float | None = None,
     progress: Callable[[float, str], None] | None = None,
+    thorough: bool = False,
 ) -> ModelResult:
     """Find out what the model of a study gets wrong; of a walking body it is `diagnose_walk` that answers.
 
@@ -83,6 +84,9 @@ def diagnose(
         Seconds that the search may take; then it stops at the best set so far, and says so.
     progress
         Called with a share done and a few words.
+    thorough
+        Whether both estimators of a joint with recorded efforts search by themselves. By default inverse dynamics
+        searches, and the likelihood begins with its set.
 
     Raises
     ------
@@ -99,4 +103,4 @@ def diagnose(
         return diagnose_walk(study, seed=seed, limit=limit, progress=progress)
     from fes_pin.diagnosis.diagnosis import diagnose_joint as of_a_rig  # noqa: PLC0415
 
-    return of_a_rig(study, library=library, seed=seed, limit=limit, progress=progress)
+    return of_a_rig(study, library=library, seed=seed, limit=limit, progress=progress, thorough=thorough)
