@@ -1,0 +1,86 @@
+"""Two estimators of a joint whose effort was recorded: the likelihood, and inverse dynamics."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from bench import study, trial
+from driven_rigs.laboratory import draw_laboratory
+
+import fes_pin as fp
+from fes_pin.diagnosis import by_effort
+from fes_pin.diagnosis.by_effort import named_by_one
+from fes_pin.infer.estimators import CHOICE
+
+
+def test_a_cause_that_effort_alone_shows_is_named_where_it_lessens_both_errors(tmp_path):
+    """One trial of an arm with a spring and friction: held-out motion confirms friction alone."""
+    drawn = draw_laboratory(("coulomb_friction", "parallel_stiffness"), 20291150, tmp_path)
+    found = fp.diagnose(fp.read_study(drawn.study))
+    assert {c.name for c in found.causes} == {"coulomb_friction", "parallel_stiffness"}
+    assert "parallel_stiffness is named by effort, not by motion" in found.warnings
+    step = next(one for one in found.why.steps if one.claim == CHOICE)
+    assert "low-passed effort" in str(step) and "predictions" in str(step)
+
+
+def arm(folder, **hidden):
+    return study(folder, [trial(seed, **hidden) for seed in range(3)])
+
+
+@pytest.mark.parametrize("hidden", [{}, {"friction": 0.1, "drag": 0.05}])
+def test_both_estimators_agree_on_an_arm(tmp_path, hidden):
+    found = fp.diagnose(arm(tmp_path, **hidden))
+    names = {"friction": "coulomb_friction", "drag": "quadratic_damping"}
+    assert {c.name for c in found.causes} == {names[n] for n in hidden}
+    assert not [w for w in found.warnings if "is named by" in w]
+
+
+def test_a_set_that_lessens_the_error_of_effort_alone_is_no_answer(tmp_path, monkeypatch):
+    """Inverse dynamics is made to name a cause that is not there: the motion contradicts it, and a warning says so."""
+    original = by_effort.searched
+
+    def too_much(rig, trials, seed):
+        found = original(rig, trials, seed)
+        sets = found.models
+        sets.fitted_set(("cogging",))
+        return replace(found, state=replace(found.state, found=found.state.search.result(("cogging",))))
+
+    monkeypatch.setattr(by_effort, "searched", too_much)
+    found = fp.diagnose(arm(tmp_path))
+    assert found.verdict == "adequate"
+    assert "cogging is named by effort, not by motion; it is not in the answer" in found.warnings
+
+
+def test_a_thorough_search_has_no_set_to_begin_with(tmp_path, monkeypatch):
+    """It finds the same on an arm; the set of inverse dynamics is fitted for the comparison alone."""
+    begun = []
+    original = by_effort.begun_by_effort
+
+    def noted(models, trials, thorough=False):
+        policy = original(models, trials, thorough)
+        begun.append((models.proposed, policy.fitted_first))
+        return policy
+
+    monkeypatch.setattr("fes_pin.diagnosis.diagnosis.begun_by_effort", noted)
+    found = fp.diagnose(arm(tmp_path, friction=0.1), thorough=True)
+    assert [c.name for c in found.causes] == ["coulomb_friction"]
+    assert begun and all(one == (None, None) for one in begun)
+
+
+def test_intervals_contain_the_estimates_of_both(tmp_path):
+    found = fp.diagnose(arm(tmp_path, friction=0.1))
+    other = fp.diagnose(arm(tmp_path, friction=0.1), thorough=True)
+    low, high = found.causes[0].parameters["torque_nm"].interval
+    assert low < 0.1 < high
+    assert found.causes[0].parameters["torque_nm"].value == pytest.approx(
+        other.causes[0].parameters["torque_nm"].value, rel=0.02
+    )
+
+
+def test_a_joint_without_efforts_has_one_estimator(tmp_path):
+    time = np.arange(500) * 0.01
+    swing = fp.Trial("a", "motion", {"position": 0.5 * np.exp(-0.2 * time) * np.cos(3.8 * time)}, time)
+    models = type("Models", (), {"by_effort": None})
+    first = type("State", (), {"search": type("Search", (), {"models": models})})
+    assert named_by_one(first, first) == []
+    assert not by_effort.has_efforts(arm(tmp_path), [swing])
