@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.likelihood_models import LikelihoodModels
+from fes_pin.diagnosis.likelihood_models import Found, LikelihoodModels
 from fes_pin.diagnosis.verdict import RigState, RigVerdict
 from fes_pin.effort.search import has_efforts, searched
 from fes_pin.identify.likelihood_fit import LikelihoodFit
@@ -37,6 +37,17 @@ def begun_by_effort(models: LikelihoodModels, trials: Sequence[Trial], thorough:
     return Policy(fitted_first=FITTED)
 
 
+class VerdictByEffort(RigVerdict):
+    """The verdict on a set that inverse dynamics found: what its efforts do not distinguish is equivalent too."""
+
+    def alike(self, found: Found, name: str) -> tuple[str, ...]:
+        """Return a cause and its equivalents."""
+        by_effort, known = self.models.by_effort, super().alike(found, name)
+        rest, near = {*found.best.names} - {name}, [f.names for f in by_effort.alike] if by_effort else []
+        more = {n for names in near if rest < {*names} for n in {*names} - rest}
+        return name, *sorted({*known, *more} - {name})
+
+
 class InverseDynamics(Estimator):
     """Least squares of the low-passed effort, for a joint whose effort was recorded.
 
@@ -57,18 +68,23 @@ class InverseDynamics(Estimator):
         return by_effort.models.estimator if by_effort else ""
 
     def state(self, first: RigState) -> RigState | None:
-        """Return the state of its set, fitted by the likelihood; None where the first state has the same."""
+        """Return the state of its set, fitted by the likelihood; None where the first state has the same.
+
+        Of the sets that efforts do not distinguish it is the likeliest.
+        """
         models, search = first.search.models, first.search
         by_effort = models.by_effort
-        if by_effort is None or search.was_stopped or {*by_effort.names} == first.names:
+        if by_effort is None or search.was_stopped or any({*f.names} == first.names for f in by_effort.alike):
             return None
-        if by_effort.names not in models.fits:
-            models.fit_model(by_effort.model())
-        if not models.is_possible(models.fits[by_effort.names]):
+        for one in by_effort.alike:
+            if one.names not in models.fits:
+                models.fit_model(by_effort.model(one))
+        possible = [f for one in by_effort.alike if models.is_possible(f := models.fits[one.names])]
+        if not possible:
             return None
-        verdict = RigVerdict(search, self.test)
-        found = search.result(by_effort.names)
-        return State(verdict, found, verdict.weigh(found), {}, frozenset(by_effort.names), replaced=first)
+        names, verdict = min(possible, key=lambda f: f.criterion).names, VerdictByEffort(search, self.test)
+        found = search.result(names)
+        return State(verdict, found, verdict.weigh(found), {}, frozenset(names), replaced=first)
 
 
 def as_wide_as_efforts(fitted: LikelihoodFit, models: LikelihoodModels) -> LikelihoodFit:
@@ -90,13 +106,15 @@ def named_by_one(first: RigState, answer: RigState) -> list[str]:
     models = first.search.models
     if (by_effort := models.by_effort) is None:
         return []
-    alike = {n: {*models.alike(answer.found, n)} for n in answer.names}
-    by_motion, others = {*first.names}, {*by_effort.names}
+    verdict = answer.verdict
+    assert isinstance(verdict, RigVerdict)
+    alike = {n: {*verdict.alike(answer.found, n)} for n in answer.names}
+    by_motion, by_efforts = {*first.names}, {n for one in by_effort.alike for n in one.names}
     words = []
-    for name in sorted((by_motion ^ others) & {*by_effort.models.library}):
-        one, other = ("motion", "effort") if name in by_motion else ("effort", "motion")
-        near = alike.get(name, {name} | {n for n, many in alike.items() if name in many})
-        if not (near & by_motion and near & others):
+    for name in sorted({*first.names, *by_effort.names, *answer.names} & {*by_effort.models.library}):
+        near = {name} | {m for n, many in alike.items() if name in many for m in many}
+        if not (near & by_motion and near & by_efforts) and (name in alike or near == {name}):
+            one, other = ("motion", "effort") if near & by_motion else ("effort", "motion")
             left = "" if name in alike else "; it is not in the answer"
             words.append(f"{name} is named by {one}, not by {other}{left}")
     return words

@@ -148,7 +148,7 @@ def _cause(verdict: RigVerdict, state: RigState, one: Effect, best: LikelihoodFi
     """
     fitted, on = judged
     found, name, evidence = state.found, one.name, verdict.evidence(state)[one.name]
-    alike = state.search.models.alike(found, name)
+    alike = verdict.alike(found, name)
     return Cause(
         name=name,
         sentence=fitted_sentence(one, best.model.rig),

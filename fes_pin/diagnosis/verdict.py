@@ -121,7 +121,11 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
 
     def is_rarely_chosen(self, state: RigState, name: str) -> bool:
         """Return whether most folds choose neither a cause nor one of its equivalents."""
-        return not is_chosen(share_of(self.chosen(state), self.models.alike(state.found, name)))
+        return not is_chosen(share_of(self.chosen(state), self.alike(state.found, name)))
+
+    def alike(self, found: Found, name: str) -> tuple[str, ...]:
+        """Return a cause and its equivalents."""
+        return self.models.alike(found, name)
 
     @property
     def currencies(self) -> tuple[str, ...]:

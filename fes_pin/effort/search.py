@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -132,9 +133,16 @@ class FoundByEffort:
         assert isinstance(verdict, EffortVerdict)
         return _final(verdict, self.models.fitted_set(names), self.others)
 
-    def model(self) -> Model:
-        """Return the set as a model of the catalogue."""
-        fitted, info = self.state.found.best, self.rig.parameters()
+    @cached_property
+    def alike(self) -> list[EffortFit]:
+        """The best set, and the sets that its efforts do not distinguish from it."""
+        found = self.state.found
+        each = (self.models.equivalents(found.best, found.without[n], found.rivals[n]) for n in found.best.names)
+        return list({f.names: f for f in [found.best, *(f for many in each for f in many)]}.values())
+
+    def model(self, fitted: EffortFit | None = None) -> Model:
+        """Return the set, or another fit, as a model of the catalogue."""
+        fitted, info = fitted or self.state.found.best, self.rig.parameters()
         effects = (self._effect(fitted, n) for n in fitted.names)
         nominal = {n: one.nearest(fitted.values[n]) for n, one in info.items() if n in fitted.free}
         return Model(self.rig, tuple(effects)).with_parameters(nominal)
