@@ -93,6 +93,34 @@ def test_a_slow_cycle_has_one_answer_at_any_rate(file, shared, tmp_path):
     assert found.extended_error[0] < 0.02
 
 
+@pytest.mark.parametrize("kind", [None, "motion", "imposed"])
+def test_a_joint_under_position_control_lacks_dry_friction_alone(kind, shared, tmp_path):
+    """Whatever kind is said: the noise of the torque that was read would move so light a rod far more."""
+    words = ("--rod", "0.05", "0.7", *(("--set", f"kind={kind}") if kind else ()))
+    study = study_of(shared, tmp_path, [f"controlled_{x}.csv" for x in "abc"], *words)
+    found = fp.diagnose(study)
+    assert named(found) == {"coulomb_friction"} and not found.remainder.unexplained
+    torque, interval = estimate(found, "coulomb_friction.torque_nm")
+    assert torque == pytest.approx(0.25, abs=0.001) and interval[0] < 0.25 < interval[1]
+    contradicted = any('is contradicted and "imposed" is taken' in w for w in found.warnings)
+    assert {t.kind for t in study.trials} == {kind or "imposed"} and contradicted is (kind == "motion")
+
+
+@pytest.mark.parametrize("file", ["100Hz.csv", "300Hz.csv", "imposed_pure_spring.csv"])
+def test_a_slow_cycle_that_a_stand_imposes_needs_no_kind(file, shared, tmp_path):
+    words = [w for w in CYCLE if w not in ("--set", "kind=imposed")]
+    study = study_of(shared, tmp_path, [f"one_slow_cycle/{file}"], *words)
+    assert {t.kind for t in study.trials} == {"imposed"}
+
+
+def test_no_practice_loop_is_doubted(shared):
+    studies = [fp.read_study(folder) for folder in sorted((shared / "practice_loops").glob("c*"))]
+    assert len(studies) == 30
+    for study in studies:
+        kinds = {t.kind for t in study.trials if "effort" in t}
+        assert kinds == {"motion"} and '"motion" is taken' in study.trials[0].remarks[0], study.name
+
+
 def test_a_joint_that_turns_thirty_times_is_diagnosed(shared, tmp_path):
     files = ["turning_a.csv", "turning_b.csv", "turning_rotor.urdf"]
     found = fp.diagnose(study_of(shared, tmp_path, files, "--urdf", str(tmp_path / "turning_rotor.urdf")))

@@ -19,7 +19,7 @@ from fes_pin.data.as_read import HeldFile
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import check_folder, read_bytes
 from fes_pin.data.outputs import Outputs
-from fes_pin.data.schema import IMPOSED, RigSchema, known_rigs, one_of
+from fes_pin.data.schema import RigSchema, known_rigs, one_of
 
 if TYPE_CHECKING:
     from fes_pin.data.new_study import NewStudy
@@ -82,8 +82,10 @@ def new_study(
 
     With --pendulum, --rod or --slide and no recordings it writes the URDF alone.
     """
+    from fes_pin.data.direction import LEFT_OUT
     from fes_pin.data.new_body_study import new_body_study
     from fes_pin.data.new_study import new_study as make
+    from fes_pin.data.new_study import with_kind
     from fes_pin.data.wanted import Wanted
     from fes_pin.diagnosis.checked import odd_lines
     from fes_pin.models.nominal import guess_start
@@ -124,13 +126,14 @@ def new_study(
     outputs = Outputs("new-study", force)
     outputs.check(folder, made.contents)
     study, warnings = _tried(made, wanted, catalogue)
+    left_out = {r: t.kind for t in study.trials for r in t.remarks if r.startswith(LEFT_OUT)}
+    for kind in left_out.values():
+        made = with_kind(made, kind)
+        study, warnings = _tried(made, wanted, catalogue)
     outputs.write(folder, made.contents)
     for own, theirs, unit in made.taken:
         typer.echo(f"{own:16s} is {theirs}{f', in {unit}' if unit else ''}")
-    if "motion" in made.kinds and schema.outputs.get(IMPOSED) in {own for own, _, _ in made.taken}:
-        effort = schema.outputs[IMPOSED]
-        typer.echo(f"{effort} is taken as what drives it; where the motion drives: --set kind={IMPOSED}")
-    print_text("\n".join(odd_lines(study, warnings)))
+    print_text("\n".join([*left_out, *odd_lines(study, warnings)]))
     place = shlex.quote(str(folder))
     typer.echo(f"wrote {folder / 'study.toml'}: look at it, then run")
     typer.echo(f"  fes-pin check {place}\n  fes-pin diagnose {place} --out answer")

@@ -26,6 +26,8 @@ SHORTEST = 4
 """Least samples of a stretch for each coefficient: enough to estimate the residual's size within a tenth or two."""
 APART_LEVEL = 0.01
 """Level at which two stretches differ: one too many costs a few samples, one too few mixes two laws."""
+JUMP = 5.0
+"""Standard deviations above which a difference is a jump, not noise."""
 
 
 @dataclass(frozen=True)
@@ -76,6 +78,14 @@ def answer_of(effort: np.ndarray, readings: Sequence[np.ndarray]) -> ControllerA
         left[begin:end] = np.sqrt(_missed(triangle) / max(end - begin - columns.shape[1], 1))
         gains[begin:end] = np.tensordot(solved, moved, 1)
     return ControllerAnswer(values, left, gains)
+
+
+def without_jumps(x: np.ndarray) -> np.ndarray:
+    """Return differences clipped at `JUMP` robust standard deviations: a jump of the reference is no noise."""
+    x = np.where(np.isfinite(x), x, 0.0)
+    size = np.abs(x[x != 0.0])  # an encoder at rest, or a held sample, has no noise
+    most = JUMP * 1.4826 * float(np.median(size)) if len(size) else 0.0
+    return np.clip(x, -most, most)
 
 
 def _columns(readings: Sequence[np.ndarray], n: int) -> tuple[np.ndarray, np.ndarray]:

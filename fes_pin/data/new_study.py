@@ -3,8 +3,9 @@
 What the files do not say is taken from options, or asked of a person at a terminal; only start values are guessed.
 """
 
+import re
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -35,14 +36,11 @@ class NewStudy:
         The rig's column, the file's name of it and its unit, as a person wants to see them.
     origins
         Where each recording, and the URDF, lies, by its path below the study's folder.
-    kinds
-        Of its trials.
     """
 
     contents: Mapping[str, str | bytes]
     taken: tuple[tuple[str, str, str], ...]
     origins: Mapping[str, Path]
-    kinds: tuple[str, ...] = ()
 
 
 def new_study(wanted: Wanted, guess: Callable[[Mapping[str, float]], Mapping[str, float]]) -> NewStudy:
@@ -59,6 +57,12 @@ def new_study(wanted: Wanted, guess: Callable[[Mapping[str, float]], Mapping[str
         A recording that cannot be read; what the files do not say and no option does, all of it in one line.
     """
     return _Making(wanted).made(guess)
+
+
+def with_kind(made: NewStudy, kind: str) -> NewStudy:
+    """Return a new study with a kind for the trials that state none."""
+    text = re.sub(r"(\[\[trial\]\]\nfile = .*\n)(?!kind)", rf'\1kind = "{kind}"\n', str(made.contents["study.toml"]))
+    return replace(made, contents={**made.contents, "study.toml": text})
 
 
 class _Making:
@@ -93,8 +97,9 @@ class _Making:
             *toml_table("start", start, "start values of what the nominal model fits", self._units()),
             *columns_text(sources, self.names, self.form, options),
         ]
-        for path, place, kind, conditions in zip(self.wanted.files, places, kinds, trials, strict=True):
-            text += toml_table("[trial]", {"file": place, "kind": kind, **labels_of(self.wanted, path), **conditions})
+        named = [{} if self._is_open(*one) else {"kind": one[1]} for one in zip(self.proposals, kinds, strict=True)]
+        for path, place, kind, conditions in zip(self.wanted.files, places, named, trials, strict=True):
+            text += toml_table("[trial]", {"file": place, **kind, **labels_of(self.wanted, path), **conditions})
         contents["study.toml"] = "\n".join([*HEADER, *text]) + "\n"
         taken = tuple(
             (c, s.get("name", "from its rate"), source_in_words(s, c, self.wanted.revolute)) for c, s in sources.items()
@@ -102,7 +107,7 @@ class _Making:
         origins = dict(zip(places, self.wanted.files, strict=True))
         if self.wanted.urdf is not None:
             origins[files["urdf"]] = self.wanted.urdf
-        return NewStudy(contents, taken, origins, tuple(kinds))
+        return NewStudy(contents, taken, origins)
 
     def _one_form(self) -> TextForm | None:
         forms = {p.form: p for p in self.proposals}
@@ -121,6 +126,12 @@ class _Making:
         default = self.schema.default_kind
         read = {k: sum(bool(proposal.candidates[c]) for c in self.schema.columns_of(k)) for k in fits}
         return max(fits, key=lambda k: (read[k], k == default), default=default)
+
+    def _is_open(self, proposal: Proposal, kind: str) -> bool:
+        """Return whether nobody said a kind, and the data show which of two it is."""
+        stated = self.own.get((proposal.recording.path, "kind"), self.wanted.kind)
+        read = [c for c in self.schema.columns_of(kind) if c in self.wanted.columns or proposal.candidates[c]]
+        return stated is None and self.schema.is_driven_or_read(read)
 
     def _sources(self, kinds: set[str]) -> dict[str, dict[str, Any]]:
         """For each of the rig's columns what `[columns]` says of it."""

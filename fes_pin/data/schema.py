@@ -148,6 +148,11 @@ class RigSchema(ReadOnly):
         """The columns that a kind of trial holds its imposed motion in; none of a kind that imposes none."""
         return self.imposed if kind == IMPOSED else ()
 
+    def is_driven_or_read(self, columns: Collection[str]) -> bool:
+        """Return whether a trial with these columns may be of either kind: its effort drives the rig, or is read."""
+        effort = self.outputs.get(IMPOSED)
+        return effort in self.inputs and effort in columns and self.imposed[0] in columns
+
     def driving(self, kind: str, columns: Collection[str]) -> tuple[str, ...]:
         """Return those of a trial's columns that drive the rig: a stimulus, and an imposed motion."""
         return tuple(n for n in (*self.stimuli(kind), *self.motion(kind)) if n in columns)

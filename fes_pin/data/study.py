@@ -16,6 +16,7 @@ import tomli_w
 
 from fes_pin.data.as_read import AsRead, digest_of, hashing
 from fes_pin.data.checks import check_constants, check_same_inputs, checked_label, checked_labels, checked_mapping
+from fes_pin.data.direction import with_kinds
 from fes_pin.data.errors import InputError, fault_at
 from fes_pin.data.files import as_path, hold, what_is_at, write_files
 from fes_pin.data.numbers import instance
@@ -26,7 +27,15 @@ from fes_pin.data.show import DataFrame, by_columns, frame, table_html
 from fes_pin.data.study_text import HORIZON, StudyTables, check_files, checked_horizon
 from fes_pin.data.table import format_csv
 from fes_pin.data.toml import Document, document_of, read_toml
-from fes_pin.data.trial import Trial, check_trial, read_body_trial, read_trial, trial_csv, walk_recordings
+from fes_pin.data.trial import (
+    Trial,
+    check_trial,
+    derived_trial,
+    read_body_trial,
+    read_trial,
+    trial_csv,
+    walk_recordings,
+)
 
 EDITED = "edited after it was read"
 """What stands in the place of a hash of a file that is no longer what its study holds."""
@@ -103,6 +112,8 @@ class Study(ReadOnly):
         if any(files[key] is not path for key, path in given["files"].items()):
             check_files(schema, files)
         trials = tuple(self.trials) if isinstance(self.trials, Iterable) else (self.trials,)
+        if all(isinstance(t, Trial) for t in trials):
+            trials = with_kinds(trials, schema)
         self._check_trials(trials, schema)
         if schema.inputs_required:  # else a trial without an input is one that nothing drives
             check_same_inputs([(t.kind, t.columns) for t in trials], schema, numbers["constants"], _fault_of(trials))
@@ -134,9 +145,9 @@ class Study(ReadOnly):
         frames
             By the trial's name; see `Trial.from_frame`.
         about
-            By the trial's name a mapping of its `kind` (without it the rig's default), `role`, `group` and conditions,
-            as a `[[trial]]` table gives them; or a frame with a row for each trial, as `to_frame` gives it, of which
-            what is missing, and what is none of these, is passed over.
+            By the trial's name a mapping of its `kind` (without it as the data show: `data.direction`), `role`, `group`
+            and conditions, as a `[[trial]]` table gives them; or a frame with a row for each trial, as `to_frame` gives
+            it, of which what is missing, and what is none of these, is passed over.
         rig, fields
             As `Study` takes them: name, constants, start, files ...
 
@@ -158,7 +169,7 @@ class Study(ReadOnly):
         trials = []
         for name, one in frames.items():
             row = dict(rows.get(name, {}))
-            labels = {"kind": schema.default_kind, **{n: row.pop(n) for n in ("kind", "role", "group") if n in row}}
+            labels = {"kind": "", **{n: row.pop(n) for n in ("kind", "role", "group") if n in row}}
             trials.append(Trial.from_frame(one, name=name, conditions=row, **labels))
         return cls(rig=rig, trials=tuple(trials), **fields)
 
@@ -355,11 +366,11 @@ class _Reader(StudyTables):
         start = self.start_table(constants)
         own, tables = self.columns_table(files), self._trial_tables()
         each = enumerate(zip(tables, self._trial_names(tables), strict=True))
-        trials = [self._trial(f"trial[{index}]", table, name, own) for index, (table, name) in each]
+        trials = with_kinds([self._trial(f"trial[{i}]", table, name, own) for i, (table, name) in each], self.schema)
         check_same_inputs([(t.kind, t.columns) for t in trials], self.schema, constants, self._fault_of)
         horizon = checked_horizon(self.document.table("study").get(HORIZON), self.document.under("study"))
         folder = self.folder.absolute()
-        return Study(self.name, self.rig, constants, start, tuple(trials), folder, files, self.schema, horizon)
+        return Study(self.name, self.rig, constants, start, trials, folder, files, self.schema, horizon)
 
     def _trial_tables(self) -> list[dict[str, Any]]:
         tables = self.document.data.get("trial", [])
@@ -397,7 +408,8 @@ class _Reader(StudyTables):
                 raise error(key, "missing; expected the path of a file inside the study")
         paths = [self.document.path_of(f"{where}.{key}", table[key]) for key in named]
         if len(paths) == 1:
-            return read_trial(paths[0], rig=self.schema, kind=kind, own=own, **labels)
+            trial = read_trial(paths[0], rig=self.schema, kind=kind, own=own, **labels)
+            return trial if "kind" in table else derived_trial(trial, kind="")
         return read_body_trial(paths[0], paths[1], **labels)
 
     def _fault_of(self, place: int | None, key: str, message: str) -> InputError:

@@ -39,7 +39,7 @@ class Trial(ReadOnly):
     name
         Of the trial within its study, e.g. the stem of its file.
     kind
-        "motion", "isometric" or "imposed".
+        "motion", "isometric" or "imposed"; "" leaves it to the trial's study, see `data.direction`.
     columns : mapping of str to ndarray, shape (n,)
         Every column but the time, by its name with its unit. The arrays are copied and made read-only.
     time : ndarray, shape (n,)
@@ -80,7 +80,8 @@ class Trial(ReadOnly):
     def __post_init__(self) -> None:
         error = self.key_error
         labels = checked_labels(self.name, vars(self), error)
-        checked_label(self.kind, error, "kind", "a kind")
+        if self.kind != "":
+            checked_label(self.kind, error, "kind", "a kind")
         given = {key: checked_mapping(getattr(self, key), error, key) for key in ("columns", "conditions")}
         conditions = checked_numbers(given["conditions"], dict.fromkeys(given["conditions"], NumberKey("")), error)
         time = _numbers(self.time, "time_s", self)

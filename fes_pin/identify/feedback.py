@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
+from fes_pin.data.answered import without_jumps
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
 from fes_pin.infer.distributions import chi2_tail, f_tail
@@ -15,8 +16,6 @@ SHORTEST = 20
 """Least number of samples for each lag; shorter trials are not tested."""
 LAGS = 4
 """Lags of the regression, in samples: a controller acts in the sample in which it reads, or a few later."""
-JUMP = 5.0
-"""Standard deviations above which a difference is a jump, not noise."""
 OF_EFFORT = 4
 """Order of the differences of an effort and of the reading at its samples. A motion of frequency w leaves (w dt)^order
 of itself in them, and noise grows. Second differences of a chirp leave enough that ten of 44 free joints seemed to be
@@ -82,8 +81,8 @@ def _granger(effort: np.ndarray, reading: np.ndarray, order: int) -> tuple[float
     Pulses that last one sample are not differenced: the differences of each would be as regular as no noise is.
     """
     is_held = np.any((effort[1:] != 0.0) & (effort[:-1] != 0.0))
-    u = _without_jumps(np.diff(effort, order) if is_held else effort[order:])
-    y = _without_jumps(np.diff(reading, order))
+    u = without_jumps(np.diff(effort, order) if is_held else effort[order:])
+    y = without_jumps(np.diff(reading, order))
     n = len(u) - LAGS
     if n < SHORTEST * LAGS or not u.any() or not y.any():
         return 1.0, 0.0
@@ -94,14 +93,6 @@ def _granger(effort: np.ndarray, reading: np.ndarray, order: int) -> tuple[float
     free = n - past.shape[1] - read.shape[1]
     gain = (few - many) / read.shape[1]
     return float(f_tail(gain / max(many / free, 1e-30), read.shape[1], free)), 1.0 - many / max(few, 1e-30)
-
-
-def _without_jumps(x: np.ndarray) -> np.ndarray:
-    """Return differences clipped at `JUMP` robust standard deviations: a jump of the reference is no noise."""
-    x = np.where(np.isfinite(x), x, 0.0)
-    size = np.abs(x[x != 0.0])  # an encoder at rest, or a held sample, has no noise
-    most = JUMP * 1.4826 * float(np.median(size)) if len(size) else 0.0
-    return np.clip(x, -most, most)
 
 
 def _left(columns: np.ndarray, target: np.ndarray) -> float:

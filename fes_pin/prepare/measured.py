@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from fes_pin.data.derived import without_derived
+from fes_pin.data.direction import contradicted
 from fes_pin.data.errors import InputError
 from fes_pin.data.schema import RigSchema
 from fes_pin.data.spikes import without_spikes
@@ -32,7 +33,7 @@ class Measured:
     left_out
         Samples that were spikes, by trial and column.
     warnings
-        The stretches that were cut out, a line each.
+        The stretches that were cut out, and a kind that the data contradict, a line each.
     """
 
     study: Study
@@ -47,6 +48,8 @@ class Measured:
 def measured_study(study: Study) -> Measured:
     """Return a study without spikes of its measured columns and without stretches in which a sensor was stuck.
 
+    Trials of a joint whose efforts cannot have driven it are of the kind "imposed" in it; see `data.direction`.
+
     A sample that its neighbours replace carries no information of its own. Intervals are therefore too narrow by half
     the share of such samples: half a percent where one in a hundred is a spike.
 
@@ -55,8 +58,9 @@ def measured_study(study: Study) -> Measured:
     InputError
         If no trial has a reading that is not stuck.
     """
-    rig, trials, found, warnings = nominal_model(study).rig, [], {}, []
-    for trial in study.trials:
+    rig, trials, found = nominal_model(study).rig, [], {}
+    directed, warnings = contradicted(study.trials, study.schema)
+    for trial in directed:
         pieces, said = without_stuck(trial, rig.outputs(trial.kind), bool(rig.unknowns(trial.kind)))
         warnings += said
         for piece in pieces:

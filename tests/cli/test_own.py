@@ -71,7 +71,8 @@ def recordings(tmp_path):
 def test_one_command_makes_a_study_of_german_exports(monkeypatch, capsys, recordings):
     before = {p.name: p.read_bytes() for p in recordings.iterdir()}
     assert run(monkeypatch, "new-study", *sorted(recordings.glob("*.csv")), "--rod", LENGTH, MASS) == 0
-    assert "nothing is odd about its numbers" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "nothing is odd about its numbers" in said and 'kind is left out and "motion" is taken' in said
     assert {p.name: p.read_bytes() for p in recordings.iterdir() if p.name in before} == before
     study = read_study(recordings)
     assert [t.name for t in study.trials] == ["m0", "m1", "m2", "m3"]
@@ -159,7 +160,7 @@ def test_kinds_are_told_by_what_they_read(monkeypatch, capsys, tmp_path):
     joint.write_text(plain((time, angle, effort), ("time_s", "angle_rad", "torque_Nm")))
     capsys.readouterr()
     assert run(monkeypatch, "new-study", joint, "--rod", 0.4, 1.2) == 0
-    assert "where the motion drives: --set kind=imposed" in capsys.readouterr().out
+    assert 'kind is left out and "motion" is taken' in capsys.readouterr().out
     assert run(monkeypatch, "new-study", joint, "--rod", 0.4, 1.2, "--set", "kind=imposed", "--force") == 0
     assert read_study(joint.parent).trials[0].kind == "imposed"
 

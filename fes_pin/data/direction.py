@@ -1,0 +1,284 @@
+"""Which way a recorded effort acts: it drives the joint, or it is what an imposed motion takes.
+
+Inverse dynamics are the same for both. What differs is the noise of the effort, above the band of the motion.
+
+**Read.** An effort that drives a joint of inertia I moves it there too: its acceleration is the net effort over I, and
+noise of the reading adds to it. The noise of an effort that was read moves nothing. With both passed by an octave,
+
+    ratio = median |net effort| / (I median |acceleration|)
+
+is at most 1 for an effort that drives, whatever its controller does, at samples at which the joint moves: one that
+sticks does not follow, and about reversals friction is uncertain. The net effort is the recorded one without all that
+follows from position and velocity: gravity, springs, damping and friction, fitted with the inertia in the band of the
+motion. Octaves count where the reading is above no low pass, so that its spectrum is that of white noise.
+
+**Commanded.** A controller answers the noise of the reading. Readings of the samples around then predict the fourth
+differences of its effort, in which hardly any motion is. An effort with noise of its own that answers nothing was read.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fes_pin.data.schema import IMPOSED, RigSchema
+from fes_pin.data.trial import Trial, derived_trial
+
+MORE, MANY = 1.5, 4.0
+"""Ratios from which an effort cannot have driven the joint, and from which a stated kind is contradicted. Driven rigs
+have at most 1, and 0.35 is the largest of 71. Where their reading was low-passed at 4 Hz and then rounded, 2.5 is."""
+ORDER, LAGS = 4, 4
+"""Of differences of an effort and of a reading, and samples to either side over which a controller answers."""
+NOISE_ORDER = 8
+"""Of differences in which the noise of an effort is measured: of a sine of 5 Hz at 50 Hz they leave 0.02 %."""
+COMMANDED = 0.1
+"""Share of the differences of an effort from which a controller commands it. Of 71 driven rigs 0.14 is the least, but
+for one whose log was interpolated; of efforts that were read 0.06 is the largest."""
+NOISY = 1e-3
+"""Noise, as a share of an effort, from which it is noise of its own: rounding and 12 bits leave less."""
+EXPLAINED = 0.9
+"""Least share of the effort's variance that the motion explains: else its upper octaves hold causes, not noise."""
+SURELY = 3.0
+"""Standard deviations by which the inertia may be larger than its estimate."""
+SEGMENT_S = 4.0
+"""Segments of a spectrum, s: they resolve a quarter of a hertz."""
+QUIET, WHITE = 0.7, 4.0
+"""Share of the Nyquist frequency above which a reading is noise, and the ratio to that noise from which it is more."""
+OF_POWER, TIMES, SLOWEST_HZ = 0.98, 4.0, 3.0
+"""The band: so many times the frequency below which the velocity has this share of its power, and at least, Hz."""
+OF_RATE = 0.4
+"""Largest cut-off frequency, as a share of the sample rate."""
+OCTAVES = 6
+"""Octaves above the band that are looked at, at most."""
+FEWEST = 100
+"""Samples of a trial that is looked at, and of joints in motion, at least."""
+MOVING = 0.3
+"""Speed, as a share of the usual one, from which a joint counts as moving."""
+ALIKE = 1e-6
+"""Singular value, as a share of the largest, below which columns are alike."""
+
+
+LEFT_OUT = "kind is left out"
+"""How a remark begins about a kind that the data decided."""
+
+
+@dataclass(frozen=True)
+class Direction:
+    """Which way efforts act.
+
+    Attributes
+    ----------
+    kind
+        "imposed" where the efforts were read, else "motion".
+    reason
+        Why, in words.
+    ratio
+        Acceleration that the net effort would cause, over what was read, in the octave where it is largest; NaN where
+        the trials do not show it.
+    answering
+        Share of the fourth differences of the efforts that the readings predict.
+    """
+
+    kind: str
+    reason: str
+    ratio: float = math.nan
+    answering: float = 0.0
+
+
+UNKNOWN = Direction("motion", "the trials do not show whether the effort drives")
+"""Of trials that do not show it."""
+
+
+def with_kinds(trials: Sequence[Trial], schema: RigSchema) -> tuple[Trial, ...]:
+    """Return trials with the kind that their data show where it was left out, and a remark about it.
+
+    Parameters
+    ----------
+    schema
+        Of the rig. Kinds of rigs whose effort can only be one of the two are the default.
+    """
+    if all(t.kind for t in trials):
+        return tuple(trials)
+    open_ones = [t for t in trials if not t.kind and schema.is_driven_or_read(t.columns)]
+    found = direction_of(open_ones)
+    remark = f'{LEFT_OUT} and "{found.kind}" is taken: {found.reason}'
+    made = {id(t): derived_trial(t, kind=found.kind, remarks=(*t.remarks, remark)) for t in open_ones}
+    return tuple(made.get(id(t), t if t.kind else derived_trial(t, kind=schema.default_kind)) for t in trials)
+
+
+def contradicted(trials: Sequence[Trial], schema: RigSchema) -> tuple[tuple[Trial, ...], list[str]]:
+    """Return trials, as imposed where their efforts certainly did not drive the joint, and warnings about their kind.
+
+    Where that is uncertain the stated kind is kept.
+    """
+    out, warnings = list(trials), []
+    for kind in (schema.default_kind, IMPOSED):
+        stated = [t for t in trials if t.kind == kind and schema.is_driven_or_read(t.columns)]
+        found = direction_of(stated)
+        if kind == IMPOSED and found.kind != IMPOSED and found.answering > COMMANDED:
+            warnings.append(f'kind = "{kind}" is doubtful: {found.reason}')
+        elif kind != IMPOSED and MORE < found.ratio < MANY:
+            warnings.append(f'kind = "{kind}" is doubtful, or the reading was low-passed: {found.reason}')
+        elif kind != IMPOSED and found.ratio >= MANY:
+            warnings.append(f'kind = "{kind}" is contradicted and "{IMPOSED}" is taken: {found.reason}')
+            names = {t.name for t in stated}
+            out = [derived_trial(t, kind=IMPOSED) if t.name in names else t for t in trials]
+    return tuple(out), warnings
+
+
+def direction_of(trials: Sequence[Trial]) -> Direction:
+    """Return which way the efforts of trials act, by all trials together.
+
+    Parameters
+    ----------
+    trials
+        Each with the columns "position" and "effort".
+    """
+    usable = [t for t in trials if len(t) >= FEWEST and np.ptp(t["effort"]) > 0.0 and np.ptp(t["position"]) > 0.0]
+    if not usable:
+        return UNKNOWN
+    ratio, octave = _largest_ratio(usable)
+    answering, noise = _answering(usable)
+    if ratio > MORE:
+        said = f"the effort would accelerate the joint {ratio:.2g} times as much as was read {octave}"
+        return Direction(IMPOSED, said, ratio, answering)
+    if answering > COMMANDED:
+        said = "the effort answers the noise of the reading, as the command of a controller does"
+        return Direction("motion", said, ratio, answering)
+    if noise > NOISY:
+        said = f"the effort has noise of its own, {100.0 * noise:.2g} % of it, which does not answer the reading"
+        return Direction(IMPOSED, said, ratio, answering)
+    return UNKNOWN
+
+
+def _largest_ratio(trials: Sequence[Trial]) -> tuple[float, str]:
+    """Return the largest ratio of an octave, and that octave in words; NaN where none shows it."""
+    dt = max(t.dt for t in trials)
+    frequency = np.fft.rfftfreq(round(SEGMENT_S / dt), dt)
+    position = _pooled(trials, [t["position"] for t in trials], frequency)
+    noise = float(np.median(position[frequency > QUIET * frequency[-1]]))
+    band = _band(frequency, position, noise)
+    if not 2.0 * band <= frequency[-1] or any(len(t) * t.dt * band <= 2.0 for t in trials):
+        return math.nan, ""
+    net, inertia, explained = _net_efforts(trials, band)
+    if explained < EXPLAINED:
+        return math.nan, ""
+    ratios = {}
+    for low in (band * 2.0**k for k in range(OCTAVES) if band * 2.0 ** (k + 1) <= frequency[-1]):
+        is_white = position[(frequency >= low) & (frequency < 2.0 * low)].mean() < WHITE * noise
+        if is_white and math.isfinite(ratio := _ratio(trials, net, band, low)):
+            ratios[low] = ratio / inertia
+    if not ratios:
+        return math.nan, ""
+    low = max(ratios, key=lambda f: ratios[f])
+    return ratios[low], f"from {low:.2g} to {2.0 * low:.2g} Hz"
+
+
+def _answering(trials: Sequence[Trial]) -> tuple[float, float]:
+    """Return the share of the fourth differences of efforts that readings predict, and their noise over the efforts."""
+    from fes_pin.data.answered import without_jumps  # noqa: PLC0415 - half a second of SciPy, for efforts alone
+
+    usual = math.sqrt(float(np.mean(np.concatenate([t["effort"] for t in trials]) ** 2)))
+    high = np.concatenate([np.diff(t["effort"], NOISE_ORDER) for t in trials])
+    is_held = not np.median(np.abs(np.concatenate([np.diff(t["effort"]) for t in trials])))
+    size = 0.0 if is_held else 1.4826 * float(np.median(np.abs(high)))
+    noise = size / math.sqrt(math.comb(2 * NOISE_ORDER, NOISE_ORDER))
+    every = missed = 0.0
+    for trial in trials:
+        effort, reading = (without_jumps(np.diff(trial[n], ORDER)) for n in ("effort", "position"))
+        if not effort.any() or not reading.any():
+            continue
+        around = np.lib.stride_tricks.sliding_window_view(reading, 2 * LAGS + 1) / reading.std()
+        target = effort[LAGS:-LAGS] / effort.std()
+        left = target - around @ np.linalg.lstsq(around, target, rcond=1e-10)[0]
+        every, missed = every + float(target @ target), missed + float(left @ left)
+    return 1.0 - missed / max(every, 1e-300), noise / usual
+
+
+def _band(frequency: np.ndarray, position: np.ndarray, noise: float) -> float:
+    """Return the frequency above which there is hardly motion, Hz, from the spectrum of the position."""
+    power = np.cumsum(np.maximum(position - WHITE * noise, 0.0) * frequency**2)
+    return max(TIMES * float(frequency[np.searchsorted(power, OF_POWER * power[-1])]), SLOWEST_HZ)
+
+
+def _net_efforts(trials: Sequence[Trial], band: float) -> tuple[list[np.ndarray], float, float]:
+    """Return the effort of each trial without what position and velocity explain, the largest inertia, and R^2."""
+    from fes_pin.data.smooth import low_pass  # noqa: PLC0415 - half a second of SciPy, for efforts alone
+
+    motions = [_moved(t, band) for t in trials]
+    every = np.concatenate(motions, axis=1)
+    low, high, usual = every[0].min(), every[0].max(), float(np.sqrt(np.mean(every[1] ** 2))) + 1e-300
+    columns = [_columns(q, v, 0.5 * (low + high), 0.5 * (high - low), usual) for q, v, _ in motions]
+    rows = []
+    for trial, (_, _, a), known in zip(trials, motions, columns, strict=True):
+        cutoff, edge = min(band, OF_RATE / trial.dt), math.ceil(1.0 / (band * trial.dt))
+        smooth = low_pass(np.column_stack([a, *known, trial["effort"]]), trial.dt, cutoff)
+        rows.append(smooth[edge : len(a) - edge : max(1, int(0.25 / (band * trial.dt)))])
+    every_row = np.concatenate(rows).T
+    a, known, effort = every_row[0], every_row[1:-1], every_row[-1]
+    sizes = np.sqrt(np.mean(np.square(known), axis=1))
+    basis, values, turned = np.linalg.svd(known.T / sizes, full_matrices=False)
+    kept = values > ALIKE * values[0]
+    basis, turned, values = basis[:, kept], turned[kept], values[kept]
+    free, left = (x - basis @ (basis.T @ x) for x in (a, effort))
+    power = max(float(free @ free), 1e-300)
+    inertia = float(free @ left) / power
+    missed = left - inertia * free
+    deviation = math.sqrt(float(missed @ missed) / max(len(a) - len(values) - 1, 1) / power)
+    weights = (turned.T @ (basis.T @ (effort - inertia * a) / values)) / sizes
+    net = [t["effort"] - weights @ one for t, one in zip(trials, columns, strict=True)]
+    return net, abs(inertia) + SURELY * deviation, 1.0 - float(np.var(missed) / np.var(effort))
+
+
+def _ratio(trials: Sequence[Trial], net: Sequence[np.ndarray], band: float, low: float) -> float:
+    """Return the net effort over the acceleration in an octave, medians of the moving joint; NaN where it hardly moves.
+
+    A held effort u gives a position q of second differences (u_k + u_(k-1)) dt^2 / (2 I), without friction.
+    """
+    from fes_pin.data.smooth import low_pass  # noqa: PLC0415
+
+    speeds = [np.abs(_moved(t, band)[1]) for t in trials]
+    usual = math.sqrt(float(np.mean(np.concatenate(speeds) ** 2)))
+    pairs = []
+    for trial, effort, speed in zip(trials, net, speeds, strict=True):
+        both = np.column_stack([0.5 * (effort[1:-1] + effort[:-2]), np.diff(trial["position"], 2) / trial.dt**2])
+        octave = low_pass(both, trial.dt, 2.0 * low) - low_pass(both, trial.dt, low)
+        around = 2 * math.ceil(0.5 / (low * trial.dt)) + 1
+        still = np.convolve(speed[1:-1] < MOVING * usual, np.ones(around), "same") > 0.5
+        still[:around] = still[-around:] = True
+        pairs.append(np.abs(octave[~still]))
+    every = np.concatenate(pairs)
+    if len(every) < FEWEST:
+        return math.nan
+    effort, bend = np.median(every, axis=0)
+    return float(effort / bend) if bend > 0.0 else math.nan
+
+
+def _moved(trial: Trial, band: float) -> np.ndarray:
+    """Return position, velocity and acceleration in the band, shape (3, n)."""
+    from fes_pin.data.smooth import low_pass  # noqa: PLC0415
+
+    position = low_pass(trial["position"], trial.dt, min(band, OF_RATE / trial.dt))
+    velocity = np.gradient(position, trial.dt)
+    return np.stack([position, velocity, np.gradient(velocity, trial.dt)])
+
+
+def _columns(q: np.ndarray, v: np.ndarray, middle: float, half: float, usual: float) -> np.ndarray:
+    """Return torques of position and velocity, shape (columns, n): gravity, springs, damping, dry friction."""
+    x = (q - middle) / half
+    friction = (np.tanh(v / (share * usual)) for share in (0.05, 0.3))
+    return np.stack([np.ones_like(x), x, x**2, x**3, np.sin(q), np.cos(q), v, v * np.abs(v), *friction])
+
+
+def _pooled(trials: Sequence[Trial], values: Sequence[np.ndarray], frequency: np.ndarray) -> np.ndarray:
+    """Return the mean one-sided spectrum of a signal of trials, each weighed by its length (Welch 1967)."""
+    from scipy.signal import welch  # noqa: PLC0415
+
+    spectra = []
+    for trial, one in zip(trials, values, strict=True):
+        length = min(len(one), round(SEGMENT_S / trial.dt))
+        spectra.append(np.interp(frequency, *welch(one, 1.0 / trial.dt, nperseg=length, detrend="linear")))
+    return np.asarray(np.average(spectra, axis=0, weights=[len(one) for one in values]))
