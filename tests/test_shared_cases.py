@@ -106,6 +106,20 @@ def test_a_joint_under_position_control_lacks_dry_friction_alone(kind, shared, t
     assert {t.kind for t in study.trials} == {kind or "imposed"} and contradicted is (kind == "motion")
 
 
+def test_a_goal_position_is_never_taken_as_a_torque(shared, tmp_path, capsys):
+    for name in "abc":
+        shutil.copy(shared / f"cases/position_command_as_effort/{name}.csv", tmp_path)
+    files = [str(tmp_path / f"{name}.csv") for name in "abc"]
+    columns = ("--column", "position=actual:rad", "--column", "effort=command:Nm")
+    sys.argv = ["fes-pin", "new-study", *files, "--rod", "0.4", "1.2", *columns]
+    with pytest.raises(SystemExit) as ended:
+        main.main()
+    said = " ".join(capsys.readouterr().err.split())
+    assert ended.value.code == 2 and "looks like a goal position" in said
+    assert re.search(r"expected an effort, [78](\.\d)? N m/rad times \(goal - position\)", said)
+    assert not (tmp_path / "study.toml").exists()
+
+
 @pytest.mark.parametrize("file", ["100Hz.csv", "300Hz.csv", "imposed_pure_spring.csv"])
 def test_a_slow_cycle_that_a_stand_imposes_needs_no_kind(file, shared, tmp_path):
     words = [w for w in CYCLE if w not in ("--set", "kind=imposed")]

@@ -27,9 +27,9 @@ import numpy as np
 from fes_pin.data.schema import IMPOSED, RigSchema
 from fes_pin.data.trial import Trial, derived_trial
 
-MORE, MANY = 1.5, 4.0
+MORE, MANY = 1.5, 3.5
 """Ratios from which an effort cannot have driven the joint, and from which a stated kind is contradicted. Driven rigs
-have at most 1, and 0.35 is the largest of 71. Where their reading was low-passed at 4 Hz and then rounded, 2.5 is."""
+have at most 1, and 0.35 is the largest of 71. Where their reading was low-passed at 4 Hz and then rounded, 2.8 is."""
 ORDER, LAGS = 4, 4
 """Of differences of an effort and of a reading, and samples to either side over which a controller answers."""
 NOISE_ORDER = 8
@@ -156,12 +156,9 @@ def direction_of(trials: Sequence[Trial]) -> Direction:
 
 def _largest_ratio(trials: Sequence[Trial]) -> tuple[float, str]:
     """Return the largest ratio of an octave, and that octave in words; NaN where none shows it."""
-    dt = max(t.dt for t in trials)
-    frequency = np.fft.rfftfreq(round(SEGMENT_S / dt), dt)
-    position = _pooled(trials, [t["position"] for t in trials], frequency)
-    noise = float(np.median(position[frequency > QUIET * frequency[-1]]))
-    band = _band(frequency, position, noise)
-    if not 2.0 * band <= frequency[-1] or any(len(t) * t.dt * band <= 2.0 for t in trials):
+    frequency, position, noise = _spectrum_of_positions(trials)
+    band = band_hz(trials)
+    if not 2.0 * band <= frequency[-1]:
         return math.nan, ""
     net, inertia, explained = _net_efforts(trials, band)
     if explained < EXPLAINED:
@@ -198,25 +195,32 @@ def _answering(trials: Sequence[Trial]) -> tuple[float, float]:
     return 1.0 - missed / max(every, 1e-300), noise / usual
 
 
-def _band(frequency: np.ndarray, position: np.ndarray, noise: float) -> float:
-    """Return the frequency above which there is hardly motion, Hz, from the spectrum of the position."""
+def _spectrum_of_positions(trials: Sequence[Trial]) -> tuple[np.ndarray, np.ndarray, float]:
+    """Return frequencies, the mean spectrum of the positions, and that of their noise."""
+    dt = max(t.dt for t in trials)
+    frequency = np.fft.rfftfreq(round(SEGMENT_S / dt), dt)
+    position = _pooled(trials, [t["position"] for t in trials], frequency)
+    return frequency, position, float(np.median(position[frequency > QUIET * frequency[-1]]))
+
+
+def band_hz(trials: Sequence[Trial]) -> float:
+    """Return the frequency above which there is hardly motion, Hz; NaN where trials are too short for it."""
+    if not trials:
+        return math.nan
+    frequency, position, noise = _spectrum_of_positions(trials)
     power = np.cumsum(np.maximum(position - WHITE * noise, 0.0) * frequency**2)
-    return max(TIMES * float(frequency[np.searchsorted(power, OF_POWER * power[-1])]), SLOWEST_HZ)
+    band = max(TIMES * float(frequency[np.searchsorted(power, OF_POWER * power[-1])]), SLOWEST_HZ)
+    return math.nan if any(len(t) * t.dt * band <= 2.0 for t in trials) else band
 
 
 def _net_efforts(trials: Sequence[Trial], band: float) -> tuple[list[np.ndarray], float, float]:
     """Return the effort of each trial without what position and velocity explain, the largest inertia, and R^2."""
-    from fes_pin.data.smooth import low_pass  # noqa: PLC0415 - half a second of SciPy, for efforts alone
-
-    motions = [_moved(t, band) for t in trials]
+    motions = [moved(t, band) for t in trials]
     every = np.concatenate(motions, axis=1)
     low, high, usual = every[0].min(), every[0].max(), float(np.sqrt(np.mean(every[1] ** 2))) + 1e-300
-    columns = [_columns(q, v, 0.5 * (low + high), 0.5 * (high - low), usual) for q, v, _ in motions]
-    rows = []
-    for trial, (_, _, a), known in zip(trials, motions, columns, strict=True):
-        cutoff, edge = min(band, OF_RATE / trial.dt), math.ceil(1.0 / (band * trial.dt))
-        smooth = low_pass(np.column_stack([a, *known, trial["effort"]]), trial.dt, cutoff)
-        rows.append(smooth[edge : len(a) - edge : max(1, int(0.25 / (band * trial.dt)))])
+    columns = [_columns(q, v, 0.5 * (low + high), 0.5 * (high - low), usual) for q, v, _, _ in motions]
+    each = zip(trials, motions, columns, strict=True)
+    rows = [smoothed_rows(t, np.stack([m[2], *known, m[3]]), band) for t, m, known in each]
     every_row = np.concatenate(rows).T
     a, known, effort = every_row[0], every_row[1:-1], every_row[-1]
     sizes = np.sqrt(np.mean(np.square(known), axis=1))
@@ -240,7 +244,7 @@ def _ratio(trials: Sequence[Trial], net: Sequence[np.ndarray], band: float, low:
     """
     from fes_pin.data.smooth import low_pass  # noqa: PLC0415
 
-    speeds = [np.abs(_moved(t, band)[1]) for t in trials]
+    speeds = [np.abs(moved(t, band)[1]) for t in trials]
     usual = math.sqrt(float(np.mean(np.concatenate(speeds) ** 2)))
     pairs = []
     for trial, effort, speed in zip(trials, net, speeds, strict=True):
@@ -257,13 +261,27 @@ def _ratio(trials: Sequence[Trial], net: Sequence[np.ndarray], band: float, low:
     return float(effort / bend) if bend > 0.0 else math.nan
 
 
-def _moved(trial: Trial, band: float) -> np.ndarray:
-    """Return position, velocity and acceleration in the band, shape (3, n)."""
+def smoothed_rows(trial: Trial, columns: np.ndarray, band: float) -> np.ndarray:
+    """Return columns, shape (columns, n), low-passed at the rows of a regression, shape (rows, columns)."""
     from fes_pin.data.smooth import low_pass  # noqa: PLC0415
 
-    position = low_pass(trial["position"], trial.dt, min(band, OF_RATE / trial.dt))
+    cutoff, edge = min(band, OF_RATE / trial.dt), math.ceil(1.0 / (band * trial.dt))
+    smooth = low_pass(columns.T, trial.dt, cutoff)
+    return smooth[edge : len(smooth) - edge : max(1, int(0.25 / (band * trial.dt)))]
+
+
+def moved(trial: Trial, band: float) -> np.ndarray:
+    """Return position, velocity, acceleration and effort in the band, shape (4, n).
+
+    An effort is held until the next sample: about a sample the mean of its two values acts.
+    """
+    from fes_pin.data.smooth import low_pass  # noqa: PLC0415
+
+    acting = 0.5 * (trial["effort"] + np.concatenate([trial["effort"][:1], trial["effort"][:-1]]))
+    both = np.column_stack([trial["position"], acting])
+    position, effort = low_pass(both, trial.dt, min(band, OF_RATE / trial.dt)).T
     velocity = np.gradient(position, trial.dt)
-    return np.stack([position, velocity, np.gradient(velocity, trial.dt)])
+    return np.stack([position, velocity, np.gradient(velocity, trial.dt), effort])
 
 
 def _columns(q: np.ndarray, v: np.ndarray, middle: float, half: float, usual: float) -> np.ndarray:

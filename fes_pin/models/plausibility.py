@@ -13,6 +13,7 @@ from fes_pin.data.schema import IMPOSED
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.infer.levels import SEEN_DEVIATIONS
+from fes_pin.models.goals import check_no_goal
 from fes_pin.models.model import Model
 from fes_pin.models.rigs.base import RUN_OUT
 
@@ -49,6 +50,7 @@ def odd_numbers(study: Study | ToPredict, model: Model, simulated: Simulation) -
         For data that allow no verdict, see `data.plausibility`; and for a time step much longer than the time constants
         of the model's start values.
     """
+    check_no_goal(study, model.rig)
     odd = [*implausible(study), *_steps(study, model), *_range(study, model)]
     return [*odd, *_swings(study, model), *_turned(study, model, simulated), *_at_rest(study, model)]
 

@@ -77,7 +77,7 @@ def test_a_stated_kind_that_data_contradict_is_said(tmp_path):
 
 
 def test_a_stated_kind_that_is_uncertain_is_kept(tmp_path):
-    loud = study(tmp_path, [imposed(k, kind="motion", noise=0.12) for k in (1, 2)])
+    loud = study(tmp_path, [imposed(k, kind="motion", noise=0.09) for k in (1, 2)])
     measured = measured_study(loud)
     assert MORE < direction_of(loud.trials).ratio < MANY
     assert {t.kind for t in measured.study.trials} == {"motion"} and "is doubtful" in measured.warnings[0]

@@ -1,0 +1,80 @@
+"""Whether the effort of a joint is a torque, or the goal position of a controller in the column of the effort.
+
+A position controller of stiffness k and damping d applies the torque k (goal - q) - d v, so that
+
+    goal = q + (inertia a + gravity(q)) / k + (damping + d) v / k + friction / k
+
+A torque has the weight 1 at the inertia and the gravity of the URDF, and a goal 1 at the position and 1 / k at them.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from fes_pin.data.direction import FEWEST, band_hz, moved, smoothed_rows
+from fes_pin.data.errors import InputError
+from fes_pin.data.plausibility import ToPredict, trials_named
+from fes_pin.data.study import Study
+from fes_pin.data.trial import Trial
+from fes_pin.models.rigs.base import Rig
+
+CLOSE = 0.05
+"""Distance of the weight of the position from 1 within which an effort is a goal: gears and scales are within it."""
+LESS = 0.5
+"""Weight of the believed inertia and gravity below which an effort is no torque: beliefs are rarely wrong by a half."""
+EXPLAINED = 0.95
+"""Least share of the variance of a goal that the equation explains."""
+SURELY = 3.0
+"""Standard deviations by which the weight of inertia and gravity may be larger than its estimate."""
+
+
+def check_no_goal(study: Study | ToPredict, rig: Rig) -> None:
+    """Raise InputError where the efforts of a joint are goal positions."""
+    driven = [t for t in study.trials if {"effort", "position"} <= set(t.columns) and len(t) >= FEWEST]
+    if rig.name != "joint" or not driven:
+        return
+    stiffness = stiffness_of_goal(driven, rig.constants)
+    if stiffness is None:
+        return
+    unit = "N m/rad" if rig.constants["revolute"] else "N/m"
+    names = trials_named([t.name for t in driven])
+    looks = f"looks like a goal position in {names}: the position follows it one to one"
+    wanted = f"expected an effort, {stiffness:.2g} {unit} times (goal - position) if the URDF's inertia is right"
+    raise InputError(f"{looks}; {wanted}", file=study.folder, column="effort")
+
+
+def stiffness_of_goal(trials: Sequence[Trial], constants: Mapping[str, float]) -> float | None:
+    """Return the stiffness of the controller whose goals are the efforts of trials; None where they are no goals.
+
+    Parameters
+    ----------
+    trials
+        Each with the columns "position" and "effort".
+    constants
+        Of the joint: `inertia`, `gravity_cos`, `gravity_sin`, `revolute`.
+    """
+    moving = [t for t in trials if np.ptp(t["effort"]) > 0.0 and np.ptp(t["position"]) > 0.0]
+    band = band_hz(moving)
+    if not math.isfinite(band):
+        return None
+    usual = float(np.sqrt(np.mean(np.concatenate([moved(t, band)[1] for t in moving]) ** 2)))
+    rows = []
+    for trial in moving:
+        q, v, a, effort = moved(trial, band)
+        turned = constants["revolute"] * q
+        weight = constants["gravity_cos"] * np.cos(turned) + constants["gravity_sin"] * np.sin(turned)
+        known = [q, constants["inertia"] * a + weight, v, np.tanh(v / (CLOSE * usual)), np.ones_like(q)]
+        rows.append(smoothed_rows(trial, np.stack([*known, effort]), band))
+    every = np.concatenate(rows)
+    columns, effort = every[:, :-1], every[:, -1]
+    if np.linalg.matrix_rank(columns) < columns.shape[1] or len(effort) <= columns.shape[1]:
+        return None
+    weights = np.linalg.lstsq(columns, effort, rcond=None)[0]
+    missed = effort - columns @ weights
+    spread = np.sqrt(np.diag(np.linalg.inv(columns.T @ columns)) * float(missed @ missed) / len(effort))
+    of_torque = float(weights[1] + SURELY * spread[1])
+    is_goal = abs(weights[0] - 1.0) < CLOSE and 0.0 < of_torque < LESS
+    if not is_goal or float(np.var(missed)) > (1.0 - EXPLAINED) * float(np.var(effort)):
+        return None
+    return 1.0 / max(float(weights[1]), 1e-300)

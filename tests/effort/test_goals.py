@@ -1,0 +1,54 @@
+"""A goal position in the column of the effort is rejected, and no effort is taken for one."""
+
+import numpy as np
+import pytest
+from bench import DAMPING, INERTIA, WEIGHT, study, trial
+from driven_rigs.draw import draw
+from driven_rigs.swing_up import draw_swing_up
+from scipy.integrate import odeint
+
+import fes_pin as fp
+
+DT, SECONDS = 0.01, 6.0
+
+
+def servo(seed, stiffness, friction=0.05, is_torque=False):
+    """A joint that a position controller moves, integrated by LSODA: its goal, or its torque, and the position."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(round(SECONDS / DT)) * DT
+    waves = zip(rng.uniform(0.5, 6.0, 3), rng.uniform(0.0, 6.0, 3), strict=True)
+    goals = sum(0.3 * np.sin(w * time + phase) for w, phase in waves)
+    state, read = np.array([goals[0], 0.0]), []
+
+    def moves(x, _, goal):
+        torque = stiffness * (goal - x[0]) - 0.05 * stiffness * x[1] - DAMPING * x[1] - WEIGHT * np.sin(x[0])
+        return [x[1], (torque - friction * np.tanh(x[1] / 0.02)) / INERTIA]
+
+    for goal in goals:
+        read.append(state[0] + 3e-4 * rng.standard_normal())
+        state = odeint(moves, state, [0.0, DT], args=(goal,))[-1]
+    effort = stiffness * (goals - np.array(read)) if is_torque else goals
+    return fp.Trial(f"{seed}", "motion", {"effort": effort, "position": np.array(read)}, time)
+
+
+@pytest.mark.parametrize("stiffness", [4.0, 15.0, 60.0])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_goal_position_is_no_torque(seed, stiffness, tmp_path):
+    goals = study(tmp_path, [servo(seed + 10 * k, stiffness) for k in range(2)])
+    for use in (fp.check, fp.diagnose):
+        with pytest.raises(fp.InputError, match="looks like a goal position") as said:
+            use(goals)
+        found = float(str(said.value).split("expected an effort, ")[1].split(" ")[0])
+        assert found == pytest.approx(stiffness, rel=0.15) and "\n" not in str(said.value)
+
+
+@pytest.mark.parametrize("stiffness", [4.0, 15.0])
+def test_the_torque_of_the_same_controller_is_one(stiffness, tmp_path):
+    fp.check(study(tmp_path, [servo(3, stiffness, is_torque=True), servo(4, stiffness, is_torque=True)]))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_no_controllers_torque_is_taken_for_a_goal(seed, tmp_path):
+    fp.check(study(tmp_path, [trial(seed), trial(seed + 50)]))
+    fp.check(fp.read_study(draw(("coulomb_friction",), 0.2, 7100 + seed, tmp_path / "a").study))
+    fp.check(fp.read_study(draw_swing_up((), 7200 + seed, tmp_path / "b").study))
