@@ -18,6 +18,7 @@ from fes_pin.effort.columns import Links
 from fes_pin.effort.fits import EffortSets
 from fes_pin.effort.motion import Band, Record, band_of, has_rows, noise_of_bend
 from fes_pin.effort.problem import HOLD, EffortFit, Rows, own
+from fes_pin.effort.timing import with_hold
 from fes_pin.effort.verdict import EffortSearch, EffortState, EffortVerdict
 from fes_pin.infer.covariance import covariance_of
 from fes_pin.infer.fits import Names
@@ -217,9 +218,9 @@ def search_effort(study: Study, seed: int = 0) -> EffortAnswer:
     found = searched(joint, trials, seed)
     state, verdict = found.state, found.state.verdict
     assert isinstance(verdict, EffortVerdict)
-    left, many = state.weighed.lack_of_fit, (state.found.nominal, state.found.best)
-    nominal, extended = (_final(verdict, one, found.others) for one in many)
-    if _moves(extended, state.found.best, found.others):
+    timed = with_hold((state.found.nominal, state.found.best), [found.models, *found.others])
+    left, (nominal, extended) = state.weighed.lack_of_fit, (_final(verdict, one, found.others) for one in timed)
+    if _moves(extended, timed[1], found.others):
         return EffortAnswer(REJECTED, band_hz=found.band_hz, refusal=NOT_CARRIED, remainder=left)
     units = joint.units()
     return EffortAnswer(
