@@ -34,12 +34,13 @@ ORDER, LAGS = 4, 4
 """Of differences of an effort and of a reading, and samples to either side over which a controller answers."""
 NOISE_ORDER = 8
 """Of differences in which the noise of an effort is measured: of a sine of 5 Hz at 50 Hz they leave 0.02 %."""
-COMMANDED = 0.1
-"""Share of the differences of an effort from which a controller commands it. Of 71 driven rigs 0.14 is the least, but
-for one whose log was interpolated; of efforts that were read 0.06 is the largest."""
+COMMANDED, SURELY_COMMANDED = 0.1, 0.9
+"""Share of the differences of an effort from which a controller commands it, and from which a stated kind is doubtful.
+Of 71 driven rigs 0.14 is the least, but for one whose log was interpolated. Of efforts that were read 0.06 is the
+largest, and 0.3 on a testing machine that shakes position and force together."""
 NOISY = 1e-3
 """Noise, as a share of an effort, from which it is noise of its own: rounding and 12 bits leave less."""
-EXPLAINED = 0.9
+EXPLAINED = 0.95
 """Least share of the effort's variance that the motion explains: else its upper octaves hold causes, not noise."""
 SURELY = 3.0
 """Standard deviations by which the inertia may be larger than its estimate."""
@@ -49,6 +50,8 @@ QUIET, WHITE = 0.7, 4.0
 """Share of the Nyquist frequency above which a reading is noise, and the ratio to that noise from which it is more."""
 OF_POWER, TIMES, SLOWEST_HZ = 0.98, 4.0, 3.0
 """The band: so many times the frequency below which the velocity has this share of its power, and at least, Hz."""
+SLOWEST_ROWS = 0.25
+"""Longest step, in periods of the slowest band: the octave above it ends at the Nyquist frequency."""
 OF_RATE = 0.4
 """Largest cut-off frequency, as a share of the sample rate."""
 OCTAVES = 6
@@ -57,6 +60,8 @@ FEWEST = 100
 """Samples of a trial that is looked at, and of joints in motion, at least."""
 MOVING = 0.3
 """Speed, as a share of the usual one, from which a joint counts as moving."""
+FARTHEST = 1e6
+"""Position in rad or m that nothing reaches."""
 ALIKE = 1e-6
 """Singular value, as a share of the largest, below which columns are alike."""
 
@@ -118,7 +123,7 @@ def contradicted(trials: Sequence[Trial], schema: RigSchema) -> tuple[tuple[Tria
     for kind in (schema.default_kind, IMPOSED):
         stated = [t for t in trials if t.kind == kind and schema.is_driven_or_read(t.columns)]
         found = direction_of(stated)
-        if kind == IMPOSED and found.kind != IMPOSED and found.answering > COMMANDED:
+        if kind == IMPOSED and found.kind != IMPOSED and found.answering > SURELY_COMMANDED:
             warnings.append(f'kind = "{kind}" is doubtful: {found.reason}')
         elif kind != IMPOSED and MORE < found.ratio < MANY:
             warnings.append(f'kind = "{kind}" is doubtful, or the reading was low-passed: {found.reason}')
@@ -137,10 +142,14 @@ def direction_of(trials: Sequence[Trial]) -> Direction:
     trials
         Each with the columns "position" and "effort".
     """
-    usable = [t for t in trials if len(t) >= FEWEST and np.ptp(t["effort"]) > 0.0 and np.ptp(t["position"]) > 0.0]
+    usable = [t for t in trials if len(t) >= FEWEST and 0.0 < np.ptp(t["position"]) < FARTHEST]
+    largest = max((float(np.abs(t["effort"]).max()) for t in usable), default=0.0)
+    if largest <= 0.0:
+        return UNKNOWN
+    usable = [t.with_columns(effort=t["effort"] / largest) for t in usable if np.ptp(t["effort"]) > 1e-9 * largest]
     if not usable:
         return UNKNOWN
-    ratio, octave = _largest_ratio(usable)
+    ratio, octave, is_explained = _largest_ratio(usable)
     answering, noise = _answering(usable)
     if ratio > MORE:
         said = f"the effort would accelerate the joint {ratio:.2g} times as much as was read {octave}"
@@ -148,30 +157,33 @@ def direction_of(trials: Sequence[Trial]) -> Direction:
     if answering > COMMANDED:
         said = "the effort answers the noise of the reading, as the command of a controller does"
         return Direction("motion", said, ratio, answering)
-    if noise > NOISY:
+    if noise > NOISY and is_explained:
         said = f"the effort has noise of its own, {100.0 * noise:.2g} % of it, which does not answer the reading"
         return Direction(IMPOSED, said, ratio, answering)
     return UNKNOWN
 
 
-def _largest_ratio(trials: Sequence[Trial]) -> tuple[float, str]:
-    """Return the largest ratio of an octave, and that octave in words; NaN where none shows it."""
-    frequency, position, noise = _spectrum_of_positions(trials)
+def _largest_ratio(trials: Sequence[Trial]) -> tuple[float, str, bool]:
+    """Return the largest ratio of an octave, and that octave in words; NaN where none shows it.
+
+    The last value is whether the motion explains the effort.
+    """
     band = band_hz(trials)
-    if not 2.0 * band <= frequency[-1]:
-        return math.nan, ""
+    if math.isnan(band):
+        return math.nan, "", False
+    frequency, position, noise = _spectrum_of_positions(trials)
     net, inertia, explained = _net_efforts(trials, band)
     if explained < EXPLAINED:
-        return math.nan, ""
+        return math.nan, "", False
     ratios = {}
     for low in (band * 2.0**k for k in range(OCTAVES) if band * 2.0 ** (k + 1) <= frequency[-1]):
         is_white = position[(frequency >= low) & (frequency < 2.0 * low)].mean() < WHITE * noise
         if is_white and math.isfinite(ratio := _ratio(trials, net, band, low)):
             ratios[low] = ratio / inertia
     if not ratios:
-        return math.nan, ""
+        return math.nan, "", True
     low = max(ratios, key=lambda f: ratios[f])
-    return ratios[low], f"from {low:.2g} to {2.0 * low:.2g} Hz"
+    return ratios[low], f"from {low:.2g} to {2.0 * low:.2g} Hz", True
 
 
 def _answering(trials: Sequence[Trial]) -> tuple[float, float]:
@@ -192,25 +204,26 @@ def _answering(trials: Sequence[Trial]) -> tuple[float, float]:
         target = effort[LAGS:-LAGS] / effort.std()
         left = target - around @ np.linalg.lstsq(around, target, rcond=1e-10)[0]
         every, missed = every + float(target @ target), missed + float(left @ left)
-    return 1.0 - missed / max(every, 1e-300), noise / usual
+    return 1.0 - missed / every if every else 0.0, noise / usual
 
 
 def _spectrum_of_positions(trials: Sequence[Trial]) -> tuple[np.ndarray, np.ndarray, float]:
     """Return frequencies, the mean spectrum of the positions, and that of their noise."""
     dt = max(t.dt for t in trials)
-    frequency = np.fft.rfftfreq(round(SEGMENT_S / dt), dt)
+    frequency = np.fft.rfftfreq(min(round(SEGMENT_S / dt), max(map(len, trials))), dt)
     position = _pooled(trials, [t["position"] for t in trials], frequency)
     return frequency, position, float(np.median(position[frequency > QUIET * frequency[-1]]))
 
 
 def band_hz(trials: Sequence[Trial]) -> float:
-    """Return the frequency above which there is hardly motion, Hz; NaN where trials are too short for it."""
-    if not trials:
+    """Return the frequency above which there is hardly motion, Hz; NaN where trials are too short or too coarse."""
+    if not trials or max(t.dt for t in trials) * SLOWEST_HZ > SLOWEST_ROWS:
         return math.nan
     frequency, position, noise = _spectrum_of_positions(trials)
     power = np.cumsum(np.maximum(position - WHITE * noise, 0.0) * frequency**2)
     band = max(TIMES * float(frequency[np.searchsorted(power, OF_POWER * power[-1])]), SLOWEST_HZ)
-    return math.nan if any(len(t) * t.dt * band <= 2.0 for t in trials) else band
+    is_short = 2.0 * band > frequency[-1] or any(len(t) * t.dt * band <= 2.0 for t in trials)
+    return math.nan if is_short else band
 
 
 def _net_efforts(trials: Sequence[Trial], band: float) -> tuple[list[np.ndarray], float, float]:

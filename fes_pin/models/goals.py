@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from fes_pin.data.direction import FEWEST, band_hz, moved, smoothed_rows
+from fes_pin.data.direction import FARTHEST, FEWEST, band_hz, moved, smoothed_rows
 from fes_pin.data.errors import InputError
 from fes_pin.data.plausibility import ToPredict, trials_named
 from fes_pin.data.study import Study
@@ -54,7 +54,7 @@ def stiffness_of_goal(trials: Sequence[Trial], constants: Mapping[str, float]) -
     constants
         Of the joint: `inertia`, `gravity_cos`, `gravity_sin`, `revolute`.
     """
-    moving = [t for t in trials if np.ptp(t["effort"]) > 0.0 and np.ptp(t["position"]) > 0.0]
+    moving = [t for t in trials if 0.0 < np.ptp(t["position"]) < FARTHEST and 0.0 < np.ptp(t["effort"]) < FARTHEST]
     band = band_hz(moving)
     if not math.isfinite(band):
         return None
