@@ -69,16 +69,25 @@ class Again:
         return [self._kept[k][1] for k in keys]
 
 
-def make_folds(found: Found, train: Sequence[Trial], test: Sequence[Trial], refitted: Again) -> list[Fold]:
+def make_folds(
+    found: Found,
+    train: Sequence[Trial],
+    test: Sequence[Trial],
+    refitted: Again,
+    held: Sequence[list[int]] | None = None,
+) -> list[Fold]:
     """Return the trials that the study holds out as one fold, or folds to cross-validate; none of one trial.
 
-    Each is one of `identified_folds`.
+    Parameters
+    ----------
+    held
+        Trials of each fold; by default `identified_folds` of the best set.
     """
     if test:
         return [Fold(found.nominal, found.best, found.without, tuple(test))]
     if len(train) < 2:
         return []
-    held = identified_folds(found.best)
+    held = identified_folds(found.best) if held is None else held
     fits = {"": found.nominal, "+": found.best, **found.without}
     others = [[t for i, t in enumerate(found.best.trials) if i not in out] for out in held]
     wanted = [(k, n) for k in range(len(held)) for n in fits]

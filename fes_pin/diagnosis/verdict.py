@@ -21,7 +21,15 @@ from fes_pin.diagnosis.errors_ahead import (
     random_parts,
     squared_errors,
 )
-from fes_pin.diagnosis.held_out import Again, Fold, as_random_as_in_all, evidence_of, gains_of, make_folds
+from fes_pin.diagnosis.held_out import (
+    Again,
+    Fold,
+    as_random_as_in_all,
+    evidence_of,
+    gains_of,
+    identified_folds,
+    make_folds,
+)
 from fes_pin.diagnosis.likelihood_models import Found, LikelihoodModels, LikelihoodSearch
 from fes_pin.diagnosis.rejected import is_moved_by_what_is_recorded, no_noise, with_rejected_causes
 from fes_pin.identify.error_measures import FREE
@@ -143,10 +151,10 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
         """
         if currency == EFFORT and self.models.by_effort is not None:
             return self.models.by_effort.errors(state.found.best.names)
-        best, train, folds = state.found.best, self.models.trials, self.folds(state)
-        if not (folds and folds[0].within):
-            folds = make_folds(replace(state.found, nominal=best, without={}), train, (), self.refitted)
-        floor = unit.found.best
+        best, train, folds, floor = state.found.best, self.models.trials, self.folds(state), unit.found.best
+        held = identified_folds(floor) if len(train) > 1 else []  # the same of both sets
+        if [[*f.out] for f in folds] != held:
+            folds = make_folds(replace(state.found, nominal=best, without={}), train, (), self.refitted, held)
         pairs = [(f.chosen or f.best, floor, f.test) for f in folds]
         return squared_errors(pairs or [(best, floor, train)], self.models.judged_s)
 

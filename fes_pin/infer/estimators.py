@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from fes_pin.infer.held_out import Errors, held_out_gain
-from fes_pin.infer.levels import NOTHING_PERCENT
+from fes_pin.infer.levels import FORM_SHARE, NOTHING_PERCENT
 from fes_pin.infer.result import Gain
-from fes_pin.infer.text import percent
+from fes_pin.infer.text import WHOLE, percent
 from fes_pin.infer.verdict import State, Step
 
 AnyState = State[Any, Any, Any]
@@ -66,6 +66,11 @@ class Compared:
         return self.gain.low > NOTHING_PERCENT
 
     @property
+    def is_felt(self) -> bool:
+        """Whether the other removes more than an error of form may leave."""
+        return self.gain.percent > WHOLE * FORM_SHARE
+
+    @property
     def is_worse(self) -> bool:
         """Whether the first does."""
         return self.loss.low > NOTHING_PERCENT
@@ -78,17 +83,17 @@ class Compared:
 def choose(first: AnyState, others: Sequence[Estimator], seed: int = 0) -> AnyState:
     """Return the state of the first estimator, or of one that predicts materially better; the first such one.
 
-    It predicts better where the share of the squared error that it removes is above `NOTHING_PERCENT` in every
-    currency, and in one with its 95 % interval: what improves one currency alone is an error of form of another. Noise
-    is not subtracted: each estimator has its own, and that of a wrong model is large. Data that the study itself holds
-    out are not used: gains on them would be optimistic.
+    It predicts better where the 95 % interval of the share of the squared error that it removes is above
+    `NOTHING_PERCENT` in one currency, and that share is above `FORM_SHARE` in each other one: what lessens the error of
+    one currency alone is an error of form. Noise is not subtracted: each estimator has its own, and that of a wrong
+    model is large. Data that the study itself holds out are not used: gains on them would be optimistic.
     """
     for estimator in others:
         other = estimator.state(first)
         if other is None:
             continue
         compared = _compared(first, other, seed)
-        better = all(c.gain.percent > NOTHING_PERCENT for c in compared) and any(c.is_better for c in compared)
+        better = any(c.is_better and all(o.is_felt for o in compared if o is not c) for c in compared)
         smaller = estimator.prefers_smaller and len(other.names) < len(first.names)
         if better or (smaller and compared and not any(c.is_worse for c in compared)):
             said = "predicts better" if better else "predicts as well with fewer causes"
