@@ -4,7 +4,6 @@ A model predicts the effort by its own equations, as of an imposed motion: along
 the model says of the sensor. What was recorded passes the same filters as what is predicted; see `effort.motion`.
 """
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -22,10 +21,8 @@ from fes_pin.models.rigs.joint import Joint
 from fes_pin.models.simulate import Simulator
 from fes_pin.models.stage import Effect
 
-DRAG, LAG, PLAY = "quadratic_damping", "sensor_lag", "backlash"
-"""Friction that acts on the torque, a reading that is late, and one behind a play."""
-SLOW, UNSURE = 0.05, 5.0
-"""Speed below which a reading stands, as a share of the usual speed and in deviations of the noise of the speed."""
+DRAG, LAG = "quadratic_damping", "sensor_lag"
+"""Friction that acts on the torque, and a reading that is late."""
 OF_TORQUE = ("gravity_angle", "torque", "friction", "effort")
 """Signals that a motion which is measured and one which is imposed have in common."""
 
@@ -173,31 +170,14 @@ def _seen(model: Model, track: Motion) -> Motion:
         record = replace(record, reading=reading)
     inertia, cosine, sine, turns = (float(rig.constants[n]) for n in rig.needed)
     links = Links(inertia, cosine, sine, bool(turns))
-    names = [e.name for e in reversed(views) if e.name not in (LAG, PLAY)]
-    seen = Rows([record], track.band, links).seen(values, names)[1][0]
-    slack = values.get(f"{PLAY}.half_width", 0.0)
-    return Motion(seen.record, seen.band, _driven_side(seen, slack)) if slack else seen
-
-
-def _driven_side(track: Motion, half_width: float) -> np.ndarray:
-    """Return the position of the driven side of a play by a reading, shape (n,).
-
-    The driven side turns where the reading stops, and crosses the slack from rest until the reading moves again: by
-    the square of the time.
-    """
-    power = (2.0 * math.pi) ** 2 * 0.25 * math.sqrt(math.pi) * (track.band.wide / math.sqrt(math.log(2.0))) ** 3
-    stands = max(SLOW * float(np.sqrt(np.mean(track.v**2))), UNSURE * math.sqrt(power * track.band.noise))
-    moving = np.flatnonzero(np.abs(track.v) > stands)
-    if len(moving) < 2:
-        return track.reading
-    side, at = np.sign(track.v[moving]), np.interp(np.arange(len(track.v)), moving, np.arange(len(moving)))
-    last = np.minimum(at.astype(int), len(moving) - 2)
-    return np.asarray(track.reading + half_width * (side[last] + np.diff(side)[last] * (at - last) ** 2))
+    names = [e.name for e in reversed(views) if e.name != LAG]
+    (seen,) = Rows([record], track.band, links).seen(values, names)[1]
+    return Motion(record, track.band, seen.reading)
 
 
 def _is_view(effect: Effect) -> bool:
     """Return whether a cause is of the reading, and can be taken off it."""
-    return effect.name in (LAG, PLAY, "sensor_drift", "sensor_gain", "sensor_nonlinearity", "sensor_offset")
+    return effect.name in (LAG, "backlash", "sensor_drift", "sensor_gain", "sensor_nonlinearity", "sensor_offset")
 
 
 def _without_friction(model: Model) -> Model:

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fes_pin.effort.motion import Motion
+from fes_pin.effort.motion import Motion, noise_of_speed
 from fes_pin.models.rigs.joint import Joint
 
 Values = Mapping[str, float]
@@ -23,7 +23,10 @@ Values = Mapping[str, float]
 Torques = Callable[[Motion, Values, "Sizes"], Sequence[np.ndarray]]
 
 SLOWLY = 0.05
-"""Speed at which friction has most of its size, as a share of the usual speed, until data show another."""
+"""Speed at which friction has most of its size, until data show another, and below which the reading of a play stands;
+as a share of the usual speed."""
+UNSURE = 5.0
+"""Speed below which a reading behind a play stands, in deviations of the noise of the speed, if that is the larger."""
 STRIBECK = 0.1
 """Speed over which stiction falls, as a share of the usual speed, where a fit starts."""
 PRESLIDING = 1e-3
@@ -38,6 +41,8 @@ WAVES = tuple(1.5 + 0.75 * k for k in range(20))
 """Waves of a cogging torque within the range that are tried."""
 RINGS_HZ = (3.0, 4.5, 6.5, 9.0, 11.0, 13.5, 17.0, 22.0)
 """Frequencies of a frame that are tried, Hz, as the catalogue has them."""
+FRAME = 0.01
+"""Coupling of a frame that is tried: its torque is in proportion within 1 %."""
 PLAYS = (0.003, 0.03)
 """Half widths of a play that are tried, as shares of the range, as the catalogue has them."""
 
@@ -168,16 +173,24 @@ def cogging(track: Motion, x: Values, sizes: Sizes) -> Sequence[np.ndarray]:
     return track.low(-np.sin(x["waves"] * track.q)), track.low(-np.cos(x["waves"] * track.q))
 
 
-def frame_vibration(track: Motion, x: Values, sizes: Sizes) -> Sequence[np.ndarray]:
-    """Return the effort that a swinging frame takes, to first order in its coupling.
+def frame_vibration(track: Motion, x: Values, inertia: float) -> np.ndarray:
+    """Return the change of the column of an inertia where the frame swings, at the rows, shape (m,).
 
-    With H = s^2 / (s^2 + 2 zeta omega s + omega^2) the believed inertia has the effort coupling H q''.
+    With H(s) = s^2 / (s^2 + 2 zeta omega s + omega^2) an inertia J has the effort
+
+        J q'' / (1 + c H) = J q'' - J c / (1 + c) H' q''
+
+    where H' has omega and zeta divided by sqrt(1 + c).
     """
     from scipy.signal import bilinear, lfilter  # noqa: PLC0415 - as above
 
-    omega = 2.0 * math.pi * x["frequency_hz"]
-    b, a = bilinear([1.0, 0.0, 0.0], [1.0, 2.0 * x["damping_ratio"] * omega, omega**2], 1.0 / track.dt)
-    return (track.low(sizes.links.inertia * lfilter(b, a, track.a)),)
+    softer = math.sqrt(1.0 + x["coupling"])
+    omega = 2.0 * math.pi * x["frequency_hz"] / softer
+    omega = 2.0 / track.dt * math.tan(0.5 * omega * track.dt)  # the bilinear transform keeps this frequency
+    zeta = x["damping_ratio"] / softer
+    b, a = bilinear([1.0, 0.0, 0.0], [1.0, 2.0 * zeta * omega, omega**2], 1.0 / track.dt)
+    share = x["coupling"] / (1.0 + x["coupling"])
+    return -inertia * share * track.low(lfilter(b, a, track.a))
 
 
 def sensor_offset(track: Motion, x: Values, sizes: Sizes) -> np.ndarray:
@@ -208,8 +221,17 @@ def sensor_nonlinearity(track: Motion, x: Values, sizes: Sizes) -> np.ndarray:
 
 
 def backlash(track: Motion, x: Values, sizes: Sizes) -> np.ndarray:
-    """Return the reading on the driven side of a play, which it crosses about where it reverses."""
-    return np.asarray(track.reading + x["half_width"] * np.tanh(track.v / (SLOWLY * sizes.usual)))
+    """Return the position of the driven side of a play.
+
+    The driven side turns where the reading stops, and crosses the slack from rest until the reading moves again: by
+    the square of the time.
+    """
+    moving = np.flatnonzero(np.abs(track.v) > max(SLOWLY * sizes.usual, UNSURE * math.sqrt(noise_of_speed(track.band))))
+    if len(moving) < 2:
+        return track.reading
+    side, at = np.sign(track.v[moving]), np.interp(np.arange(len(track.v)), moving, np.arange(len(moving)))
+    last = np.minimum(at.astype(int), len(moving) - 2)
+    return np.asarray(track.reading + x["half_width"] * (side[last] + np.diff(side)[last] * (at - last) ** 2))
 
 
 @dataclass(frozen=True)
@@ -219,7 +241,8 @@ class CauseOfEffort:
     Attributes
     ----------
     torques
-        Columns at the rows, one for each amplitude, at values of the shapes; None of a view or a change of the effort.
+        Columns at the rows, one for each amplitude, at values of the shapes; None of a view, and
+        of a change of the links or of the effort.
     view
         The corrected reading, shape (n,); None of a torque.
     amplitudes
@@ -309,9 +332,9 @@ def library(sizes: Sizes, fastest: float) -> dict[str, CauseOfEffort]:
         ),
         CauseOfEffort(
             "frame_vibration",
-            frame_vibration,
             None,
-            {"coupling": (0.0, 5.0, 0.0)},
+            None,
+            {"coupling": (0.0, 5.0, FRAME)},
             [{"frequency_hz": f, "damping_ratio": 0.05} for f in RINGS_HZ if f < fastest],
             {"frequency_hz": (2.0, fastest), "damping_ratio": (0.0, 0.2)},
         ),

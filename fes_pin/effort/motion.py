@@ -264,6 +264,11 @@ def noise_of_bend(band: Band) -> float:
     return band.noise * (2.0 * math.pi) ** 4 * 0.375 * math.sqrt(math.pi) * (band.low / math.sqrt(math.log(2.0))) ** 5
 
 
+def noise_of_speed(band: Band) -> float:
+    """Return the variance of the wide velocity by the noise of the reading: as above, the integral of f^2."""
+    return band.noise * (2.0 * math.pi) ** 2 * 0.25 * math.sqrt(math.pi) * (band.wide / math.sqrt(math.log(2.0))) ** 3
+
+
 def _noise_share(records: Sequence[Record], low: float, noise: float) -> float:
     """Return the share of the noise of the reading in the variance of the low-passed acceleration."""
     variance = noise_of_bend(Band(low, low, noise))

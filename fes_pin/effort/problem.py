@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fes_pin.effort.columns import Links, Sizes, Values, library, nominal_columns
+from fes_pin.effort.columns import Links, Sizes, Values, backlash, frame_vibration, library, nominal_columns
 from fes_pin.effort.motion import Band, Motion, Record
 from fes_pin.infer.optimum import Optimum
 from fes_pin.infer.problem import Linearized, Problem, Unknowns
@@ -27,6 +27,8 @@ KEPT_VIEWS = 24
 """Sets of tracks that are kept: one for each correction of the reading that is tried."""
 PASSED = 1.5
 """Highest frequency of a frame that swings, in units of the band: the low pass leaves half of its amplitude."""
+SWINGS = "frame_vibration"
+"""The cause that changes what an inertia takes of the effort."""
 HOLD = "hold_rows"
 """Rows by which an effort acts after it was recorded, a nuisance where the motion is imposed."""
 Columns = dict[str, np.ndarray]
@@ -62,8 +64,8 @@ class Rows:
         return [len(t.rows) for t in self.tracks]
 
     def seen(self, values: Values, names: Sequence[str]) -> tuple[object, list[Motion]]:
-        """Return the tracks as sensor causes of a set have them, with a key."""
-        views = [self.library[n] for n in names if self.library[n].view is not None]
+        """Return the tracks as sensor causes of a set have them, with a key; a play lies before what reads it."""
+        views = sorted((c for c in map(self.library.get, names) if c and c.view), key=lambda c: c.view is backlash)
         key = tuple((c.name, *own(values, c.name).items()) for c in views)
         if not views:
             return key, self.tracks
@@ -94,6 +96,13 @@ class Rows:
             if at not in self._nominal:
                 self._nominal[at] = [nominal_columns(t, self.links, tilt) for t in tracks]
             out = [dict(one) for one in self._nominal[at]]
+            if SWINGS in names:
+                swinging = own(values, SWINGS)
+                place = (key, SWINGS, *swinging.items())
+                if place not in self._made:
+                    self._made[place] = [(frame_vibration(t, swinging, self.links.inertia),) for t in tracks]
+                for one, (change,) in zip(out, self._made[place], strict=True):
+                    one["inertia_scale"] = one["inertia_scale"] + change
         for name in (only,) if only else names:
             cause = self.library[name]
             if cause.torques is None:

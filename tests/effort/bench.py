@@ -15,21 +15,28 @@ URDF = f"""<robot name="arm"><link name="base"/><link name="moving">
 <limit lower="-9" upper="9" effort="1e3" velocity="1e3"/></joint></robot>""".format(about=INERTIA - MASS * LEVER**2)
 
 
-def trial(seed, count=0.0, friction=0.0, offset=0.0, drag=0.0, seconds=8.0):
-    """Efforts that were commanded and positions that were read; `count` is that of the encoder."""
+def trial(seed, count=0.0, friction=0.0, offset=0.0, drag=0.0, play=0.0, frame=None, seconds=8.0):
+    """Efforts that were commanded and positions that were read, by an encoder of a `count`, behind a `play`.
+
+    `frame` has a coupling, a frequency and a damping ratio.
+    """
     rng = np.random.default_rng(seed)
     time = np.arange(round(seconds / DT)) * DT
     waves = [(f, p) for f, p in zip(rng.uniform(0.2, 1.0, 3), rng.uniform(0.0, 6.0, 3), strict=True)]
     wanted = sum(0.35 * (np.sin(2.0 * np.pi * f * time + p) - np.sin(p)) for f, p in waves)
-    state, effort, read = np.zeros(2), np.empty(len(time)), np.empty(len(time))
-    pushed, rate = 0.0, 0.0
+    state, effort, read = np.zeros(4), np.empty(len(time)), np.empty(len(time))
+    pushed, rate, followed = 0.0, 0.0, 0.0
+    coupling, omega, zeta = (frame[0], 2.0 * np.pi * frame[1], frame[2]) if frame else (0.0, 0.0, 0.0)
 
     def moves(x, _, command):
         torque = command + offset - DAMPING * x[1] - WEIGHT * np.sin(x[0]) - drag * x[1] * abs(x[1])
-        return [x[1], (torque - friction * np.tanh(x[1] / 0.02)) / INERTIA]
+        pull = (torque - friction * np.tanh(x[1] / 0.02)) / INERTIA
+        swings = -(omega**2) * x[2] - 2.0 * zeta * omega * x[3] - coupling * pull
+        return [x[1], pull - swings, x[3], swings]
 
     for k in range(len(time)):
-        seen = state[0] + 1e-4 * rng.standard_normal()
+        followed = min(max(followed, state[0] - play), state[0] + play)
+        seen = followed + 1e-4 * rng.standard_normal()
         read[k] = round(seen / count) * count if count else seen
         rate += 0.3 * ((read[k] - read[max(k - 1, 0)]) / DT - rate)
         effort[k] = 12.0 * (wanted[k] - read[k]) - 1.0 * rate

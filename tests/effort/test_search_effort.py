@@ -50,6 +50,23 @@ def test_drag_is_not_taken_for_friction_of_another_form(tmp_path):
     assert {c.name for c in found.causes} == {"coulomb_friction", "quadratic_damping"}
 
 
+def test_a_frame_that_swings_has_the_parameters_of_the_catalogue(tmp_path):
+    """Its coupling is not small: the mode that the effort of a motion shows is 10 % slower than that of the frame."""
+    found = answer(tmp_path, frame=(0.2, 3.5, 0.05))
+    assert [c.name for c in found.causes] == ["frame_vibration"]
+    for name, true in (("coupling", 0.2), ("frequency_hz", 3.5), ("damping_ratio", 0.05)):
+        assert inside(found.causes[0].parameters[name], true)
+    assert found.causes[0].parameters["frequency_hz"].value == pytest.approx(3.5, rel=0.02)
+    assert found.extended["inertia_scale"].value == pytest.approx(1.0, abs=0.01)
+
+
+def test_a_play_is_crossed_from_rest(tmp_path):
+    found = answer(tmp_path, play=0.004)
+    assert [c.name for c in found.causes] == ["backlash"]
+    assert found.causes[0].parameters["half_width"].value == pytest.approx(0.004, rel=0.1)
+    assert found.extended["inertia_scale"].value == pytest.approx(1.0, abs=0.005)
+
+
 def test_a_study_without_efforts_is_rejected_in_words(tmp_path):
     free = [trial(seed).without("effort") for seed in range(2)]
     found = search_effort(study(tmp_path, free))
