@@ -25,8 +25,6 @@ STEP = 1e-4
 """Step of a numerical derivative, as a share of the value or of the size at which a cause is tried."""
 KEPT_VIEWS = 24
 """Sets of tracks that are kept: one for each correction of the reading that is tried."""
-PASSED = 1.5
-"""Highest frequency of a frame that swings, in units of the band: the low pass leaves half of its amplitude."""
 SWINGS = "frame_vibration"
 """The cause that changes what an inertia takes of the effort."""
 HOLD = "hold_rows"
@@ -52,7 +50,7 @@ class Rows:
         tracks = [t for t in (Motion(r, band) for r in records) if len(t.rows)]
         self.sizes = _sizes(tracks, links)
         self.tracks = _moving(tracks, self.sizes.fast)
-        self.library = library(self.sizes, max(PASSED * band.low, 3.5))
+        self.library = library(self.sizes, max(band.low, 3.5))
         self.reversing = [t.reversing(self.sizes.fast) for t in self.tracks]
         self._views: OrderedDict[object, list[Motion]] = OrderedDict()
         self._made: dict[object, list[Sequence[np.ndarray]]] = {}

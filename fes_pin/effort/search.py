@@ -149,13 +149,9 @@ class FoundByEffort:
         return Model(self.rig, tuple(effects)).with_parameters(nominal)
 
     def _effect(self, fitted: EffortFit, name: str) -> Effect:
-        """Return a cause of a fit as the catalogue has it, with the forms that were significant."""
-        kind, forms = effect_named(name), self.models.library[name].forms
-        unused = {n for k, one in enumerate(forms) if k not in fitted.forms.get(name, ()) for n in one}
-        known = {n: v for n, v in own(fitted.values, name).items() if n not in unused}
-        if not self.models.is_imposed:  # the velocity is estimated, with an uncertainty that rounds friction
-            known = {n: v for n, v in known.items() if n != "creep_speed"}
-            known |= {"stretch": known.pop("presliding")} if "presliding" in known else {}
+        """Return a cause of a fit as the catalogue has it, without its forms, which differ between estimators."""
+        kind, forms = effect_named(name), {n for one in self.models.library[name].forms for n in one}
+        known = {n: v for n, v in own(fitted.values, name).items() if n not in forms}
         values: dict[str, Any] = {n: x.nearest(known[n]) for n, x in kind.parameters().items() if n in known}
         return kind(**values)
 
