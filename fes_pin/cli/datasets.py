@@ -36,8 +36,8 @@ def datasets(
             typer.echo(f"{name}: {place}")
         return
     for one in DATASETS.values():
-        print_text(f"{one.name}: {one.what}\n  {one.origin} ({one.licence})")
-        typer.echo(f"  {_where(one.name) or one.by_hand or f'fes-pin datasets {one.name}'}")
+        where = _where(one.name) or one.by_hand or f"fes-pin datasets {one.name}"
+        print_text(f"{one.name}: {one.what}\n  {one.origin} ({one.licence})\n  {where}")
 
 
 def _where(name: str) -> str:
