@@ -267,8 +267,8 @@ class EffortSets(FittedSets[EffortFit, Values]):
         return self.fits[names].criterion
 
     def excess_scatter(self, larger: EffortFit, smaller: EffortFit) -> float:
-        """See `infer.scatter.excess_scatter`."""
-        return excess_scatter(larger, smaller)
+        """See `infer.scatter.excess_scatter`; once every cause was tried, the residual is a noise that may be slow."""
+        return excess_scatter(larger, smaller, is_slow=self.takes_forms)
 
     def extension_p_value(self, fitted: EffortFit) -> float:
         """Return the family-wise p-value of the best score of a further candidate."""

@@ -15,6 +15,7 @@ from dataclasses import replace
 from typing import Protocol, TypeVar
 
 import numpy as np
+import scipy.linalg
 
 from fes_pin.infer.covariance import covariance_of, scattered, widened
 from fes_pin.infer.distributions import chi2_quantile, normal_quantile
@@ -104,8 +105,15 @@ def as_wide_as_estimates_differ(fitted: F, other: Optimum) -> F:
     return replace(fitted, covariance=fitted.covariance + np.outer(apart, apart))
 
 
-def excess_scatter(larger: Optimum, smaller: Optimum) -> float:
-    """Return the variance ratio of a larger fit's further parameters to that of a right model; at least 1."""
+def excess_scatter(larger: Optimum, smaller: Optimum, *, is_slow: bool = False) -> float:
+    """Return the variance ratio of a larger fit's further parameters to that of a right model; at least 1.
+
+    Parameters
+    ----------
+    is_slow
+        Whether the ratio is at least that of a first-order autoregression with the correlation of neighbouring
+        residuals: `PIECES` show too little of a noise that is slower than they are long.
+    """
     more = [k for k, n in enumerate(larger.free) if n not in smaller.free]
     if not more:
         return 1.0
@@ -113,8 +121,33 @@ def excess_scatter(larger: Optimum, smaller: Optimum) -> float:
     more = [k for k in more if np.isfinite(covariance[k, k]) and covariance[k, k] > 0.0]
     if not more or len(scores) < 2:
         return 1.0
-    own, wide = (c[np.ix_(more, more)] for c in (covariance, scattered(covariance, scores)))
-    return max(1.0, float(np.trace(np.linalg.pinv(own, hermitian=True) @ wide)) / len(more))
+    known = np.isfinite(np.diag(covariance))
+    own = np.linalg.pinv(covariance[np.ix_(more, more)], hermitian=True)
+    wide = [scattered(covariance, scores)]
+    if is_slow:
+        inverse = np.where(np.outer(known, known), covariance, 0.0)
+        wide.append(inverse @ _autoregressive(at_rest(larger.parts)) @ inverse)
+    return max(1.0, *(float(np.trace(own @ one[np.ix_(more, more)])) / len(more) for one in wide))
+
+
+def _autoregressive(parts: Sequence[Linearized]) -> np.ndarray:
+    """Return the covariance of the slopes of the log-likelihood, by the correlation of neighbouring residuals.
+
+    Source: Newey and West, as `covariance.widened`, with the lags of a first-order autoregression: Andrews,
+    Heteroskedasticity and autocorrelation consistent covariance matrix estimation, Econometrica 59 (1991).
+    """
+    pairs = [(p.residual[:-1], p.residual[1:]) for p in parts]
+    near, power = (sum(float(x @ y) for x, y in many) for many in (pairs, [(a, a) for a, _ in pairs]))
+    rho = min(max(near / max(power, 1e-300), 0.0), 1.0 - 1e-6)
+    return np.asarray(sum(p.jacobian.T @ _correlated(without_locals(p, p.jacobian), rho) for p in parts))
+
+
+def _correlated(columns: np.ndarray, rho: float) -> np.ndarray:
+    """Return the correlations rho^|i - j| of rows times columns, shape (m, n); their inverse is a band of three."""
+    bands = np.full((3, len(columns)), -rho)
+    bands[1] = 1.0 + rho**2
+    bands[1, [0, -1]] = 1.0 if len(columns) > 1 else 1.0 - rho**2
+    return np.asarray(scipy.linalg.solve_banded((1, 1), bands / (1.0 - rho**2), columns))
 
 
 def least_apart(likelier: Residuals, other: Residuals) -> float:

@@ -27,9 +27,9 @@ def fitted(columns, errors, names):
     return SimpleNamespace(parts=parts, free=names, at_bound=(), sse=float(left @ left))
 
 
-def gains(coefficient, seed):
+def gains(coefficient, seed, each=EACH, **how):
     """Gains of two slow waves that are not there beside a level, and the same over their scatter; noise lasts."""
-    rng, n = np.random.default_rng(seed), EACH * TRIALS
+    rng, n = np.random.default_rng(seed), each * TRIALS
     time = np.arange(n) / n
     columns = np.stack([np.ones(n), *(np.sin(2.0 * np.pi * k * time) for k in (3.0, 7.0))], axis=1)
     out = []
@@ -39,7 +39,7 @@ def gains(coefficient, seed):
             errors[k] = coefficient * errors[k - 1] + shock
         small, large = fitted(columns[:, :1], errors, ("a",)), fitted(columns, errors, ("a", "b", "c"))
         gain = small.sse - large.sse
-        out.append((gain, gain / excess_scatter(large, small)))
+        out.append((gain, gain / excess_scatter(large, small, **how)))
     return np.array(out)
 
 
@@ -54,6 +54,13 @@ def test_beside_noise_that_lasts_it_keeps_its_level_as_the_plain_gain_does_not()
     plain, scaled = gains(0.8, 1).T
     assert np.mean(plain > chi2_quantile(0.95, 2)) > 0.5
     assert np.mean(scaled > chi2_quantile(0.95, 2)) < 0.12
+
+
+def test_noise_that_lasts_longer_than_pieces_is_seen_by_its_correlation():
+    """Pieces of five rows, and a noise that lasts ten."""
+    level, (_, pieces), (_, slow) = chi2_quantile(0.95, 2), gains(0.9, 5, 50).T, gains(0.9, 5, 50, is_slow=True).T
+    assert np.mean(pieces > level) > 0.15
+    assert np.mean(slow > level) < 0.12
 
 
 def test_what_is_there_in_all_pieces_keeps_its_gain():
