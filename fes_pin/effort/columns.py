@@ -270,7 +270,27 @@ ANY, POSITIVE = (-math.inf, math.inf, 0.0), (0.0, math.inf, 0.0)
 
 def library(sizes: Sizes, fastest: float) -> dict[str, CauseOfEffort]:
     """Return the causes of one joint by name, with the starts and bounds that the recorded motion gives."""
-    s, creep, reach = sizes, SLOWLY * sizes.usual, sizes.reach
+    causes = [*_torques(sizes), *_of_sensors(sizes)]
+    causes += [
+        CauseOfEffort(
+            "frame_vibration",
+            None,
+            None,
+            {"coupling": (0.0, 5.0, FRAME)},
+            [{"frequency_hz": f, "damping_ratio": 0.05} for f in RINGS_HZ if f < fastest],
+            {"frequency_hz": (2.0, fastest), "damping_ratio": (0.0, 0.2)},
+        ),
+        CauseOfEffort("effort_gain", None, None, {"error": (-0.9, 9.0, 0.05)}),
+        CauseOfEffort("sensor_lag", None, None, {"lag_s": (0.0, 0.5, 0.005)}),
+    ]
+    if sizes.links.turns and (sizes.links.cosine or sizes.links.sine):
+        causes.append(CauseOfEffort("base_tilt", None, None, {"tilt_rad": (-1.0, 1.0, 0.02)}))
+    return {one.name: one for one in causes}
+
+
+def _torques(s: Sizes) -> list[CauseOfEffort]:
+    """Return the causes that are torques."""
+    creep, reach = SLOWLY * s.usual, s.reach
     stops = [
         {"side": side, "angle_rad": s.quantiles[q]} for side, qs in zip((1.0, -1.0), STOPS, strict=True) for q in qs
     ]
@@ -281,10 +301,8 @@ def library(sizes: Sizes, fastest: float) -> dict[str, CauseOfEffort]:
     rests = [{"rest_angle_rad": x, "hardening_per_rad2": 0.0} for x in (s.quantiles[0.5], s.low, s.high)]
     slowest = 1.0 / s.seconds
     waves = 2.0 * math.pi / reach
-    most = math.pi / 2.0 if s.links.turns else reach
-    places = [{"place": k} for k in (1.0, 0.0, 2.0)] if s.links.turns else [{"place": 0.0}]
     hardens = {"hardening_per_rad2": (1.0 / reach**2, 0.0, 1e3 / reach**2)}
-    causes = [
+    return [
         CauseOfEffort(
             "coulomb_friction",
             coulomb_friction,
@@ -330,16 +348,15 @@ def library(sizes: Sizes, fastest: float) -> dict[str, CauseOfEffort]:
             [{"waves": waves * n} for n in WAVES],
             {"waves": (WAVES[0] * waves, 2.0 * WAVES[-1] * waves)},
         ),
-        CauseOfEffort(
-            "frame_vibration",
-            None,
-            None,
-            {"coupling": (0.0, 5.0, FRAME)},
-            [{"frequency_hz": f, "damping_ratio": 0.05} for f in RINGS_HZ if f < fastest],
-            {"frequency_hz": (2.0, fastest), "damping_ratio": (0.0, 0.2)},
-        ),
-        CauseOfEffort("effort_gain", None, None, {"error": (-0.9, 9.0, 0.05)}),
-        CauseOfEffort("sensor_lag", None, None, {"lag_s": (0.0, 0.5, 0.005)}),
+    ]
+
+
+def _of_sensors(s: Sizes) -> list[CauseOfEffort]:
+    """Return the causes that are views of the reading."""
+    reach = s.reach
+    most = math.pi / 2.0 if s.links.turns else reach
+    places = [{"place": k} for k in (1.0, 0.0, 2.0)] if s.links.turns else [{"place": 0.0}]
+    return [
         CauseOfEffort("sensor_offset", None, sensor_offset, {"offset": (-most, most, 0.02 * reach)}),
         CauseOfEffort("sensor_drift", None, sensor_drift, {"rate_per_s": (-most, most, 0.02 * reach / s.seconds)}),
         CauseOfEffort("sensor_gain", None, sensor_gain, {"error": (-0.5, 1.0, 0.02)}, places),
@@ -352,6 +369,3 @@ def library(sizes: Sizes, fastest: float) -> dict[str, CauseOfEffort]:
         ),
         CauseOfEffort("backlash", None, backlash, {"half_width": (0.0, 0.5 * reach, PLAYS[0] * reach)}),
     ]
-    if s.links.turns and (s.links.cosine or s.links.sine):
-        causes.append(CauseOfEffort("base_tilt", None, None, {"tilt_rad": (-1.0, 1.0, 0.02)}))
-    return {one.name: one for one in causes}

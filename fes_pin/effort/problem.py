@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections import OrderedDict
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
-from fes_pin.effort.columns import Links, Sizes, Values, backlash, frame_vibration, library, nominal_columns
+from fes_pin.effort.columns import Links, Sizes, Torques, Values, backlash, frame_vibration, library, nominal_columns
 from fes_pin.effort.motion import Band, Motion, Record
 from fes_pin.infer.optimum import Optimum
 from fes_pin.infer.problem import Linearized, Problem, Unknowns
@@ -87,38 +88,50 @@ class Rows:
             The cause whose columns alone are made; by default those of a set and of the nominal model.
         """
         key, tracks = self.seen(values, names)
-        tilt = values.get("base_tilt.tilt_rad", 0.0) if "base_tilt" in names else 0.0
-        out: list[Columns] = [{} for _ in tracks]
-        if not only:
-            at = (key, tilt)
-            if at not in self._nominal:
-                self._nominal[at] = [nominal_columns(t, self.links, tilt) for t in tracks]
-            out = [dict(one) for one in self._nominal[at]]
-            if SWINGS in names:
-                swinging = own(values, SWINGS)
-                place = (key, SWINGS, *swinging.items())
-                if place not in self._made:
-                    self._made[place] = [(frame_vibration(t, swinging, self.links.inertia),) for t in tracks]
-                for one, (change,) in zip(out, self._made[place], strict=True):
-                    one["inertia_scale"] = one["inertia_scale"] + change
+        out: list[Columns] = [{} for _ in tracks] if only else self._nominal_columns(key, tracks, values, names)
         for name in (only,) if only else names:
             cause = self.library[name]
             if cause.torques is None:
                 continue
             shapes = {n: v for n, v in own(values, name).items() if n not in cause.amplitudes}
-            place = (key, name, *shapes.items())
-            if place not in self._made:
-                self._made[place] = [cause.torques(t, shapes, self.sizes) for t in tracks]
-            for one, made in zip(out, self._made[place], strict=True):
+            make = partial(self._along, cause.torques, shapes)
+            many = self._once((key, name, *shapes.items()), make, tracks)
+            for one, made in zip(out, many, strict=True):
                 one.update(zip((f"{name}.{n}" for n in cause.amplitudes), made, strict=True))
         return out
+
+    def _nominal_columns(
+        self, key: object, tracks: Sequence[Motion], values: Values, names: Sequence[str]
+    ) -> list[Columns]:
+        """Return the columns of the nominal model, as a tilt and a frame that swings of a set have them."""
+        tilt = values.get("base_tilt.tilt_rad", 0.0) if "base_tilt" in names else 0.0
+        if (at := (key, tilt)) not in self._nominal:
+            self._nominal[at] = [nominal_columns(t, self.links, tilt) for t in tracks]
+        out = [dict(one) for one in self._nominal[at]]
+        if SWINGS in names:
+            swinging = own(values, SWINGS)
+            place = (key, SWINGS, *swinging.items())
+            many = self._once(place, lambda t: (frame_vibration(t, swinging, self.links.inertia),), tracks)
+            for one, (change,) in zip(out, many, strict=True):
+                one["inertia_scale"] = one["inertia_scale"] + change
+        return out
+
+    def _along(self, torques: Torques, shapes: Values, track: Motion) -> Sequence[np.ndarray]:
+        return torques(track, shapes, self.sizes)
+
+    def _once(
+        self, place: object, make: Callable[[Motion], Sequence[np.ndarray]], tracks: Sequence[Motion]
+    ) -> list[Sequence[np.ndarray]]:
+        """Return what is made of each track, made once."""
+        if place not in self._made:
+            self._made[place] = [make(t) for t in tracks]
+        return self._made[place]
 
     def efforts(self, values: Values) -> list[np.ndarray]:
         """Return the low-passed effort of each trial, as late as its hold and a sensor's lag have it."""
         hold, lag = values[HOLD], values.get("sensor_lag.lag_s", 0.0)
-        if ("effort", hold, lag) not in self._made:
-            self._made["effort", hold, lag] = [(t.effort(hold * t.dt, lag),) for t in self.tracks]
-        return [one for (one,) in self._made["effort", hold, lag]]
+        many = self._once(("effort", hold, lag), lambda t: (t.effort(hold * t.dt, lag),), self.tracks)
+        return [one for (one,) in many]
 
 
 def own(values: Values, name: str) -> dict[str, float]:

@@ -217,7 +217,7 @@ def _efforts(
     from fes_pin.effort.columns import Links  # noqa: PLC0415
     from fes_pin.effort.motion import Record, band_of, has_rows  # noqa: PLC0415
     from fes_pin.effort.problem import HELD_ROWS, HOLD, EffortProblem, Rows  # noqa: PLC0415
-    from fes_pin.models.rigs.rigid import load_urdf  # noqa: PLC0415
+    from fes_pin.models.rigs.joint import Joint  # noqa: PLC0415
 
     many = [[Record(t.name, t.time, t["position"], t["effort"], t.kind) for t in some] for some in (shown, trials)]
     try:
@@ -226,7 +226,7 @@ def _efforts(
         return [{} for _ in models]
     if not has_rows(many[1], band):
         return [{} for _ in models]
-    rows, out = Rows(many[1], band, Links.of(load_urdf(study.urdf))), list[dict[str, float]]()
+    rows, out = Rows(many[1], band, Links.of_rig(Joint.of_study(study))), list[dict[str, float]]()
     hold = HELD_ROWS * any(t.kind != "imposed" for t in trials)
     for values in models:
         causes = list(dict.fromkeys(n.partition(".")[0] for n in values if "." in n))
