@@ -5,15 +5,16 @@ from collections.abc import Collection, Mapping, Sequence
 import numpy as np
 
 from fes_pin.identify.fit import Fit
-from fes_pin.infer.levels import CONFIDENCE_95
+from fes_pin.infer.levels import CONFIDENCE_95, SMALL_SHARE
 from fes_pin.models.stage import Effect
 
 
 def is_possible(fitted: Fit, measured: Mapping[str, np.ndarray]) -> bool:
     """Return False if a cause in a fit is impossible: another cause is then mistaken for it.
 
-    It is impossible if its size or shape ended at a bound other than its null or 0, or if its size is less than the
-    readings can resolve.
+    It is impossible if its size or shape ended at a bound other than its null or 0, if its size is less than the
+    readings can resolve, or if it is a gain that leaves hardly anything: a rig that the recorded effort does not move is
+    moved by something else.
 
     Parameters
     ----------
@@ -30,7 +31,8 @@ def are_possible(effects: Sequence[Effect], at_bound: Collection[str], measured:
         for n in (*effect.amplitudes(), *effect.shapes()):
             size = getattr(effect, n)
             is_stuck = f"{effect.name}.{n}" in at_bound and size not in (info[n].null, 0.0)
-            if is_stuck or 0.0 < abs(size) < smallest.get(n, 0.0):
+            is_void = effect.scales and n in effect.amplitudes() and abs(1.0 + size) < SMALL_SHARE
+            if is_stuck or is_void or 0.0 < abs(size) < smallest.get(n, 0.0):
                 return False
     return True
 

@@ -11,10 +11,10 @@ from fes_pin.identify.fit import fit_problem
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.problem import answered_columns, measured_columns
 from fes_pin.identify.process_noise import first_guess
-from fes_pin.models.effects import Backlash, CoulombFriction, SensorGain, SensorLag
+from fes_pin.models.effects import Backlash, CoulombFriction, EffortGain, SensorGain, SensorLag
 from fes_pin.models.nominal import nominal_model
 from fes_pin.search.likelihood_fits import LikelihoodFits
-from fes_pin.search.possible import is_possible
+from fes_pin.search.possible import are_possible, is_possible
 
 KNEE = next(k for k in range(99) if BASES[np.random.default_rng(k).integers(len(BASES))].name == "knee")
 GAIN, FRICTION = ("sensor_gain",), ("coulomb_friction",)
@@ -67,3 +67,11 @@ def test_a_lag_of_less_than_half_a_row_is_the_logs(rows, possible, tmp_path):
     fitted = fit_problem(problem, model.parameters())
     assert is_possible(fitted, answered_columns(model, study.trials)) == possible
     assert is_possible(fitted, measured_columns(model, study.trials))
+
+
+@pytest.mark.parametrize(
+    ("error", "possible"), [(-0.95, False), (-1.05, False), (-0.8, True), (-2.0, True), (0.3, True)]
+)
+def test_an_effort_that_hardly_acts_is_no_cause(error, possible):
+    """Something else moves such a joint; an effort of the wrong sign is one that acts."""
+    assert are_possible([EffortGain(error=error)], (), {}) is possible
