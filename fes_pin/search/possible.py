@@ -13,8 +13,8 @@ def is_possible(fitted: Fit, measured: Mapping[str, np.ndarray]) -> bool:
     """Return False if a cause in a fit is impossible: another cause is then mistaken for it.
 
     It is impossible if its size or shape ended at a bound other than its null or 0, if its size is less than the
-    readings can resolve, or if it is a gain that leaves hardly anything: a rig that the recorded effort does not move is
-    moved by something else.
+    readings can resolve, or if it is a gain that leaves hardly anything: something else then moves the rig, not the
+    recorded effort.
 
     Parameters
     ----------
