@@ -30,6 +30,7 @@ from fes_pin.infer.search import Search
 from fes_pin.infer.verdict import share_in, word_of
 from fes_pin.models.effects import effect_named
 from fes_pin.models.model import Model
+from fes_pin.models.nominal import nominal_model
 from fes_pin.models.rigs.base import Rig
 from fes_pin.models.rigs.joint import Joint
 from fes_pin.models.stage import Effect
@@ -206,9 +207,9 @@ def search_effort(study: Study, seed: int = 0) -> EffortAnswer:
     InputError
         The study is not of a joint, or its motion is not above the noise.
     """
-    if study.rig != "joint":
+    trials, joint = [t for t in study.trials if t.role != "held_out"], nominal_model(study).rig
+    if not isinstance(joint, Joint):
         raise InputError(f"expected a study of a joint, found one of the rig {study.rig}", file=study.folder)
-    trials, joint = [t for t in study.trials if t.role != "held_out"], Joint.of_study(study)
     if not has_efforts(joint, trials):
         return EffortAnswer(REJECTED, refusal=NO_EFFORT)
     found = searched(joint, trials, seed)

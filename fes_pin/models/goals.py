@@ -18,6 +18,7 @@ from fes_pin.data.plausibility import ToPredict, trials_named
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.models.rigs.base import Rig
+from fes_pin.models.rigs.joint import Joint
 
 CLOSE = 0.05
 """Distance of the weight of the position from 1 within which an effort is a goal: gears and scales are within it."""
@@ -32,7 +33,7 @@ SURELY = 3.0
 def check_no_goal(study: Study | ToPredict, rig: Rig) -> None:
     """Raise InputError where the efforts of a joint are goal positions."""
     driven = [t for t in study.trials if {"effort", "position"} <= set(t.columns) and len(t) >= FEWEST]
-    if rig.name != "joint" or not driven:
+    if not isinstance(rig, Joint) or not driven:
         return
     stiffness = stiffness_of_goal(driven, rig.constants)
     if stiffness is None:

@@ -8,6 +8,7 @@ from driven_rigs.draw import draw
 from fes_pin.data.study import read_study
 from fes_pin.diagnosis.diagnosis import diagnose_joint
 from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.infer.scatter import with_honest_intervals
 from fes_pin.models.model import Model
 
 WIDTH = "backlash.half_width"
@@ -16,7 +17,7 @@ WIDTH = "backlash.half_width"
 def missed_by_a_parabola(model, fitted):
     """What the cost differs by from one, a deviation of the width to either side of where a fit ended."""
     problem, steps = LikelihoodProblem(model, fitted.trials, fitted.noise), np.linspace(-1.0, 1.0, 21)
-    widths = fitted.values[WIDTH] + steps * fitted.std(WIDTH)
+    widths = fitted.values[WIDTH] + steps * with_honest_intervals(fitted).std(WIDTH)
     costs = problem.costs([({**fitted.values, WIDTH: float(w)}, fitted.unknowns) for w in widths])
     return float(np.abs(costs - np.polynomial.Polynomial.fit(steps, costs, 2)(steps)).max())
 
@@ -29,7 +30,7 @@ def test_a_play_is_named_alone_and_its_likelihood_is_a_parabola(tmp_path):
     assert [c.name for c in found.causes] == ["backlash"], str(found)
     assert not found.remainder.unexplained
     fitted = found.extended
-    width, std = fitted.values[WIDTH], fitted.std(WIDTH)
+    width, std = fitted.values[WIDTH], with_honest_intervals(fitted).std(WIDTH)  # without the estimate by efforts
     assert width == pytest.approx(drawn.truth["backlash"], abs=4.0 * std)
     assert std < 0.02 * width
     assert missed_by_a_parabola(fitted.model, fitted) < 1.0  # what a deviation is worth
