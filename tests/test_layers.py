@@ -1,6 +1,6 @@
 """The imports run one way: cohort -> verdict -> view -> front ends -> faults -> search -> identify -> models -> data;
-and control -> allocation -> muscles -> body. No front end (diagnosis, contrasts, comparison, walk, effort) imports
-another.
+and control -> allocation -> muscles -> body. No front end (diagnosis, contrasts, comparison, walk) imports another.
+Diagnosis has inverse dynamics (effort) as an estimator.
 
 Inference (infer) knows no rig and no body: all may use it, and it uses nothing of ours but `workers`.
 The controller takes eq. (1) from paper, which takes recruitment from muscles. Measured walking (walk) reads the body,

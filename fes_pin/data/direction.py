@@ -25,6 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fes_pin.data.schema import IMPOSED, RigSchema
+from fes_pin.data.spectra import ABOVE_NOISE, OF_POWER, QUIET, SEGMENT_S, SLOWEST_HZ, TIMES, pooled
 from fes_pin.data.trial import Trial, derived_trial
 
 MORE, MANY = 1.5, 3.5
@@ -45,12 +46,6 @@ EXPLAINED = 0.95
 """Least share of the effort's variance that the motion explains: else its upper octaves hold causes, not noise."""
 SURELY = 3.0
 """Standard deviations by which the inertia may be larger than its estimate."""
-SEGMENT_S = 4.0
-"""Segments of a spectrum, s: they resolve a quarter of a hertz."""
-QUIET, WHITE = 0.7, 4.0
-"""Share of the Nyquist frequency above which a reading is noise, and the ratio to that noise from which it is more."""
-OF_POWER, TIMES, SLOWEST_HZ = 0.98, 4.0, 3.0
-"""The band: so many times the frequency below which the velocity has this share of its power, and at least, Hz."""
 SLOWEST_ROWS = 0.25
 """Longest step, in periods of the slowest band: the octave above it ends at the Nyquist frequency."""
 OF_RATE = 0.4
@@ -178,7 +173,7 @@ def _largest_ratio(trials: Sequence[Trial]) -> tuple[float, str, bool]:
         return math.nan, "", False
     ratios = {}
     for low in (band * 2.0**k for k in range(OCTAVES) if band * 2.0 ** (k + 1) <= frequency[-1]):
-        is_white = position[(frequency >= low) & (frequency < 2.0 * low)].mean() < WHITE * noise
+        is_white = position[(frequency >= low) & (frequency < 2.0 * low)].mean() < ABOVE_NOISE * noise
         if is_white and math.isfinite(ratio := _ratio(trials, net, band, low)):
             ratios[low] = ratio / inertia
     if not ratios:
@@ -212,7 +207,7 @@ def _spectrum_of_positions(trials: Sequence[Trial]) -> tuple[np.ndarray, np.ndar
     """Return frequencies, the mean spectrum of the positions, and that of their noise."""
     dt = max(t.dt for t in trials)
     frequency = np.fft.rfftfreq(min(round(SEGMENT_S / dt), max(map(len, trials))), dt)
-    position = _pooled(trials, [t["position"] for t in trials], frequency)
+    position = pooled([(t["position"], t.dt) for t in trials], frequency)
     return frequency, position, float(np.median(position[frequency > QUIET * frequency[-1]]))
 
 
@@ -221,7 +216,7 @@ def band_hz(trials: Sequence[Trial]) -> float:
     if not trials or max(t.dt for t in trials) * SLOWEST_HZ > SLOWEST_ROWS:
         return math.nan
     frequency, position, noise = _spectrum_of_positions(trials)
-    power = np.cumsum(np.maximum(position - WHITE * noise, 0.0) * frequency**2)
+    power = np.cumsum(np.maximum(position - ABOVE_NOISE * noise, 0.0) * frequency**2)
     band = max(TIMES * float(frequency[np.searchsorted(power, OF_POWER * power[-1])]), SLOWEST_HZ)
     is_short = 2.0 * band > frequency[-1] or any(len(t) * t.dt * band <= 2.0 for t in trials)
     return math.nan if is_short else band
@@ -303,14 +298,3 @@ def _columns(q: np.ndarray, v: np.ndarray, middle: float, half: float, usual: fl
     x = (q - middle) / half
     friction = (np.tanh(v / (share * usual)) for share in (0.05, 0.3))
     return np.stack([np.ones_like(x), x, x**2, x**3, np.sin(q), np.cos(q), v, v * np.abs(v), *friction])
-
-
-def _pooled(trials: Sequence[Trial], values: Sequence[np.ndarray], frequency: np.ndarray) -> np.ndarray:
-    """Return the mean one-sided spectrum of a signal of trials, each weighed by its length (Welch 1967)."""
-    from scipy.signal import welch  # noqa: PLC0415
-
-    spectra = []
-    for trial, one in zip(trials, values, strict=True):
-        length = min(len(one), round(SEGMENT_S / trial.dt))
-        spectra.append(np.interp(frequency, *welch(one, 1.0 / trial.dt, nperseg=length, detrend="linear")))
-    return np.asarray(np.average(spectra, axis=0, weights=[len(one) for one in values]))

@@ -13,7 +13,10 @@ from fes_pin.data.errors import InputError
 from fes_pin.data.imposed import moved_along
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial, derived_trial
+from fes_pin.effort.columns import Links
 from fes_pin.effort.motion import Band, Motion, Record, band_of
+from fes_pin.effort.problem import HELD_ROWS, Rows
+from fes_pin.effort.search import has_efforts
 from fes_pin.models.model import Model
 from fes_pin.models.outside import origin
 from fes_pin.models.rigs.base import Rig
@@ -63,15 +66,14 @@ class AlongMotion:
         return self.residual(of) + self.friction[of]
 
 
-def has_effort(rig: Rig, trial: Trial) -> bool:
-    """Return whether a trial is of a joint, with an effort and a position at every sample."""
-    known = type(rig) is Joint and {"effort", "position"} <= {*trial.columns} and trial["effort"].any()
-    return bool(known and np.isfinite(trial["effort"] + trial["position"]).all())
+def with_efforts(rig: Rig, trials: Sequence[Trial]) -> list[Trial]:
+    """Return the trials of a joint that have an effort and a position at every sample."""
+    return [t for t in trials if has_efforts(rig, [t])]
 
 
 def effort_band(rig: Rig, trials: Sequence[Trial]) -> Band | None:
     """Return the band of the motion of trials with efforts; None without one, or where it is not above the noise."""
-    records = [_record(t) for t in trials if has_effort(rig, t) and t.role != "held_out"]
+    records = [Record.of(t) for t in with_efforts(rig, trials) if t.role != "held_out"]
     try:
         return band_of(records) if records else None
     except InputError:
@@ -90,8 +92,8 @@ def along_motion(models: Mapping[str, Model], trials: Sequence[Trial], band: Ban
     band
         Their band.
     """
-    kept = [t for t in trials if len(Motion(_record(t), band).rows) >= FEWEST]
-    read = [Motion(_record(t), band) for t in kept]
+    kept = [t for t in trials if len(Motion(Record.of(t), band).rows) >= FEWEST]
+    read = [Motion(Record.of(t), band) for t in kept]
     predicted = {n: _efforts(model, kept, band) for n, model in models.items()}
     others = {n: _efforts(_without_friction(model), kept, band) for n, model in models.items()}
     out = []
@@ -109,15 +111,9 @@ def left_out(model: Model, trials: Sequence[Trial]) -> list[str]:
     return [e.name for e in model.effects if e.each_trial or not (_is_view(e) or all(e.name in one for one in acting))]
 
 
-def _record(trial: Trial) -> Record:
-    return Record(trial.name, trial.time, trial["position"], trial["effort"], trial.kind)
-
-
 def _measured(trial: Trial, band: Band) -> np.ndarray:
     """Return the recorded effort at the rows: a command is held until the next, on average half a sample."""
-    from fes_pin.effort.problem import HELD_ROWS  # noqa: PLC0415 - half a second of SciPy, for joints with efforts
-
-    record = _record(trial)
+    record = Record.of(trial)
     smooth = Motion(record, band, record.effort).wide(0)
     late = 0.0 if trial.kind == IMPOSED else HELD_ROWS * record.dt
     return Motion(replace(record, effort=smooth), band).effort(late, 0.0)
@@ -127,7 +123,7 @@ def _efforts(model: Model, trials: Sequence[Trial], band: Band) -> list[np.ndarr
     """Return the effort of a model at the rows of each trial."""
     out = []
     for trial in trials:
-        track, acting = Motion(_record(trial), band), model
+        track, acting = Motion(Record.of(trial), band), model
         if trial.kind != IMPOSED:
             track = _seen(model, track)
             names = _acting(model, trial)
@@ -157,9 +153,6 @@ def _acting(model: Model, trial: Trial) -> set[str]:
 
 def _seen(model: Model, track: Motion) -> Motion:
     """Return the motion of the joint by the reading that a model's sensor gives of it."""
-    from fes_pin.effort.columns import Links  # noqa: PLC0415 - as above
-    from fes_pin.effort.problem import Rows  # noqa: PLC0415
-
     views, values, record, rig = [e for e in model.effects if _is_view(e)], model.parameters(), track.record, model.rig
     if not views:
         return track
@@ -168,10 +161,9 @@ def _seen(model: Model, track: Motion) -> Motion:
         earlier = np.interp(record.time + shift * lag, record.time, record.reading)
         reading = earlier + (1.0 - shift) * lag * np.gradient(earlier, record.dt)
         record = replace(record, reading=reading)
-    inertia, cosine, sine, turns = (float(rig.constants[n]) for n in rig.needed)
-    links = Links(inertia, cosine, sine, bool(turns))
+    assert isinstance(rig, Joint)
     names = [e.name for e in reversed(views) if e.name != LAG]
-    (seen,) = Rows([record], track.band, links).seen(values, names)[1]
+    (seen,) = Rows([record], track.band, Links.of_rig(rig)).seen(values, names)[1]
     return Motion(record, track.band, seen.reading)
 
 

@@ -6,11 +6,13 @@ different sets, that which predicts better answers: in the low-passed effort, an
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from fes_pin.data.errors import InputError
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.likelihood_models import Found, LikelihoodModels
 from fes_pin.diagnosis.verdict import RigState, RigVerdict
-from fes_pin.effort.search import has_efforts, searched
+from fes_pin.effort.search import NOT_CARRIED, has_efforts, searched
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.estimators import AnyState, Estimator
 from fes_pin.infer.scatter import as_wide_as_estimates_differ
@@ -28,9 +30,13 @@ def begun_by_effort(models: LikelihoodModels, trials: Sequence[Trial], thorough:
     if models.model.effects or not isinstance(rig, Joint) or not has_efforts(rig, trials):
         return Policy()
     try:
-        models.by_effort = searched(rig, trials, models.seed)
-    except InputError:  # the motion is not above the noise of its reading
+        found = searched(rig, trials, models.seed)
+        models.refusal = "" if found.is_carried else NOT_CARRIED
+    except (InputError, ArithmeticError, np.linalg.LinAlgError) as problem:
+        models.refusal = str(problem)
+    if models.refusal:
         return Policy()
+    models.by_effort = found
     if thorough:
         return Policy()
     models.proposed = models.by_effort.model()
@@ -49,16 +55,7 @@ class VerdictByEffort(RigVerdict):
 
 
 class InverseDynamics(Estimator):
-    """Least squares of the low-passed effort, for a joint whose effort was recorded.
-
-    Parameters
-    ----------
-    test
-        Trials that the study itself holds out.
-    """
-
-    def __init__(self, test: Sequence[Trial]) -> None:
-        self.test = test
+    """Least squares of the low-passed effort, for a joint whose effort was recorded."""
 
     prefers_smaller = True
 
@@ -82,19 +79,22 @@ class InverseDynamics(Estimator):
         possible = [f for one in by_effort.alike if models.is_possible(f := models.fits[one.names])]
         if not possible:
             return None
-        names, verdict = min(possible, key=lambda f: f.criterion).names, VerdictByEffort(search, self.test)
+        assert isinstance(first.verdict, RigVerdict)
+        names, verdict = min(possible, key=lambda f: f.criterion).names, VerdictByEffort(search, first.verdict.test)
         found = search.result(names)
         return State(verdict, found, verdict.weigh(found), {}, frozenset(names), replaced=first)
 
 
 def as_wide_as_efforts(fitted: LikelihoodFit, models: LikelihoodModels) -> LikelihoodFit:
     """Return a fit with intervals that include the estimates of inverse dynamics where these differ significantly."""
-    other = models.by_effort.final(fitted.names) if models.by_effort is not None else None
-    return fitted if other is None else as_wide_as_estimates_differ(fitted, other)
+    by_effort = models.by_effort
+    if by_effort is None or not by_effort.knows(fitted.names):
+        return fitted
+    return as_wide_as_estimates_differ(fitted, by_effort.final(by_effort.models.fitted_set(fitted.names)))
 
 
 def named_by_one(first: RigState, answer: RigState) -> list[str]:
-    """Return a line for each cause that only one of two estimators names, where both know it.
+    """Return a line for each cause that only one of two estimators names, where both know it, or why one is silent.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def named_by_one(first: RigState, answer: RigState) -> list[str]:
     """
     models = first.search.models
     if (by_effort := models.by_effort) is None:
-        return []
+        return [f"efforts name no cause: {models.refusal}"] * bool(models.refusal)
     verdict = answer.verdict
     assert isinstance(verdict, RigVerdict)
     alike = {n: {*verdict.alike(answer.found, n)} for n in answer.names}

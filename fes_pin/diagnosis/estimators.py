@@ -1,10 +1,8 @@
 """Other estimators of a rig than the likelihood: white process noise, and least squares of free simulations."""
 
 from abc import abstractmethod
-from collections.abc import Sequence
 
 from fes_pin.data.schema import IMPOSED
-from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.decide.by_prediction import FEWEST, best_predicting
 from fes_pin.diagnosis.errors_ahead import squared_errors
 from fes_pin.diagnosis.likelihood_models import Found, LikelihoodModels, LikelihoodSearch
@@ -30,16 +28,7 @@ def _ended(search: LikelihoodSearch, found: Found | None) -> tuple[LikelihoodSea
 
 
 class RigEstimator(Estimator):
-    """Another estimator of a rig, whose errors are those by which its causes are judged.
-
-    Parameters
-    ----------
-    test
-        Trials that the study itself holds out.
-    """
-
-    def __init__(self, test: Sequence[Trial]) -> None:
-        self.test = test
+    """Another estimator of a rig, whose errors are those by which its causes are judged."""
 
     @abstractmethod
     def searched(self, first: RigState) -> tuple[LikelihoodSearch, Found] | None:
@@ -49,7 +38,8 @@ class RigEstimator(Estimator):
         """Return the state of its own verdict."""
         if first.search.was_stopped or (found := self.searched(first)) is None:
             return None
-        return RigVerdict(found[0], self.test).of(found[1], replaced=first)
+        assert isinstance(first.verdict, RigVerdict)
+        return RigVerdict(found[0], first.verdict.test).of(found[1], replaced=first)
 
 
 class LeastSquares(RigEstimator):

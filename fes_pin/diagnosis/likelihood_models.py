@@ -30,9 +30,12 @@ class LikelihoodModels(LikelihoodFits):
     ----------
     by_effort
         What inverse dynamics found in the same trials; None where it does not apply.
+    refusal
+        Why inverse dynamics gives no answer though efforts were recorded, in words; "" where it gives one.
     """
 
     by_effort: FoundByEffort | None = None
+    refusal = ""
 
     def nominal(self) -> LikelihoodFit:
         """Fit the nominal model, and simulate the family of score tests of all causes in it.

@@ -46,8 +46,8 @@ def diagnosis_of(
     study: Study, search: LikelihoodSearch, found: Found, trials: tuple[list[Trial], list[Trial]]
 ) -> Diagnosis:
     """Return the diagnosis of a rig from a search by the likelihood that has run."""
-    first, white = RigVerdict(search, trials[1]).of(found), WhiteProcessNoise(trials[1])
-    estimators = (InverseDynamics(trials[1]), white, LeastSquares(trials[1]))
+    first, white = RigVerdict(search, trials[1]).of(found), WhiteProcessNoise()
+    estimators = (InverseDynamics(), white, LeastSquares())
     state: RigState = choose(first, estimators, search.models.seed)
     verdict, found = state.verdict, state.found
     assert isinstance(verdict, RigVerdict)

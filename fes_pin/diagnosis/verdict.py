@@ -149,9 +149,10 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
 
         A set with a cause of which inverse dynamics knows no column has no error of effort.
         """
-        if currency == EFFORT and self.models.by_effort is not None:
-            return self.models.by_effort.errors(state.found.best.names)
-        best, train, folds, floor = state.found.best, self.models.trials, self.folds(state), unit.found.best
+        best, by_effort = state.found.best, self.models.by_effort
+        if currency == EFFORT and by_effort is not None:
+            return by_effort.errors(best.names) if by_effort.knows(best.names) else None
+        train, folds, floor = self.models.trials, self.folds(state), unit.found.best
         held = identified_folds(floor) if len(train) > 1 else []  # the same of both sets
         if [[*f.out] for f in folds] != held:
             folds = make_folds(replace(state.found, nominal=best, without={}), train, (), self.refitted, held)

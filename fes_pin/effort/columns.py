@@ -105,10 +105,14 @@ class Links:
         return math.atan2(-self.cosine, self.sine) if self.turns and (self.cosine or self.sine) else 0.0
 
 
-def nominal_columns(track: Motion, links: Links, tilt: float = 0.0) -> dict[str, np.ndarray]:
-    """Return the columns of the nominal model at the rows of a trial."""
+NOMINAL = ("inertia_scale", "damping", "gravity_scale")
+"""Parameters of the nominal model, as `models.rigs.joint` has them."""
+
+
+def nominal_columns(track: Motion, links: Links, tilt: float = 0.0) -> Sequence[np.ndarray]:
+    """Return the columns of the nominal model at the rows of a trial, in the order of `NOMINAL`."""
     gravity = track.low(links.gravity(track.q, tilt)) if links.cosine or links.sine else np.zeros(len(track.rows))
-    return {"inertia_scale": links.inertia * track.moved(2), "damping": track.moved(1), "gravity_scale": gravity}
+    return links.inertia * track.moved(2), track.moved(1), gravity
 
 
 def coulomb_friction(track: Motion, x: Values, sizes: Sizes) -> Sequence[np.ndarray]:

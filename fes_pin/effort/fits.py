@@ -21,9 +21,10 @@ from fes_pin.infer.projection import Projection
 from fes_pin.infer.scatter import excess_scatter, least_apart, with_honest_intervals
 from fes_pin.infer.search import BEAM, FITTED
 from fes_pin.models.effects import effect_named
+from fes_pin.models.rigs.joint import Joint
 
-NOMINAL = {"inertia_scale": (1e-3, 1e3), "damping": (0.0, 1e8), "gravity_scale": (-10.0, 10.0)}
-"""Bounds of the nominal parameters, as those of `models.rigs.joint`."""
+LIMITS = {n: (one.lower, one.upper) for n, one in Joint.parameters().items()}
+"""Bounds of the nominal parameters."""
 
 
 Forms = Mapping[str, tuple[int, ...]]
@@ -62,7 +63,7 @@ class EffortSets(FittedSets[EffortFit, Values]):
         self._formed: set[tuple[Names, frozenset[Hashable]]] = set()
         self.is_imposed = all(t.record.kind == "imposed" for t in rows.tracks)
         self.values = {**nominal_values, HOLD: HELD_ROWS * (not self.is_imposed)}
-        self.base = {n: NOMINAL[n] for n in fitted} | ({HOLD: (0.0, HELD_ROWS)} if self.is_imposed else {})
+        self.base = {n: LIMITS[n] for n in fitted} | ({HOLD: (0.0, HELD_ROWS)} if self.is_imposed else {})
         self.library = rows.library
 
     @property
@@ -81,9 +82,11 @@ class EffortSets(FittedSets[EffortFit, Values]):
                 out |= {f"{name}.{n}": x[1:] for n, x in cause.forms[k].items()}
         return out
 
-    def problem(self, names: Sequence[str], forms: Forms, **more: object) -> EffortProblem:
-        """Return the problem of a set."""
-        return EffortProblem(self.rows, names, self.limits(names, forms), **more)  # type: ignore[arg-type]
+    def problem(
+        self, names: Sequence[str], forms: Forms, robust: bool = True, kept: Sequence[np.ndarray] | None = None
+    ) -> EffortProblem:
+        """Return the problem of a set; see `EffortProblem`."""
+        return EffortProblem(self.rows, names, self.limits(names, forms), None, robust, kept)
 
     def fit(self, names: Names, values: Values, forms: Forms) -> EffortFit:
         """Return the fit of a set from start values, which need not have those of the nominal model.
@@ -113,8 +116,9 @@ class EffortSets(FittedSets[EffortFit, Values]):
         return self.fits[names]
 
     def nominal(self) -> EffortFit:
-        """Fit the nominal model."""
+        """Fit the nominal model, and simulate the family of score tests of all candidates in it."""
         self.fits[()] = self.fit((), {}, {})
+        self.family = self._family(self.fits[()])
         return self.fits[()]
 
     def first(self) -> Names:
@@ -183,10 +187,8 @@ class EffortSets(FittedSets[EffortFit, Values]):
                 out[name] = Candidate(best[0], best[1])
         return out
 
-    @cached_property
-    def family(self) -> Family:  # type: ignore[override]
-        """The family of all candidates, at each place where they are tried."""
-        base = self.fits[()]
+    def _family(self, base: EffortFit) -> Family:
+        """Return the family of all candidates, at each place where they are tried."""
         projection, many, blocks = Projection(base.parts), [], list[slice]()
         for name in self.library:
             for columns in self._whitened(base, name):

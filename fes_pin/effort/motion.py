@@ -10,7 +10,7 @@ Scale-space for discrete signals, IEEE Transactions on Pattern Analysis and Mach
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -18,16 +18,12 @@ import numpy as np
 from scipy.special import erfcx
 
 from fes_pin.data.errors import InputError
+from fes_pin.data.spectra import ABOVE_NOISE, OF_POWER, QUIET, SEGMENT_S, SLOWEST_HZ, TIMES, pooled, spectrum
+from fes_pin.data.trial import Trial
 from fes_pin.infer.levels import SMALL_SHARE
 
-QUIET = 0.7
-"""Share of the Nyquist frequency above which a second difference of the reading is noise."""
-OF_POWER, TIMES = 0.98, 4.0
-"""Share of the power of the velocity that the motion has below a frequency, and the band in units of that frequency."""
-ABOVE_NOISE = 4.0
-"""Ratio of spectra at which a motion is above the noise: spectra of a few segments scatter by a half."""
-SLOWEST_HZ, FASTEST_HZ = 3.0, 25.0
-"""Least and largest band, Hz: limbs and laboratory joints under control move below, flexible modes lie above."""
+FASTEST_HZ = 25.0
+"""Largest band, Hz: flexible modes of laboratory joints lie above."""
 OF_RATE = 0.2
 """Largest band as a share of the sample rate: a narrower Gaussian is no longer sampled."""
 NOISE_SHARE = 0.003
@@ -45,9 +41,6 @@ REVERSING, AROUND_S = 0.04, 0.02
 """Speed, as a share of a fast one, below which a joint reverses, and the time around it, s: friction is uncertain."""
 RESTS = 2.0
 """Time on either side for which a joint that rests is slow, in deviations of the kernel: 95 % of its weight."""
-SEGMENT_S = 4.0
-"""Segments of a spectrum, s: they resolve a quarter of a hertz."""
-
 BELOW_NOISE = "the recorded motion is not above the noise of its reading"
 """Why there is no band."""
 
@@ -122,6 +115,11 @@ class Record:
     reading: np.ndarray
     effort: np.ndarray
     kind: str
+
+    @classmethod
+    def of(cls, trial: Trial) -> Record:
+        """Return a trial with the columns "position" and "effort" as it was read."""
+        return cls(trial.name, trial.time, trial["position"], trial["effort"], trial.kind)
 
     @cached_property
     def dt(self) -> float:
@@ -217,8 +215,7 @@ class Motion:
 
     def _near(self, some: np.ndarray, seconds: float) -> np.ndarray:
         """Return which rows are at most so far from some samples, shape (m,) of bool."""
-        around = np.ones(2 * round(seconds / self.dt) + 1)
-        return np.asarray(np.convolve(some, around, mode="same")[self.rows] > 0.5)
+        return np.convolve(some, np.ones(2 * round(seconds / self.dt) + 1, bool), mode="same")[self.rows]
 
 
 def band_of(records: Sequence[Record]) -> Band:
@@ -231,7 +228,8 @@ def band_of(records: Sequence[Record]) -> Band:
     """
     dt = max(r.dt for r in records)
     noise = float(np.median([_noise(r) for r in records]))
-    frequency, power = _pooled(records, lambda r: np.diff(r.reading) / r.dt, dt)
+    frequency = np.arange(1.0 / SEGMENT_S, 0.5 / dt, 0.5 / SEGMENT_S)
+    power = pooled([(np.diff(r.reading) / r.dt, r.dt) for r in records], frequency)
     of_noise = noise * (2.0 * np.sin(np.pi * frequency * dt) / dt) ** 2
     below = power > ABOVE_NOISE * of_noise
     last = int(np.argmin(below)) if not below.all() else len(power)
@@ -279,23 +277,6 @@ def _noise_share(records: Sequence[Record], low: float, noise: float) -> float:
 
 def _noise(record: Record) -> float:
     """Return the power of white noise of a reading, in its unit squared per Hz, by its second differences."""
-    frequency, power = _spectrum(np.diff(record.reading, 2), record.dt)
+    frequency, power = spectrum(np.diff(record.reading, 2), record.dt)
     high = frequency > QUIET * frequency[-1]
     return float(np.median(power[high] / (2.0 * np.sin(np.pi * frequency[high] * record.dt)) ** 4))
-
-
-def _pooled(records: Sequence[Record], of: Callable[[Record], np.ndarray], dt: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the mean spectrum of a signal of trials, each weighed by its length."""
-    grid = np.arange(1.0 / SEGMENT_S, 0.5 / dt, 0.5 / SEGMENT_S)
-    each = [(len(r.time), *_spectrum(of(r), r.dt)) for r in records]
-    return grid, np.average([np.interp(grid, f, p) for _, f, p in each], axis=0, weights=[n for n, _, _ in each])
-
-
-def _spectrum(values: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return frequencies, and the one-sided power of a signal by Welch's method (IEEE Trans. AU-15, 1967)."""
-    length = min(len(values), round(SEGMENT_S / dt))
-    window = np.hanning(length + 2)[1:-1]
-    starts = range(0, len(values) - length + 1, max(1, length // 2))
-    pieces = np.array([values[k : k + length] - values[k : k + length].mean() for k in starts]) * window
-    power = np.mean(np.abs(np.fft.rfft(pieces, axis=1)) ** 2, axis=0) * 2.0 * dt / float(window @ window)
-    return np.fft.rfftfreq(length, dt), power

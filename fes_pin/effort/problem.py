@@ -10,7 +10,17 @@ from functools import partial
 
 import numpy as np
 
-from fes_pin.effort.columns import Links, Sizes, Torques, Values, backlash, frame_vibration, library, nominal_columns
+from fes_pin.effort.columns import (
+    NOMINAL,
+    Links,
+    Sizes,
+    Torques,
+    Values,
+    backlash,
+    frame_vibration,
+    library,
+    nominal_columns,
+)
 from fes_pin.effort.motion import Band, Motion, Record
 from fes_pin.infer.optimum import Optimum
 from fes_pin.infer.problem import Linearized, Problem, Unknowns
@@ -24,8 +34,8 @@ ROUNDS, NEGLIGIBLE = 40, 1e-12
 """Steps of a variance under the weights of Student's t, and its least share of the mean square of the effort."""
 STEP = 1e-4
 """Step of a numerical derivative, as a share of the value or of the size at which a cause is tried."""
-KEPT_VIEWS = 24
-"""Sets of tracks that are kept: one for each correction of the reading that is tried."""
+KEPT_VIEWS, KEPT_COLUMNS = 24, 500
+"""Corrections of the reading, and columns, that are kept: those of two steps through all places of the library."""
 SWINGS = "frame_vibration"
 """The cause that changes what an inertia takes of the effort."""
 HOLD = "hold_rows"
@@ -54,8 +64,7 @@ class Rows:
         self.library = library(self.sizes, max(band.low, 3.5))
         self.reversing = [t.reversing(self.sizes.fast) for t in self.tracks]
         self._views: OrderedDict[object, list[Motion]] = OrderedDict()
-        self._made: dict[object, list[Sequence[np.ndarray]]] = {}
-        self._nominal: dict[object, list[Columns]] = {}
+        self._made: OrderedDict[object, list[Sequence[np.ndarray]]] = OrderedDict()
 
     @property
     def lengths(self) -> list[int]:
@@ -105,9 +114,8 @@ class Rows:
     ) -> list[Columns]:
         """Return the columns of the nominal model, as a tilt and a frame that swings of a set have them."""
         tilt = values.get("base_tilt.tilt_rad", 0.0) if "base_tilt" in names else 0.0
-        if (at := (key, tilt)) not in self._nominal:
-            self._nominal[at] = [nominal_columns(t, self.links, tilt) for t in tracks]
-        out = [dict(one) for one in self._nominal[at]]
+        many = self._once((key, "", tilt), lambda t: nominal_columns(t, self.links, tilt), tracks)
+        out = [dict(zip(NOMINAL, one, strict=True)) for one in many]
         if SWINGS in names:
             swinging = own(values, SWINGS)
             place = (key, SWINGS, *swinging.items())
@@ -125,6 +133,8 @@ class Rows:
         """Return what is made of each track, made once."""
         if place not in self._made:
             self._made[place] = [make(t) for t in tracks]
+            if len(self._made) > KEPT_COLUMNS:
+                self._made.popitem(last=False)
         return self._made[place]
 
     def efforts(self, values: Values) -> list[np.ndarray]:

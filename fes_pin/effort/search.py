@@ -18,7 +18,7 @@ from fes_pin.effort.columns import Links
 from fes_pin.effort.fits import EffortSets
 from fes_pin.effort.motion import Band, Record, band_of, has_rows, noise_of_bend
 from fes_pin.effort.problem import HOLD, EffortFit, Rows, own
-from fes_pin.effort.timing import with_hold
+from fes_pin.effort.timing import timed
 from fes_pin.effort.verdict import EffortSearch, EffortState, EffortVerdict
 from fes_pin.infer.covariance import covariance_of
 from fes_pin.infer.fits import Names
@@ -37,7 +37,7 @@ from fes_pin.models.stage import Effect
 
 OTHER_BANDS = (0.7, 1.4)
 """Bands in which a set is fitted again, as shares of its own: half of the power of the acceleration apart."""
-NOT_CARRIED = "the band does not carry the inertia: it moves by more than its interval between 0.7 and 1.4 of the band"
+NOT_CARRIED = "the inertia moves by more than its interval between 0.7 and 1.4 of the band of the motion"
 """Why no values are given."""
 REJECTED = "rejected"
 """Verdict where `refusal` says why nothing is claimed."""
@@ -94,6 +94,8 @@ class FoundByEffort:
     ----------
     rig
         The joint, with the start values of its nominal parameters.
+    verdict
+        The verdict on what the search found.
     state
         The state to which no claim objects.
     others
@@ -101,13 +103,14 @@ class FoundByEffort:
     """
 
     rig: Joint
+    verdict: EffortVerdict
     state: EffortState
     others: Sequence[EffortSets]
 
     @property
     def models(self) -> EffortSets:
         """The sets that were searched."""
-        return self.state.search.models
+        return self.verdict.search.models
 
     @property
     def band_hz(self) -> float:
@@ -119,21 +122,32 @@ class FoundByEffort:
         """Names of the causes, in alphabetical order."""
         return tuple(sorted(self.state.names))
 
-    def errors(self, names: Names) -> Errors | None:
-        """Return cross-validated errors of the low-passed effort of a set; None where a cause has no column there."""
-        if {*names} - {*self.models.library}:
-            return None
-        verdict = self.state.verdict
-        assert isinstance(verdict, EffortVerdict)
-        return verdict.errors_of(self.models.fitted_set(names), self.state.found.best)
+    def knows(self, names: Names) -> bool:
+        """Return whether every cause of a set has a column."""
+        return {*names} <= {*self.models.library}
 
-    def final(self, names: Names) -> EffortFit | None:
-        """Return the final values of a set, with their intervals; None where a cause has no column."""
-        if {*names} - {*self.models.library}:
-            return None
-        verdict = self.state.verdict
-        assert isinstance(verdict, EffortVerdict)
-        return _final(verdict, self.models.fitted_set(names), self.others)
+    def errors(self, names: Names) -> Errors:
+        """Return cross-validated errors of the low-passed effort of a set, of which it `knows` every cause."""
+        return self.verdict.errors_of(self.models.fitted_set(names), self.state.found.best)
+
+    def final(self, fitted: EffortFit) -> EffortFit:
+        """Return the final values of a set, with their intervals, and with the delay of commands where it shows."""
+        return self._best[0] if fitted is self.state.found.best else self._final(fitted)[0]
+
+    @property
+    def is_carried(self) -> bool:
+        """Whether the inertia of the best set moves by no more than its interval between bands."""
+        return not self._best[1]
+
+    @cached_property
+    def _best(self) -> tuple[EffortFit, bool]:
+        return self._final(self.state.found.best)
+
+    def _final(self, fitted: EffortFit) -> tuple[EffortFit, bool]:
+        """Return the final values of a set, and whether its inertia moves between bands."""
+        with timed(fitted, [self.models, *self.others]) as begun:
+            final = _final(self.verdict, begun, self.others)
+            return final, _moves(final, begun, self.others)
 
     @cached_property
     def alike(self) -> list[EffortFit]:
@@ -179,7 +193,7 @@ def searched(rig: Joint, trials: Sequence[Trial], seed: int = 0) -> FoundByEffor
     InputError
         The motion is not above the noise of its reading, or trials are shorter than the filter.
     """
-    records = [Record(t.name, t.time, t["position"], t["effort"], t.kind) for t in trials]
+    records = [Record.of(t) for t in trials]
     links = Links.of_rig(rig)
     values = {n: float(getattr(rig, n)) for n in rig.parameters()}
     fitted = [n for n in rig.fitted_parameters() if n != "gravity_scale" or links.cosine or links.sine]
@@ -189,9 +203,10 @@ def searched(rig: Joint, trials: Sequence[Trial], seed: int = 0) -> FoundByEffor
         return EffortSets(Rows(records, one, links), values, fitted, seed)
 
     search: EffortSearch = Search(sets_in(band), lambda share, words: None)
-    state = EffortVerdict(search).of(search.run())
+    verdict = EffortVerdict(search)
+    state = verdict.of(search.run())
     bands = [replace(band, low=r * band.low, wide=max(band.wide, r * band.low)) for r in OTHER_BANDS]
-    return FoundByEffort(rig, state, [sets_in(one) for one in bands if has_rows(records, one)])
+    return FoundByEffort(rig, verdict, state, [sets_in(one) for one in bands if has_rows(records, one)])
 
 
 def search_effort(study: Study, seed: int = 0) -> EffortAnswer:
@@ -213,13 +228,10 @@ def search_effort(study: Study, seed: int = 0) -> EffortAnswer:
     if not has_efforts(joint, trials):
         return EffortAnswer(REJECTED, refusal=NO_EFFORT)
     found = searched(joint, trials, seed)
-    state, verdict = found.state, found.state.verdict
-    assert isinstance(verdict, EffortVerdict)
-    timed = with_hold((state.found.nominal, state.found.best), [found.models, *found.others])
-    left, (nominal, extended) = state.weighed.lack_of_fit, (_final(verdict, one, found.others) for one in timed)
-    if _moves(extended, timed[1], found.others):
+    state, units, left = found.state, joint.units(), found.state.weighed.lack_of_fit
+    if not found.is_carried:
         return EffortAnswer(REJECTED, band_hz=found.band_hz, refusal=NOT_CARRIED, remainder=left)
-    units = joint.units()
+    nominal, extended = found.final(state.found.nominal), found.final(state.found.best)
     return EffortAnswer(
         word_of(bool(state.names), left),
         tuple(_causes(state, extended, units)),
@@ -251,7 +263,7 @@ def _final(verdict: EffortVerdict, fitted: EffortFit, others: Sequence[EffortSet
 
 def near_to(some: np.ndarray) -> np.ndarray:
     """Return which rows are some, or neighbours of these, shape (m,) of bool."""
-    return np.asarray(np.convolve(some, [1, 1, 1], mode="same") > 0.5)
+    return np.convolve(some, np.ones(3, bool), mode="same")
 
 
 def _with_noisy_regressor(fitted: EffortFit, rows: Rows) -> EffortFit:

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from fes_pin.diagnosis.along_motion import AlongMotion, along_motion, effort_band, has_effort, left_out
+from fes_pin.diagnosis.along_motion import AlongMotion, along_motion, effort_band, left_out, with_efforts
 from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.models.model import Model
 from fes_pin.view.drawing import Drawing, panels, rows_csv, svg
@@ -21,7 +21,7 @@ THIRDS = {"lower": "stage-sensor", "middle": "stage-joint", "upper": "stage-musc
 def effort_section(diagnosis: Diagnosis) -> list[Markup]:
     """Efforts along the measured motion of a joint whose effort was recorded; nothing of another rig."""
     rig = diagnosis.model.rig
-    trials = [t for t in diagnosis.study.trials if has_effort(rig, t)]
+    trials = with_efforts(rig, diagnosis.study.trials)
     if (band := effort_band(rig, trials)) is None:
         return []
     models = {"nominal": diagnosis.nominal.model} | ({"extended": diagnosis.model} if diagnosis.causes else {})

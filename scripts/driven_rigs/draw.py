@@ -62,7 +62,7 @@ BASES = (
 
 @dataclass(frozen=True)
 class Drawn:
-    """A study and what is true of it; what acts `beside`, little, may be named as well.
+    """A study and what is true of it; causes of little effect (`beside`) may be named as well.
 
     `nearest` are the causes of the library that are nearest to what is hidden, where the library has no form of that.
     """

@@ -219,7 +219,7 @@ def _efforts(
     from fes_pin.effort.problem import HELD_ROWS, HOLD, EffortProblem, Rows  # noqa: PLC0415
     from fes_pin.models.rigs.joint import Joint  # noqa: PLC0415
 
-    many = [[Record(t.name, t.time, t["position"], t["effort"], t.kind) for t in some] for some in (shown, trials)]
+    many = [[Record.of(t) for t in some] for some in (shown, trials)]
     try:
         band = band_of(many[0])
     except fp.InputError:

@@ -89,7 +89,7 @@ def test_a_diagnosis_names_the_friction_as_large_as_it_is(seed, tmp_path):
 def test_a_search_that_has_no_time_left_is_not_judged_again(left, fitted):
     _, likeliest, _ = fitted[2]
     search = SimpleNamespace(models=SimpleNamespace(answered=True), **left)
-    first, estimator = SimpleNamespace(search=search, found=SimpleNamespace(best=likeliest)), WhiteProcessNoise(())
+    first, estimator = SimpleNamespace(search=search, found=SimpleNamespace(best=likeliest)), WhiteProcessNoise()
     assert estimator.state(first) is None and estimator.fit is None
 
 

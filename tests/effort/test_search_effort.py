@@ -105,7 +105,7 @@ def test_friction_builds_up_over_its_way_and_turns_with_the_motion():
 def test_the_band_narrows_where_an_encoder_is_coarse():
     def band(count):
         one = trial(0, count=count)
-        return band_of([Record(one.name, one.time, one["position"], one["effort"], one.kind)])
+        return band_of([Record.of(one)])
 
     assert band(5e-3).low < band(0.0).low
 

@@ -3,12 +3,15 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from bench import study, trial
 from driven_rigs.laboratory import draw_laboratory
 
 import fes_pin as fp
+from fes_pin.data.errors import InputError
 from fes_pin.diagnosis import by_effort
 from fes_pin.diagnosis.by_effort import named_by_one
+from fes_pin.effort import search
 from fes_pin.infer.estimators import CHOICE
 
 
@@ -74,7 +77,27 @@ def test_a_thorough_search_has_no_set_to_begin_with(tmp_path, monkeypatch):
 def test_a_joint_without_efforts_has_one_estimator(tmp_path):
     time = np.arange(500) * 0.01
     swing = fp.Trial("a", "motion", {"position": 0.5 * np.exp(-0.2 * time) * np.cos(3.8 * time)}, time)
-    models = type("Models", (), {"by_effort": None})
+    models = type("Models", (), {"by_effort": None, "refusal": ""})
     first = type("State", (), {"search": type("Search", (), {"models": models})})
     assert named_by_one(first, first) == []
     assert not by_effort.has_efforts(arm(tmp_path), [swing])
+
+
+@pytest.mark.parametrize("problem", [InputError("not above the noise"), np.linalg.LinAlgError("singular")])
+def test_why_efforts_name_no_cause_is_said(tmp_path, monkeypatch, problem):
+    """The likelihood searches alone, and all of its library."""
+
+    def raises(*_):
+        raise problem
+
+    monkeypatch.setattr(by_effort, "searched", raises)
+    found = fp.diagnose(arm(tmp_path, friction=0.1))
+    assert [c.name for c in found.causes] == ["coulomb_friction"]
+    assert f"efforts name no cause: {problem}" in found.warnings
+
+
+def test_an_inertia_that_moves_between_bands_is_no_answer(tmp_path, monkeypatch):
+    monkeypatch.setattr(search, "_moves", lambda final, fitted, others: True)
+    found = fp.diagnose(arm(tmp_path, friction=0.1))
+    assert f"efforts name no cause: {search.NOT_CARRIED}" in found.warnings
+    assert [c.name for c in found.causes] == ["coulomb_friction"]

@@ -120,7 +120,7 @@ def test_an_imposed_motion_is_predicted_as_the_model_predicts_it(tmp_path, recor
     model = arm(tmp_path, **true_effects(), sensor_offset={"offset": 0.3})
     found = efforts({"": model}, one)
     simulated = simulated_trial(model, one)["effort"]
-    record = Record("", one.time, one["position"], one["effort"], one.kind)
+    record = Record.of(one)
     expected = Motion(record, effort_band(model.rig, [one])).low(simulated)
     assert np.std(found.predicted[""] - expected) < 0.05 * np.std(expected)
     assert np.mean(found.predicted[""] - expected) == pytest.approx(0.0, abs=0.01)
