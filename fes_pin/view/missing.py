@@ -22,8 +22,6 @@ from fes_pin.data.imposed import imposed_motion
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
 from fes_pin.infer.noise import thin
-from fes_pin.models.free_run import measured_motion, tracking_effort
-from fes_pin.models.model import Model
 from fes_pin.models.rigs.base import Rig
 from fes_pin.models.stage import Signals
 
@@ -59,29 +57,16 @@ class Missing:
     against: Mapping[str, np.ndarray]
 
 
-def missing_input(model: Model, measured: Trial, simulated: Trial | None = None) -> Missing:
-    """Return the torque or force that a model lacks in a trial; see the module.
+def missing_input(rig: Rig, measured: Trial, simulated: Trial) -> Missing:
+    """Return the torque or force that a model of a rig lacks in a measured trial, of which it predicts a simulated one.
 
-    Parameters
-    ----------
-    model
-        The model. Of one that was simulated only the rig is used.
-    measured
-        The trial.
-    simulated
-        What the model predicts of it. None for a rig whose effort answers the reading: it integrates or falls over, so
-        that a free simulation is no reference that a motion could be near to. Then it is the effort that the model,
-        its effects included, lacks along the measured motion; see `models.free_run`.
+    See the module.
     """
-    rig, count = model.rig, _averaged(measured.time)
+    count = _averaged(measured.time)
     step = count * measured.dt
     unit, output = rig.units()["effort"], rig.output(measured.kind)
     kind, time = "force" if unit == "N" else "torque", thin(measured.time - measured.time[0], count)
     inputs = {n: thin(measured[n], count) for n in rig.input_columns(measured)}
-    if simulated is None:
-        motion = measured_motion(measured, output)
-        value, position, rate = (thin(v, count) for v in (tracking_effort(model, measured, *motion), *motion))
-        return Missing(kind, unit, value, {"angle": position, "rate": rate, "time_s": time, **inputs})
     residual = smooth(thin(measured.residual(simulated, output), count))
     if measured.kind == IMPOSED:
         position, velocity, _ = (thin(v, count) for v in imposed_motion(measured, rig.schema.imposed).values)

@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 from fes_pin.data.schema import IMPOSED
 from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.identify.replay import Replay
-from fes_pin.models.free_run import can_track
+from fes_pin.models.rigs.joint import Joint
 from fes_pin.view.missing import Missing, missing_input
 from fes_pin.view.page import Markup, element, figure, folded, joined, key
 from fes_pin.view.plots import Legend, errors_in_words, missing_drawing, share, trial_drawing
@@ -24,20 +24,22 @@ def position_unit(diagnosis: Diagnosis) -> str:
 
 
 def missing_section(diagnosis: Diagnosis, replays: Sequence[Replay]) -> list[Markup]:
-    """Missing torque and force against every variable."""
+    """Missing torque and force against every variable.
+
+    Nothing of trials in which a controller moves a joint, whose free simulation would run away: see `report_effort`.
+    """
+    is_driven = diagnosis.over_horizon is not None and isinstance(diagnosis.model.rig, Joint)
+    replays = [r for r in replays if r.measured.kind == IMPOSED or not is_driven]
+    if not replays:
+        return []
     before = _missing(diagnosis, replays, "nominal")
     after = _missing(diagnosis, replays, "extended") if diagnosis.causes else []
     unit = position_unit(diagnosis)
-    how = (
-        "the effort of a stiff servo that keeps the model on the measured motion. No free simulation takes part, for "
-        "this rig's would run away"
-        if _is_tracked(diagnosis)
-        else "the smoothed residual, taken through the inertia, damping and stiffness of the rig"
-    )
     text = (
-        f"What would have to be added to the model's torque (or force) at each instant to make it right: {how}. A "
-        "cause shows as a function of what it depends on. Most telling variable first: the percentage is the share of "
-        "the variance that is a function of that variable alone."
+        "What would have to be added to the model's torque (or force) at each instant to make it right: the smoothed "
+        "residual, taken through the inertia, damping and stiffness of the rig. A cause shows as a function of what it "
+        "depends on. Most telling variable first: the percentage is the share of the variance that is a function of "
+        "that variable alone."
     )
     extended = [("extended", "extended, median")] if after else []
     out = [element("p", text)]
@@ -53,14 +55,7 @@ def missing_section(diagnosis: Diagnosis, replays: Sequence[Replay]) -> list[Mar
 
 
 def _missing(diagnosis: Diagnosis, replays: Sequence[Replay], which: str) -> list[Missing]:
-    model, tracked = getattr(diagnosis, which).model, _is_tracked(diagnosis)
-    free = [None if tracked and r.measured.kind != IMPOSED else r.models[which] for r in replays]
-    return [missing_input(model, r.measured, one) for r, one in zip(replays, free, strict=True)]
-
-
-def _is_tracked(diagnosis: Diagnosis) -> bool:
-    """True where a servo can keep the model on the motion, which a free simulation would run away from."""
-    return diagnosis.over_horizon is not None and can_track(diagnosis.model)
+    return [missing_input(diagnosis.model.rig, r.measured, r.models[which]) for r in replays]
 
 
 def trials_section(replays: Sequence[Replay], legend: Legend, unit: str, said: str = "") -> list[Markup]:

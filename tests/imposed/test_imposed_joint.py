@@ -154,7 +154,7 @@ def test_a_spring_and_damper_in_series_begin_relaxed(tmp_path):
 def test_the_missing_effort_of_an_imposed_motion_is_the_friction_that_hides_in_it(tmp_path):
     made, model = arm(tmp_path)
     measured = simulate(model + CoulombFriction(torque_nm=0.5), made.trials[0])
-    found = missing_input(model, measured, simulate(model, made.trials[0]))
+    found = missing_input(model.rig, measured, simulate(model, made.trials[0]))
     assert (found.kind, found.unit) == ("effort", "N m") and set(found.against) == {"angle", "rate", "time_s"}
     fast = np.abs(found.against["rate"]) > 0.2 * np.abs(found.against["rate"]).max()
     assert np.median(found.value[fast] * np.sign(found.against["rate"][fast])) == pytest.approx(0.5, abs=0.05)

@@ -13,7 +13,7 @@ def missing_of(study, added, index=0):
     """What the true nominal model lacks in a trial that an effect has changed."""
     model = nominal_model(study)
     trial = study.trials[index]
-    return missing_input(model, simulated_trial(model + added, trial), simulated_trial(model, trial))
+    return missing_input(model.rig, simulated_trial(model + added, trial), simulated_trial(model, trial))
 
 
 def test_missing_torque_of_a_spring_is_its_torque():

@@ -312,7 +312,7 @@ def test_a_driven_rig_shows_three_errors_side_by_side_and_reasons_along_its_moti
         "E 9.5 % \u2192 0.4 %, cross-validated; noise alone leaves 0.2 %",
         "predictions one sample ahead on what was fitted below 0.001 %",
         "free simulations on what was fitted 310 % 310 %",
-        "the effort of a stiff servo that keeps the model on the measured motion",
+        "The effort that a model needs for the motion as it was measured, by inverse dynamics",
         "Random effort 0.001 N m, 2 % of what drives the rig",
         "Simulated: 0.3 s ahead of what was measured",
     ):
