@@ -196,3 +196,69 @@ def test_folds_of_the_toy_are_those_of_the_house():
     """A run is held out at most once in either estimator: their errors are paired by run."""
     folds = deal(range(6), None, 6)
     assert all(not set(a) & set(b) for a, b in combinations(folds, 2)) and sum(map(len, folds)) == 6
+
+
+@dataclass(frozen=True)
+class Stated:
+    """A state as far as `choose` looks at it: its candidates, and its errors by currency and run."""
+
+    names: frozenset
+    errors: dict
+    steps: tuple = ()
+
+    @property
+    def verdict(self):
+        return self
+
+    @property
+    def currencies(self):
+        return tuple(self.errors)
+
+    def errors_in(self, state, currency, unit):
+        squares = self.errors[currency]
+        return Errors(squares, np.full(len(squares), 1e3), np.zeros(len(squares)))
+
+
+class Known(Estimator):
+    def __init__(self, other, prefers_smaller):
+        self.other, self.prefers_smaller = other, prefers_smaller
+
+    def state(self, first):
+        return self.other
+
+    def words(self, state):
+        return "another estimator"
+
+
+SURE, UNSURE = np.full(12, 1.0), np.tile([-40.0, 60.0], 6)
+"""Changes of an error of 100 in each run, percent: 1 % surely, and 10 % that is not sure."""
+
+
+@pytest.mark.parametrize(
+    ("motion", "effort", "names", "prefers_smaller", "answers"),
+    [
+        (UNSURE, 50.0 * SURE, "ab", False, True),  # sure in one, and more than an error of form in the other
+        (0.0 * SURE, 50.0 * SURE, "ab", False, False),  # an error of form of the effort
+        (0.5 * UNSURE, 50.0 * SURE, "ab", False, False),  # as above: 5 % that is not sure is no sixteenth
+        (SURE, 50.0 * SURE, "ab", False, True),  # sure in both
+        (0.0 * SURE, 0.0 * SURE, "", True, True),  # neither predicts better: the smaller set
+        (0.0 * SURE, 0.0 * SURE, "", False, False),
+        (0.0 * SURE, 0.0 * SURE, "ab", True, False),  # it is not smaller
+        (0.0 * SURE, -50.0 * SURE, "", True, False),  # the larger set predicts effort better
+    ],
+)
+def test_the_other_answers_by_every_currency(motion, effort, names, prefers_smaller, answers):
+    """Of a first set of one candidate; `motion` and `effort` are what the other removes of the error, percent."""
+    hundred = np.full(12, 100.0)
+    first = Stated(frozenset("a"), {"motion": hundred, "effort": hundred})
+    other = Stated(frozenset(names), {"motion": hundred - motion, "effort": hundred - effort})
+    chosen = choose(first, [Known(other, prefers_smaller)])
+    assert (chosen.names == other.names) is answers
+    assert bool(chosen.steps) is answers
+
+
+def test_a_currency_without_errors_of_both_is_not_compared():
+    hundred = np.full(12, 100.0)
+    first = Stated(frozenset("a"), {"motion": hundred, "effort": hundred})
+    other = Stated(frozenset("b"), {"motion": 0.5 * hundred})
+    assert choose(first, [Known(other, False)]).names == other.names
