@@ -106,6 +106,52 @@ def test_a_joint_under_position_control_lacks_dry_friction_alone(kind, shared, t
     assert {t.kind for t in study.trials} == {kind or "imposed"} and contradicted is (kind == "motion")
 
 
+def test_a_rod_of_another_inertia_and_weight_lacks_dry_friction_alone(shared, tmp_path):
+    """No periodic torque at the frequency of a commanded sine: weight is fitted, as the inertia is."""
+    study = study_of(shared, tmp_path, ["position_controlled_friction.csv"], "--rod", "0.05", "0.7")
+    found = fp.diagnose(study)
+    assert named(found) == {"coulomb_friction"} and not found.remainder.unexplained
+    torque, interval = estimate(found, "coulomb_friction.torque_nm")
+    assert torque == pytest.approx(0.25, abs=0.001) and interval[0] < 0.25 < interval[1]
+    assert found.extended.values["gravity_scale"] == pytest.approx(0.0, abs=0.02)
+
+
+def test_a_goal_position_is_taken_as_one(shared, tmp_path):
+    """The stiffness is 8 N m/rad, and the damping of the controller, 0.4 N m s/rad, adds to that of the joint."""
+    columns = ("--column", "position=actual:rad", "--column", "effort=command:Nm")
+    files = [f"position_command_as_effort/{x}.csv" for x in "abc"]
+    study = study_of(shared, tmp_path, files, "--rod", "0.4", "1.2", *columns)
+    assert any(
+        re.search(r"looks like a goal position in 3 trials.* [78](\.\d)? N m/rad", w) for w in fp.check(study).odd
+    )
+    found = fp.diagnose(study)
+    assert named(found) == {"coulomb_friction"} and found.extended.values["damping"] > 0.4
+    for name in ("inertia_scale", "gravity_scale"):
+        assert found.extended.values[name] == pytest.approx(1.0, abs=0.02)
+
+
+@pytest.mark.parametrize("file", ["100Hz.csv", "300Hz.csv", "imposed_pure_spring.csv"])
+def test_a_slow_cycle_has_one_answer_at_any_rate(file, shared, tmp_path):
+    found = fp.diagnose(study_of(shared, tmp_path, [f"one_slow_cycle/{file}"], *CYCLE))
+    assert named(found) == {"parallel_stiffness", "coulomb_friction"}
+    assert found.extended.values["coulomb_friction.torque_nm"] == pytest.approx(0.4, abs=0.01)
+    assert found.extended.values["damping"] == pytest.approx(0.6, abs=0.02)
+    assert found.extended_error[0] < 0.02
+
+
+@pytest.mark.parametrize("kind", [None, "motion", "imposed"])
+def test_a_joint_under_position_control_lacks_dry_friction_alone(kind, shared, tmp_path):
+    """Whatever kind is said: the noise of the torque that was read would move so light a rod far more."""
+    words = ("--rod", "0.05", "0.7", *(("--set", f"kind={kind}") if kind else ()))
+    study = study_of(shared, tmp_path, [f"controlled_{x}.csv" for x in "abc"], *words)
+    found = fp.diagnose(study)
+    assert named(found) == {"coulomb_friction"} and not found.remainder.unexplained
+    torque, interval = estimate(found, "coulomb_friction.torque_nm")
+    assert torque == pytest.approx(0.25, abs=0.001) and interval[0] < 0.25 < interval[1]
+    contradicted = any('is contradicted and "imposed" is taken' in w for w in found.warnings)
+    assert {t.kind for t in study.trials} == {kind or "imposed"} and contradicted is (kind == "motion")
+
+
 def test_a_goal_position_is_never_taken_as_a_torque(shared, tmp_path, capsys):
     for name in "abc":
         shutil.copy(shared / f"cases/position_command_as_effort/{name}.csv", tmp_path)

@@ -122,7 +122,7 @@ def new_study(
     if schema.owner is None:
         made = new_body_study(wanted)
     else:
-        made = make(wanted, lambda known: guess_start(schema.owner, known, believed))
+        made = make(wanted, lambda known, columns: guess_start(schema.owner, known, believed, columns))
     outputs = Outputs("new-study", force)
     outputs.check(folder, made.contents)
     study, warnings = _tried(made, wanted, catalogue)

@@ -43,13 +43,18 @@ class NewStudy:
     origins: Mapping[str, Path]
 
 
-def new_study(wanted: Wanted, guess: Callable[[Mapping[str, float]], Mapping[str, float]]) -> NewStudy:
+Guess = Callable[[Mapping[str, float], Collection[str]], Mapping[str, float]]
+"""Start values of what a nominal model fits, by the known numbers of its rig and by what was recorded."""
+
+
+def new_study(wanted: Wanted, guess: Guess) -> NewStudy:
     """Propose a study of recordings.
 
     Parameters
     ----------
     guess
-        Start values of what the nominal model fits, of the rig's known numbers: for those that nobody gave.
+        Start values of what the nominal model fits, of the rig's known numbers and its columns: for those that nobody
+        gave.
 
     Raises
     ------
@@ -77,12 +82,12 @@ class _Making:
         self.names = tuple(dict.fromkeys(n for p in self.proposals for n in p.recording.names))
         check_known(wanted.columns, self.schema.columns, fault_at("--column"))
 
-    def made(self, guess: Callable[[Mapping[str, float]], Mapping[str, float]]) -> NewStudy:
+    def made(self, guess: Guess) -> NewStudy:
         kinds = [self._kind(p) for p in self.proposals]
         sources = self._sources(set(kinds))
         rig, passive = self._numbers(self.schema.constants), self._numbers(self.schema.passive)
         trials = [self._trial(p, kind) for p, kind in zip(self.proposals, kinds, strict=True)]
-        known, start = self._start({**rig, **passive}, guess)
+        known, start = self._start(guess, {**rig, **passive}, sources)
         self._check_settings(sorted(set(kinds)))
         if self.missing:
             raise InputError("the files do not say everything; please add " + ", ".join(dict.fromkeys(self.missing)))
@@ -240,18 +245,18 @@ class _Making:
         return out
 
     def _start(
-        self, rig: Mapping[str, float], guess: Callable[[Mapping[str, float]], Mapping[str, float]]
+        self, guess: Guess, rig: Mapping[str, float], columns: Collection[str]
     ) -> tuple[dict[str, float], dict[str, float]]:
         """What is known of `[start]`, as `rig.KEY` was set, and what is fitted."""
         known: dict[str, float] = {}
         start: dict[str, float] = {}
-        guessed = {} if self.missing else guess(rig)
+        guessed = {} if self.missing else guess(rig, columns)
         for key, number in self.schema.start.items():
             if f"rig.{key}" in self.wanted.settings and self.schema.start_may_be_known:
                 known |= self._number(f"rig.{key}", number)
             elif key in self.wanted.settings:
                 start |= self._number(key, number)
-            elif key in guessed and number.required:
+            elif key in guessed:
                 start[key] = float(f"{guessed[key]:.3g}")
         return known, start
 

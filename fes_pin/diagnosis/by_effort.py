@@ -13,9 +13,7 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.likelihood_models import Found, LikelihoodModels
 from fes_pin.diagnosis.verdict import RigState, RigVerdict
 from fes_pin.effort.search import NOT_CARRIED, has_efforts, searched
-from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.estimators import AnyState, Estimator
-from fes_pin.infer.scatter import as_wide_as_estimates_differ
 from fes_pin.infer.search import FITTED, Policy
 from fes_pin.infer.verdict import State
 from fes_pin.models.rigs.joint import Joint
@@ -67,7 +65,7 @@ class InverseDynamics(Estimator):
     def state(self, first: RigState) -> RigState | None:
         """Return the state of its set, fitted by the likelihood; None where the first state has the same.
 
-        Of the sets that efforts do not distinguish it is the likeliest.
+        Of the sets that efforts do not distinguish it is the likeliest whose sizes are certain and possible.
         """
         models, search = first.search.models, first.search
         by_effort = models.by_effort
@@ -76,21 +74,14 @@ class InverseDynamics(Estimator):
         for one in by_effort.alike:
             if one.names not in models.fits:
                 models.fit_model(by_effort.model(one))
-        possible = [f for one in by_effort.alike if models.is_possible(f := models.fits[one.names])]
+        fits = [models.fits[one.names] for one in by_effort.alike]
+        possible = [f for f in fits if models.is_possible(f) and all(models.is_certain(f, n) for n in f.names)]
         if not possible:
             return None
         assert isinstance(first.verdict, RigVerdict)
         names, verdict = min(possible, key=lambda f: f.criterion).names, VerdictByEffort(search, first.verdict.test)
         found = search.result(names)
         return State(verdict, found, verdict.weigh(found), {}, frozenset(names), replaced=first)
-
-
-def as_wide_as_efforts(fitted: LikelihoodFit, models: LikelihoodModels) -> LikelihoodFit:
-    """Return a fit with intervals that include the estimates of inverse dynamics where these differ significantly."""
-    by_effort = models.by_effort
-    if by_effort is None or not by_effort.knows(fitted.names):
-        return fitted
-    return as_wide_as_estimates_differ(fitted, by_effort.final(by_effort.models.fitted_set(fitted.names)))
 
 
 def named_by_one(first: RigState, answer: RigState) -> list[str]:

@@ -11,7 +11,7 @@ from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.distributions import chi2_tail
 from fes_pin.infer.fits import Names
 from fes_pin.infer.levels import FORM_GAIN, NOTHING_PERCENT
-from fes_pin.infer.scatter import excess_scatter, least_apart
+from fes_pin.infer.scatter import as_wide_as_estimates_differ, excess_scatter, least_apart
 from fes_pin.infer.search import Search
 from fes_pin.remainder.lack_of_fit import lack_of_fit
 from fes_pin.search.likelihood_fits import MEASUREMENT, PROCESS, WHITE, LikelihoodFits
@@ -36,6 +36,18 @@ class LikelihoodModels(LikelihoodFits):
 
     by_effort: FoundByEffort | None = None
     refusal = ""
+
+    def as_wide_as_efforts(self, fitted: LikelihoodFit) -> LikelihoodFit:
+        """Return a fit with intervals that include the estimates of inverse dynamics that differ significantly."""
+        by_effort = self.by_effort
+        if by_effort is None or not by_effort.knows(fitted.names):
+            return fitted
+        other = by_effort.final(by_effort.models.fitted_set(fitted.names))
+        return as_wide_as_estimates_differ(fitted, other, by_effort.of_other_forms(fitted.free, other))
+
+    def is_certain(self, fitted: LikelihoodFit, name: str) -> bool:
+        """Return whether a size of a cause is certain by both estimators; see `search.possible.is_certain`."""
+        return super().is_certain(self.as_wide_as_efforts(fitted), name)
 
     def nominal(self) -> LikelihoodFit:
         """Fit the nominal model, and simulate the family of score tests of all causes in it.

@@ -8,7 +8,7 @@ import numpy as np
 
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.by_effort import InverseDynamics, as_wide_as_efforts, named_by_one
+from fes_pin.diagnosis.by_effort import InverseDynamics, named_by_one
 from fes_pin.diagnosis.decide.chosen_again import share_of
 from fes_pin.diagnosis.decide.rivals import estimates, experiment, not_identifiable, ranking, seen_sizes
 from fes_pin.diagnosis.errors_ahead import AheadErrors, free_errors, noise_that_is_small
@@ -52,7 +52,7 @@ def diagnosis_of(
     verdict, found = state.verdict, state.found
     assert isinstance(verdict, RigVerdict)
     left, best = verdict.lack_of_fit(state), _with_intervals(state, white.fit if state is first else first.found.best)
-    best = as_wide_as_efforts(best, search.models)
+    best = search.models.as_wide_as_efforts(best)
     fitted, *others = verdict.errors(state)
     held = others[0] if others else None
     on = HELD_OUT if trials[1] else CROSS_VALIDATED if held else FITTED

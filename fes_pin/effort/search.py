@@ -130,6 +130,19 @@ class FoundByEffort:
         """Return cross-validated errors of the low-passed effort of a set, of which it `knows` every cause."""
         return self.verdict.errors_of(self.models.fitted_set(names), self.state.found.best)
 
+    def of_other_forms(self, free: Sequence[str], fitted: EffortFit) -> list[str]:
+        """Return the fitted parameters of another fit whose cause has another form there than in a fit by efforts.
+
+        The torque of dry friction is that of a joint at speed, where friction falls with the speed.
+        """
+        out = []
+        for name in fitted.names:
+            known = {f"{name}.{n}" for one in self.models.library[name].forms for n in one}
+            known &= {f"{name}.{n}" for n in effect_named(name).parameters()}
+            if known & {*free} != known & {*fitted.free}:
+                out += [n for n in free if n.startswith(f"{name}.")]
+        return out
+
     def final(self, fitted: EffortFit) -> EffortFit:
         """Return the final values of a set, with their intervals, and with the delay of commands where it shows."""
         return self._best[0] if fitted is self.state.found.best else self._final(fitted)[0]

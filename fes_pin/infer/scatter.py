@@ -10,7 +10,7 @@ difference chi-square test statistic for moment structure analysis, Psychometrik
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import Protocol, TypeVar
 
@@ -79,7 +79,7 @@ def as_wide_as_trials_differ(fitted: F, again: Sequence[Optimum]) -> F:
     return replace(fitted, covariance=fitted.covariance * np.outer(wider, wider))
 
 
-def as_wide_as_estimates_differ(fitted: F, other: Optimum) -> F:
+def as_wide_as_estimates_differ(fitted: F, other: Optimum, unlike: Collection[str] = ()) -> F:
     """Return the fit with intervals that include the difference to another estimate, where that is significant.
 
     Parameters that the other fit does not have keep their intervals.
@@ -93,10 +93,11 @@ def as_wide_as_estimates_differ(fitted: F, other: Optimum) -> F:
     Parameters
     ----------
     other
-        A fit to the same data by a less efficient estimator, with honest intervals. What both have must mean the same
-        in both.
+        A fit to the same data by a less efficient estimator, with honest intervals.
+    unlike
+        Parameters of both that do not mean the same in both.
     """
-    known = dict(zip(other.free, np.diag(other.covariance), strict=True))
+    known = {n: v for n, v in zip(other.free, np.diag(other.covariance), strict=True) if n not in unlike}
     varies = np.array([known.get(n, np.inf) for n in fitted.free])
     apart = np.array([other.values.get(n, fitted.values[n]) - fitted.values[n] for n in fitted.free])
     with np.errstate(all="ignore"):

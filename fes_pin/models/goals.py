@@ -32,17 +32,40 @@ SURELY = 3.0
 
 def check_no_goal(study: Study | ToPredict, rig: Rig) -> None:
     """Raise InputError where the efforts of a joint are goal positions."""
-    driven = [t for t in study.trials if {"effort", "position"} <= set(t.columns) and len(t) >= FEWEST]
-    if not isinstance(rig, Joint) or not driven:
-        return
-    stiffness = stiffness_of_goal(driven, rig.constants)
-    if stiffness is None:
-        return
+    driven = _driven(study.trials)
+    if (stiffness := _stiffness(driven, rig)) is not None:
+        raise InputError(_words(driven, stiffness, rig, "expected"), file=study.folder, column="effort")
+
+
+def with_efforts_of_goals(trials: Sequence[Trial], rig: Rig) -> tuple[tuple[Trial, ...], list[str]]:
+    """Return trials with the effort of a controller in the place of its goal positions, and a warning about them.
+
+    The stiffness of the controller has the scale of the URDF's inertia and gravity. The damping that is fitted to such
+    efforts includes that of the controller.
+    """
+    driven = _driven(trials)
+    if (stiffness := _stiffness(driven, rig)) is None:
+        return tuple(trials), []
+    one_of = {id(t): t.with_columns(effort=stiffness * (t["effort"] - t["position"])) for t in driven}
+    return tuple(one_of.get(id(t), t) for t in trials), [f"effort {_words(driven, stiffness, rig, 'taken')}"]
+
+
+def _driven(trials: Sequence[Trial]) -> list[Trial]:
+    return [t for t in trials if {"effort", "position"} <= {*t.columns} and len(t) >= FEWEST]
+
+
+def _stiffness(driven: Sequence[Trial], rig: Rig) -> float | None:
+    return stiffness_of_goal(driven, rig.constants) if isinstance(rig, Joint) and driven else None
+
+
+def _words(driven: Sequence[Trial], stiffness: float, rig: Rig, verb: str) -> str:
     unit = "N m/rad" if rig.constants["revolute"] else "N/m"
-    names = trials_named([t.name for t in driven])
-    looks = f"looks like a goal position in {names}: the position follows it one to one"
-    wanted = f"expected an effort, {stiffness:.2g} {unit} times (goal - position) if the URDF's inertia is right"
-    raise InputError(f"{looks}; {wanted}", file=study.folder, column="effort")
+    looks = (
+        f"looks like a goal position in {trials_named([t.name for t in driven])}: the position follows it one to one"
+    )
+    return (
+        f"{looks}; {verb}: an effort of {stiffness:.2g} {unit} times (goal - position), if the URDF's inertia is right"
+    )
 
 
 def stiffness_of_goal(trials: Sequence[Trial], constants: Mapping[str, float]) -> float | None:

@@ -1,6 +1,6 @@
 """The nominal model of a study: its rig with the start values."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from fes_pin.data.schema import check_known
 from fes_pin.data.study import Study
 from fes_pin.models.model import Model
 from fes_pin.models.rigs.base import Rig
-from fes_pin.models.rigs.rigid import joint_inertia, load_urdf
+from fes_pin.models.rigs.rigid import gravity_coefficients, joint_inertia, load_urdf
 from fes_pin.models.session import session_of
 
 RUN_OUT_S = 10.0
@@ -46,8 +46,12 @@ def rig_of(study: Study) -> type[Rig]:
     return rig
 
 
-def guess_start(rig: type[Rig], known: Mapping[str, float], urdf: Path | None = None) -> dict[str, float]:
+def guess_start(
+    rig: type[Rig], known: Mapping[str, float], urdf: Path | None = None, columns: Collection[str] = ()
+) -> dict[str, float]:
     """Return start values of a rig's fitted parameters where none are given: only their size matters.
+
+    The weight of a joint is fitted where its effort was recorded, as its inertia is: both are those of the URDF.
 
     Parameters
     ----------
@@ -55,15 +59,21 @@ def guess_start(rig: type[Rig], known: Mapping[str, float], urdf: Path | None = 
         Given numbers of the rig.
     urdf
         The URDF of a joint.
+    columns
+        What was recorded.
 
     Raises
     ------
     InputError
         If the URDF cannot be read.
     """
-    out = {name: float(getattr(rig, name)) for name in rig.parameters() if name in rig.schema.start}
+    needed = {name for name, number in rig.schema.start.items() if number.required}
+    out = {name: float(getattr(rig, name)) for name in rig.parameters() if name in needed}
     if urdf is not None and out.get("damping") == 0.0:
-        out["damping"] = joint_inertia(load_urdf(urdf)) / RUN_OUT_S
+        body = load_urdf(urdf)
+        out["damping"] = joint_inertia(body) / RUN_OUT_S
+        if "effort" in columns and any(gravity_coefficients(body)):
+            out["gravity_scale"] = 1.0
     if {"foot_mass_kg", "com_distance_m"} <= set(known) and "inertia_kgm2" in out:
         out["inertia_kgm2"] = known["foot_mass_kg"] * known["com_distance_m"] ** 2
     return out

@@ -125,8 +125,10 @@ def _trial(study: fp.Study, trial: fp.Trial, window: float = WINDOW_S) -> tuple[
     effort = savgol_filter(trial["effort"], length, 3)[length::length]
     model = pin.buildModelFromUrdf(str(study.files["urdf"]))
     data = model.createData()
-    gravity = np.array([pin.computeGeneralizedGravity(model, data, np.array([x]))[0] for x in q])
-    base = {"inertia_scale": pin.crba(model, data, np.zeros(1))[0, 0] * a, "damping": v}
+    zero = pin.neutral(model)  # a joint without limits has a cosine and a sine as its position
+    at = (pin.integrate(model, zero, np.array([x])) for x in q)
+    gravity = np.array([pin.computeGeneralizedGravity(model, data, one)[0] for one in at])
+    base = {"inertia_scale": pin.crba(model, data, zero)[0, 0] * a, "damping": v}
     if "gravity_scale" in study.constants:
         effort = effort - study.constants["gravity_scale"] * gravity
     else:

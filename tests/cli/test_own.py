@@ -106,7 +106,8 @@ def test_elsewhere_it_copies_recordings_and_urdf(monkeypatch, capsys, recordings
     more = ["--column", "effort=Drehmoment_Nm:N m,scale=-1", "--set", "rig.damping=0.2", "--set", "m1:start_s=60"]
     assert run(monkeypatch, *words, *more) == 0
     study = read_study(out)
-    assert study.name == "a b" and study.constants == {"damping": 0.2} and set(study.start) == {"inertia_scale"}
+    assert study.name == "a b" and study.constants == {"damping": 0.2}
+    assert set(study.start) == {"inertia_scale", "gravity_scale"}
     assert [t.conditions for t in study.trials] == [{}, {"start_s": 60.0}]
     assert np.allclose(study.trials[0]["effort"], -TRIALS[0][2], atol=1e-4)
     assert (out / "trials" / "m0.csv").read_bytes() == (recordings / "m0.csv").read_bytes()

@@ -111,7 +111,7 @@ def test_a_recording_of_each_format_becomes_a_study(tmp_path, name):
     WRITERS[name](path)
     believed = HeldFile.holding("p.urdf", pendulum(0.3, 0.5).encode())
     wanted = Wanted((path,), known_rigs()["joint"], tmp_path, "own", believed)
-    made = new_study(wanted, lambda _: {"inertia_scale": 1.0, "damping": 0.01})
+    made = new_study(wanted, lambda *_: {"inertia_scale": 1.0, "damping": 0.01})
     for place, content in made.contents.items():
         (tmp_path / place).write_bytes(content if isinstance(content, bytes) else content.encode())
     (trial,) = read_study(tmp_path).trials
