@@ -131,42 +131,6 @@ def test_a_goal_position_is_taken_as_one(shared, tmp_path):
 
 
 @pytest.mark.parametrize("file", ["100Hz.csv", "300Hz.csv", "imposed_pure_spring.csv"])
-def test_a_slow_cycle_has_one_answer_at_any_rate(file, shared, tmp_path):
-    found = fp.diagnose(study_of(shared, tmp_path, [f"one_slow_cycle/{file}"], *CYCLE))
-    assert named(found) == {"parallel_stiffness", "coulomb_friction"}
-    assert found.extended.values["coulomb_friction.torque_nm"] == pytest.approx(0.4, abs=0.01)
-    assert found.extended.values["damping"] == pytest.approx(0.6, abs=0.02)
-    assert found.extended_error[0] < 0.02
-
-
-@pytest.mark.parametrize("kind", [None, "motion", "imposed"])
-def test_a_joint_under_position_control_lacks_dry_friction_alone(kind, shared, tmp_path):
-    """Whatever kind is said: the noise of the torque that was read would move so light a rod far more."""
-    words = ("--rod", "0.05", "0.7", *(("--set", f"kind={kind}") if kind else ()))
-    study = study_of(shared, tmp_path, [f"controlled_{x}.csv" for x in "abc"], *words)
-    found = fp.diagnose(study)
-    assert named(found) == {"coulomb_friction"} and not found.remainder.unexplained
-    torque, interval = estimate(found, "coulomb_friction.torque_nm")
-    assert torque == pytest.approx(0.25, abs=0.001) and interval[0] < 0.25 < interval[1]
-    contradicted = any('is contradicted and "imposed" is taken' in w for w in found.warnings)
-    assert {t.kind for t in study.trials} == {kind or "imposed"} and contradicted is (kind == "motion")
-
-
-def test_a_goal_position_is_never_taken_as_a_torque(shared, tmp_path, capsys):
-    for name in "abc":
-        shutil.copy(shared / f"cases/position_command_as_effort/{name}.csv", tmp_path)
-    files = [str(tmp_path / f"{name}.csv") for name in "abc"]
-    columns = ("--column", "position=actual:rad", "--column", "effort=command:Nm")
-    sys.argv = ["fes-pin", "new-study", *files, "--rod", "0.4", "1.2", *columns]
-    with pytest.raises(SystemExit) as ended:
-        main.main()
-    said = " ".join(capsys.readouterr().err.split())
-    assert ended.value.code == 2 and "looks like a goal position" in said
-    assert re.search(r"expected an effort, [78](\.\d)? N m/rad times \(goal - position\)", said)
-    assert not (tmp_path / "study.toml").exists()
-
-
-@pytest.mark.parametrize("file", ["100Hz.csv", "300Hz.csv", "imposed_pure_spring.csv"])
 def test_a_slow_cycle_that_a_stand_imposes_needs_no_kind(file, shared, tmp_path):
     words = [w for w in CYCLE if w not in ("--set", "kind=imposed")]
     study = study_of(shared, tmp_path, [f"one_slow_cycle/{file}"], *words)
