@@ -6,11 +6,12 @@ import math
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from fes_pin.effort.columns import CauseOfEffort, Values
-from fes_pin.effort.problem import HELD_ROWS, HOLD, EffortFit, EffortProblem, Rows
+from fes_pin.effort.problem import HELD_ROWS, HOLD, EffortFit, EffortProblem, Rows, own
 from fes_pin.infer.distributions import chi2_tail
 from fes_pin.infer.family import Family
 from fes_pin.infer.fits import Candidate, FittedSets, Names
@@ -22,6 +23,7 @@ from fes_pin.infer.scatter import excess_scatter, least_apart, with_honest_inter
 from fes_pin.infer.search import BEAM, FITTED
 from fes_pin.models.effects import effect_named
 from fes_pin.models.rigs.joint import Joint
+from fes_pin.models.stage import Effect
 
 LIMITS = {n: (one.lower, one.upper) for n, one in Joint.parameters().items()}
 """Bounds of the nominal parameters."""
@@ -40,6 +42,18 @@ def fit_of(
     assert problem.variances is not None
     known = {n: getattr(found, n) for n in Optimum.__dataclass_fields__}
     return EffortFit(**known, names=problem.names, forms=forms, variances=problem.variances)
+
+
+def _is_off_bounds(fitted: EffortFit) -> bool:
+    return not any("." in n and fitted.values[n] != 0.0 for n in fitted.at_bound)
+
+
+def effect_of(values: Values, cause: CauseOfEffort) -> Effect:
+    """Return a cause with its values as the catalogue has it, without its forms, which differ between estimators."""
+    kind, forms = effect_named(cause.name), {n for one in cause.forms for n in one}
+    known = {n: v for n, v in own(values, cause.name).items() if n not in forms}
+    own_values: dict[str, Any] = {n: x.nearest(known[n]) for n, x in kind.parameters().items() if n in known}
+    return kind(**own_values)
 
 
 class EffortSets(FittedSets[EffortFit, Values]):
@@ -61,6 +75,7 @@ class EffortSets(FittedSets[EffortFit, Values]):
         super().__init__()
         self.rows, self.seed, self.takes_forms = rows, seed, False
         self._formed: set[tuple[Names, frozenset[Hashable]]] = set()
+        self._plain: dict[tuple[int, bool], tuple[EffortFit, EffortFit]] = {}
         self.is_imposed = all(t.record.kind == "imposed" for t in rows.tracks)
         self.values = {**nominal_values, HOLD: HELD_ROWS * (not self.is_imposed)}
         self.base = {n: LIMITS[n] for n in fitted} | ({HOLD: (0.0, HELD_ROWS)} if self.is_imposed else {})
@@ -224,8 +239,22 @@ class EffortSets(FittedSets[EffortFit, Values]):
         return self.fits[rest]
 
     def is_possible(self, fitted: EffortFit) -> bool:
-        """Return whether every size of a cause is off its bounds."""
-        return not any("." in n and fitted.values[n] != 0.0 for n in fitted.at_bound)
+        """Return whether every size of a cause is off its bounds, and one that these trials can identify.
+
+        So must be its final values: a shape that every row draws to its bound takes the place of another cause.
+        """
+        if not (_is_off_bounds(fitted) and _is_off_bounds(self.final(fitted))):
+            return False
+        effects = [effect_of(fitted.values, self.library[n]) for n in fitted.names]
+        each = ((e, n, size) for e in effects for n, size in e.smallest(self.measured).items())
+        return not any(0.0 < abs(getattr(e, n)) < size for e, n, size in each)
+
+    @cached_property
+    def measured(self) -> dict[str, np.ndarray]:
+        """Columns of the trials, end to end, as `identify.problem.measured_columns` has them."""
+        records = [t.record for t in self.rows.tracks]
+        each = {"time": [r.time - r.time[0] for r in records], "position": [r.reading for r in records]}
+        return {n: np.concatenate(v) for n, v in {**each, "effort": [r.effort for r in records]}.items()}
 
     def is_a_model(self, fitted: EffortFit) -> bool:
         """Return whether every nominal parameter is off its bounds, but for a damping of 0."""
@@ -328,8 +357,14 @@ class EffortSets(FittedSets[EffortFit, Values]):
 
     def final(self, fitted: EffortFit, kept: Sequence[np.ndarray] | None = None) -> EffortFit:
         """Return a set by plain least squares, from a fit of it, to all rows or to some."""
+        key = id(fitted), HOLD in self.base
+        if kept is None and key in self._plain:
+            return self._plain[key][1]
         problem = self.problem(fitted.names, fitted.forms, robust=False, kept=kept)
-        return fit_of(problem, fitted.values, fitted.forms)
+        found = fit_of(problem, fitted.values, fitted.forms)
+        if kept is None:
+            self._plain[key] = fitted, found  # held as long as it is known, so that no other has its id
+        return found
 
 
 def _tempered(fitted: EffortFit, excess: float) -> EffortFit:

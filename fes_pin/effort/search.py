@@ -15,9 +15,9 @@ from fes_pin.data.errors import InputError
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.effort.columns import Links
-from fes_pin.effort.fits import EffortSets
+from fes_pin.effort.fits import EffortSets, effect_of
 from fes_pin.effort.motion import Band, Record, band_of, has_rows, noise_of_bend
-from fes_pin.effort.problem import HOLD, EffortFit, Rows, own
+from fes_pin.effort.problem import HOLD, EffortFit, Rows
 from fes_pin.effort.timing import timed
 from fes_pin.effort.verdict import EffortSearch, EffortState, EffortVerdict
 from fes_pin.infer.covariance import covariance_of
@@ -33,7 +33,6 @@ from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.rigs.base import Rig
 from fes_pin.models.rigs.joint import Joint
-from fes_pin.models.stage import Effect
 
 OTHER_BANDS = (0.7, 1.4)
 """Bands in which a set is fitted again, as shares of its own: half of the power of the acceleration apart."""
@@ -172,16 +171,9 @@ class FoundByEffort:
     def model(self, fitted: EffortFit | None = None) -> Model:
         """Return the set, or another fit, as a model of the catalogue."""
         fitted, info = fitted or self.state.found.best, self.rig.parameters()
-        effects = (self._effect(fitted, n) for n in fitted.names)
+        effects = (effect_of(fitted.values, self.models.library[n]) for n in fitted.names)
         nominal = {n: one.nearest(fitted.values[n]) for n, one in info.items() if n in fitted.free}
         return Model(self.rig, tuple(effects)).with_parameters(nominal)
-
-    def _effect(self, fitted: EffortFit, name: str) -> Effect:
-        """Return a cause of a fit as the catalogue has it, without its forms, which differ between estimators."""
-        kind, forms = effect_named(name), {n for one in self.models.library[name].forms for n in one}
-        known = {n: v for n, v in own(fitted.values, name).items() if n not in forms}
-        values: dict[str, Any] = {n: x.nearest(known[n]) for n, x in kind.parameters().items() if n in known}
-        return kind(**values)
 
 
 def has_efforts(rig: Rig, trials: Sequence[Trial]) -> bool:

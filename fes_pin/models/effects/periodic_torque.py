@@ -1,5 +1,6 @@
 """A slow periodic external torque, as of breathing."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,8 @@ from fes_pin.models.stage import Bounds, Effect, Grids, Measured, Scalar, Signal
 
 FASTEST_HZ = 0.8
 """The fastest breathing that is looked for; see the source below."""
+SAME = 0.5
+"""Share of the variance of a driven motion that has the period of a torque, from which it is the motion's own."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +46,12 @@ class PeriodicTorque(Effect):
         effect."""
         return {"frequency_hz": (_slowest(measured), FASTEST_HZ)}
 
+    def smallest(self, measured: Measured) -> dict[str, float]:
+        """No size where a joint that is driven moves with the same period: any torque of such a motion has it too."""
+        if not {"effort", "position"} <= {*measured} or _share(measured, self.frequency_hz) < SAME:
+            return {}
+        return dict.fromkeys(self.amplitudes(), math.inf)
+
     def apply(self, value: Scalar, s: Signals) -> Scalar:
         phase = TURN * self.frequency_hz * s.time
         return value + self.in_phase * sin(phase) + self.quadrature * cos(phase)
@@ -50,3 +59,15 @@ class PeriodicTorque(Effect):
 
 def _slowest(measured: Measured) -> float:
     return min(1.0 / float(np.max(measured["time"])), FASTEST_HZ)
+
+
+def _share(measured: Measured, frequency_hz: float) -> float:
+    """Return the share of the variance of the position that a sine of each trial's own explains."""
+    starts = np.flatnonzero(np.diff(measured["time"], prepend=np.inf) < 0.0)
+    squares = left = 0.0
+    for time, position in zip(*(np.split(measured[n], starts[1:]) for n in ("time", "position")), strict=True):
+        phase = TURN * frequency_hz * time
+        columns = np.column_stack([np.ones_like(time), np.sin(phase), np.cos(phase)])
+        missed = position - columns @ np.linalg.lstsq(columns, position, rcond=None)[0]
+        squares, left = squares + float(np.sum((position - position.mean()) ** 2)), left + float(missed @ missed)
+    return 1.0 - left / squares if squares > 0.0 else 0.0
