@@ -227,7 +227,7 @@ def _net_efforts(trials: Sequence[Trial], band: float) -> tuple[list[np.ndarray]
     motions = [moved(t, band) for t in trials]
     every = np.concatenate(motions, axis=1)
     low, high, usual = every[0].min(), every[0].max(), float(np.sqrt(np.mean(every[1] ** 2))) + 1e-300
-    columns = [_columns(q, v, 0.5 * (low + high), 0.5 * (high - low), usual) for q, v, _, _ in motions]
+    columns = [columns_of_motion(q, v, 0.5 * (low + high), 0.5 * (high - low), usual) for q, v, _, _ in motions]
     each = zip(trials, motions, columns, strict=True)
     rows = [smoothed_rows(t, np.stack([m[2], *known, m[3]]), band) for t, m, known in each]
     every_row = np.concatenate(rows).T
@@ -293,7 +293,7 @@ def moved(trial: Trial, band: float) -> np.ndarray:
     return np.stack([position, velocity, np.gradient(velocity, trial.dt), effort])
 
 
-def _columns(q: np.ndarray, v: np.ndarray, middle: float, half: float, usual: float) -> np.ndarray:
+def columns_of_motion(q: np.ndarray, v: np.ndarray, middle: float, half: float, usual: float) -> np.ndarray:
     """Return torques of position and velocity, shape (columns, n): gravity, springs, damping, dry friction."""
     x = (q - middle) / half
     friction = (np.tanh(v / (share * usual)) for share in (0.05, 0.3))

@@ -13,6 +13,7 @@ from fes_pin.data.stuck import without_stuck
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.infer.held_out import FOLDS, deal
+from fes_pin.models.clipped import with_limited_efforts
 from fes_pin.models.goals import with_efforts_of_goals
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.plausibility import odd_numbers
@@ -34,7 +35,7 @@ class Measured:
     left_out
         Samples that were spikes, by trial and column.
     warnings
-        The stretches that were cut out, goal positions, and a kind that the data contradict, a line each.
+        The stretches that were cut out, goal positions, limits of an actuator, and a kind that the data contradict, a line each.
     """
 
     study: Study
@@ -50,7 +51,8 @@ def measured_study(study: Study) -> Measured:
     """Return a study without spikes of its measured columns and without stretches in which a sensor was stuck.
 
     Trials of a joint whose efforts cannot have driven it are of the kind "imposed" in it; see `data.direction`. Goal
-    positions are replaced by the efforts of their controller; see `models.goals`.
+    positions are replaced by the efforts of their controller, and commands beyond the limit of an actuator by that
+    limit; see `models.goals` and `models.clipped`.
 
     A sample that its neighbours replace carries no information of its own. Intervals are therefore too narrow by half
     the share of such samples: half a percent where one in a hundred is a spike.
@@ -63,6 +65,8 @@ def measured_study(study: Study) -> Measured:
     rig, trials, found = nominal_model(study).rig, [], {}
     driven, warnings = with_efforts_of_goals(study.trials, rig)
     directed, said = contradicted(driven, study.schema)
+    warnings += said
+    directed, said = with_limited_efforts(directed, rig)
     warnings += said
     for trial in directed:
         pieces, said = without_stuck(trial, rig.outputs(trial.kind), bool(rig.unknowns(trial.kind)))

@@ -1,0 +1,58 @@
+"""Commands that an actuator clips: the limit is told from the data, and what is hidden is found behind it."""
+
+import numpy as np
+import pytest
+from bench import DAMPING, INERTIA, WEIGHT, study, trial
+from driven_rigs.laboratory import draw_laboratory
+from scipy.integrate import odeint
+
+import fes_pin as fp
+
+DT, SECONDS, FRICTION, STIFFNESS = 0.01, 8.0, 0.15, 20.0
+BEYOND = "a command beyond what the actuator gave"
+
+
+def driven(seed, stall, slope):
+    """Return a trial of a joint whose motor gives at most `stall` N m, less where it drives, by LSODA."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(round(SECONDS / DT)) * DT
+    waves = zip(rng.uniform(0.5, 8.0, 4), rng.uniform(0.0, 6.0, 4), rng.uniform(0.1, 0.4, 4), strict=True)
+    goals = sum(size * np.sin(w * time + phase) for w, phase, size in waves)
+    goals += 0.4 * np.sign(np.sin(2.0 * np.pi * 0.3 * time + rng.uniform(0.0, 6.0)))
+    state, read, commands = np.zeros(2), [], []
+
+    def moves(x, _, command):
+        limit = max(stall - slope * max(x[1] * np.sign(command), 0.0), 0.0)
+        torque = np.clip(command, -limit, limit) - DAMPING * x[1] - WEIGHT * np.sin(x[0])
+        return [x[1], (torque - FRICTION * np.tanh(x[1] / 0.02)) / INERTIA]
+
+    for goal in goals:
+        read.append(state[0] + 3e-4 * rng.standard_normal())
+        commands.append(STIFFNESS * (goal - read[-1]) - 0.05 * STIFFNESS * state[1])
+        state = odeint(moves, state, [0.0, DT], args=(commands[-1],))[-1]
+    return fp.Trial(f"{seed}", "motion", {"effort": np.array(commands), "position": np.array(read)}, time)
+
+
+@pytest.mark.parametrize("stall", [2.5, 4.0])
+@pytest.mark.parametrize("slope", [0.0, 0.2])
+@pytest.mark.parametrize("seed", range(2))
+def test_a_limit_is_said_with_its_size(seed, slope, stall, tmp_path):
+    clipped = study(tmp_path, [driven(seed + 10 * k, stall, slope) for k in range(3)])
+    (said,) = (w for w in fp.check(clipped).odd if BEYOND in w)
+    at_rest, falls = (float(said.split(word)[1].split(" N m")[0]) for word in ("is above ", ", less "))
+    assert at_rest == pytest.approx(stall, rel=0.06) and falls == pytest.approx(slope, abs=0.06)
+
+
+def test_friction_is_found_behind_a_limit(tmp_path):
+    found = fp.diagnose(study(tmp_path, [driven(10 * k, 2.5, 0.2) for k in range(3)]))
+    assert [c.name for c in found.causes] == ["coulomb_friction"]
+    values = found.extended.values
+    assert values["coulomb_friction.torque_nm"] == pytest.approx(FRICTION, rel=0.1)
+    assert values["damping"] == pytest.approx(DAMPING, rel=0.2) and values["inertia_scale"] == pytest.approx(1, rel=0.02)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_no_limit_is_seen_where_there_is_none(seed, tmp_path):
+    studies = [study(tmp_path, [trial(seed), trial(seed + 50)]), study(tmp_path, [driven(seed, np.inf, 0.0)])]
+    studies += [fp.read_study(draw_laboratory(("coulomb_friction",), 7300 + seed, tmp_path / "a").study)]
+    assert not [w for one in studies for w in fp.check(one).odd if BEYOND in w]
