@@ -5,16 +5,21 @@ different sets, that which predicts better answers: in the low-passed effort, an
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.likelihood_models import Found, LikelihoodModels
+from fes_pin.diagnosis.held_out import Again
+from fes_pin.diagnosis.likelihood_models import Found, LikelihoodModels, LikelihoodSearch
 from fes_pin.diagnosis.verdict import RigState, RigVerdict
 from fes_pin.effort.search import NOT_CARRIED, has_efforts, searched
+from fes_pin.identify.likelihood_fit import LikelihoodFit, at_values, refit
 from fes_pin.infer.estimators import AnyState, Estimator
+from fes_pin.infer.scatter import as_wide_as_estimates_differ
 from fes_pin.infer.search import FITTED, Policy
+from fes_pin.infer.text import percent
 from fes_pin.infer.verdict import State
 from fes_pin.models.rigs.joint import Joint
 
@@ -82,6 +87,49 @@ class InverseDynamics(Estimator):
         names, verdict = min(possible, key=lambda f: f.criterion).names, VerdictByEffort(search, first.verdict.test)
         found = search.result(names)
         return State(verdict, found, verdict.weigh(found), {}, frozenset(names), replaced=first)
+
+
+class ValuesByEffort(RigVerdict):
+    """The verdict on a set with the values of inverse dynamics, of all trials or of those that are not held out."""
+
+    def __init__(self, search: LikelihoodSearch, test: Sequence[Trial]) -> None:
+        super().__init__(search, test)
+        self.refitted = Again(lambda fitted, trials: self.at_efforts(refit(fitted, trials)))
+
+    def at_efforts(self, fitted: LikelihoodFit) -> LikelihoodFit:
+        """Return a fit at the values of inverse dynamics of its trials, with intervals that include its own ones.
+
+        A set with a cause that inverse dynamics does not know keeps its values.
+        """
+        by_effort = self.models.by_effort
+        if by_effort is None or not by_effort.knows(fitted.names):
+            return fitted
+        known = by_effort.values_in(fitted, [t.name for t in fitted.trials])
+        return as_wide_as_estimates_differ(at_values(fitted, known), fitted)
+
+
+def never_worse(state: RigState) -> tuple[RigState, list[str]]:
+    """Return a state with a warning, and with other values where its own predict efforts worse than the beliefs do.
+
+    They are those of inverse dynamics then, of the same set.
+    """
+    models, found, first = state.search.models, state.found, state.verdict
+    by_effort, best = models.by_effort, state.found.best
+    if by_effort is None or not by_effort.knows(best.names) or best.model.rig.name != "joint":
+        return state, []
+    now, believed = by_effort.error_percent(best.model), by_effort.error_percent(models.model)
+    if now <= believed:
+        return state, []
+    assert isinstance(first, RigVerdict)
+    verdict = ValuesByEffort(state.search, first.test)
+    without = {n: verdict.at_efforts(f) for n, f in found.without.items()}
+    again = replace(found, best=verdict.at_efforts(best), nominal=verdict.at_efforts(found.nominal), without=without)
+    then = by_effort.error_percent(again.best.model)
+    if then >= now:
+        return state, []
+    words = f"the likelihood's values predict the effort with E {percent(now)}, the believed ones {percent(believed)}; "
+    words += f"those of least squares of the effort are given: {percent(then)}"
+    return replace(state, verdict=verdict, found=again, weighed=verdict.weigh(again)), [words]
 
 
 def named_by_one(first: RigState, answer: RigState) -> list[str]:

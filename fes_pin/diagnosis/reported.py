@@ -8,7 +8,7 @@ import numpy as np
 
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.by_effort import InverseDynamics, named_by_one
+from fes_pin.diagnosis.by_effort import InverseDynamics, named_by_one, never_worse
 from fes_pin.diagnosis.decide.chosen_again import share_of
 from fes_pin.diagnosis.decide.rivals import estimates, experiment, not_identifiable, ranking, seen_sizes
 from fes_pin.diagnosis.errors_ahead import AheadErrors, free_errors, noise_that_is_small
@@ -48,10 +48,11 @@ def diagnosis_of(
     """Return the diagnosis of a rig from a search by the likelihood that has run."""
     first, white = RigVerdict(search, trials[1]).of(found), WhiteProcessNoise()
     estimators = (InverseDynamics(), white, LeastSquares())
-    state: RigState = choose(first, estimators, search.models.seed)
+    chosen: RigState = choose(first, estimators, search.models.seed)
+    state, said = never_worse(chosen)
     verdict, found = state.verdict, state.found
     assert isinstance(verdict, RigVerdict)
-    left, best = verdict.lack_of_fit(state), _with_intervals(state, white.fit if state is first else first.found.best)
+    left, best = verdict.lack_of_fit(state), _with_intervals(state, white.fit if chosen is first else first.found.best)
     best = search.models.as_wide_as_efforts(best)
     fitted, *others = verdict.errors(state)
     held = others[0] if others else None
@@ -59,7 +60,7 @@ def diagnosis_of(
     fits = verdict.gains_fitted(found) if state.weighed.folds else state.weighed.gains
     causes = [_cause(verdict, state, e, best, (fits[e.name], on)) for e in best.model.effects if not e.is_fault]
     causes.sort(key=lambda c: -c.gain_held_out.percent)
-    said = [*named_by_one(first, state), *words_of_reading(best.noise, best.model.rig, trials[0])]
+    said += [*named_by_one(first, state), *words_of_reading(best.noise, best.model.rig, trials[0])]
     said += _words_of_far(search.models, found.nominal)
     reached = [e for e in (fitted[1].free, held and held[1].free) if e is not None]
     word = word_of(bool(causes), left)

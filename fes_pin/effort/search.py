@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -45,6 +45,24 @@ NO_EFFORT = "no effort was recorded: what drives the joint is not in the trials"
 
 NOT_TESTED = Remainder(False, math.nan, None)
 """The lack of fit of a model that was not fitted."""
+
+
+STARTED = ("coulomb_friction.creep_speed", "coulomb_friction.softness")
+"""Corners of friction of a simulation, which a regression of efforts does not have."""
+WAYS = {n: "coulomb_friction.presliding" for n in ("coulomb_friction.stretch", "coulomb_friction.presliding")}
+"""Ways over which friction builds up, in the catalogue's names and in those of a regression of efforts."""
+
+
+class LikelihoodValues(Protocol):
+    """A fit of a set of causes by another estimator."""
+
+    @property
+    def names(self) -> Names:
+        """The set."""
+
+    @property
+    def free(self) -> Sequence[str]:
+        """Names of the fitted parameters."""
 
 
 @dataclass(frozen=True)
@@ -128,6 +146,33 @@ class FoundByEffort:
     def errors(self, names: Names) -> Errors:
         """Return cross-validated errors of the low-passed effort of a set, of which it `knows` every cause."""
         return self.verdict.errors_of(self.models.fitted_set(names), self.state.found.best)
+
+    def error_percent(self, model: Model) -> float:
+        """Return E of the low-passed effort by a model of whose causes it `knows` every one, percent.
+
+        Friction that builds up over a way has the stretch of its contact as that way; its corners are those of a start.
+        """
+        names, sets = [e.name for e in model.effects], self.models
+        values = {f"{n}.{k}": v for n in names for k, v in sets.library[n].shapes[0].items()} | sets.values
+        values |= {k: v for k, v in model.parameters().items() if k not in STARTED}
+        values |= {to: model.parameters()[n] for n, to in WAYS.items() if model.parameters().get(n)}
+        left, efforts = sets.problem(names, {}).residuals(values)[0], sets.rows.efforts(values)
+        squares, spread = (sum(float(np.sum(one**2)) for one in many) for many in (left, efforts))
+        return 100.0 * squares / max(spread, 1e-300)
+
+    def values_in(self, fitted: LikelihoodValues, names: Collection[str]) -> dict[str, float]:
+        """Return the final values of the set of another fit, by trials of some names; those that mean the same in it.
+
+        Parameters
+        ----------
+        names
+            Names of the trials; all rows count where none is of a trial by these names.
+        """
+        kept = [np.full(len(t.rows), t.record.name in names) for t in self.models.rows.tracks]
+        whole = self.models.fitted_set(fitted.names)
+        final = self.models.final(whole, kept if any(one.any() for one in kept) else None)
+        unlike = self.of_other_forms(fitted.free, final)
+        return {n: final.values[n] for n in fitted.free if n in final.free and n not in unlike}
 
     def of_other_forms(self, free: Sequence[str], fitted: EffortFit) -> list[str]:
         """Return the fitted parameters of another fit whose cause has another form there than in a fit by efforts.

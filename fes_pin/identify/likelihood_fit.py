@@ -1,6 +1,6 @@
 """Fits by the likelihood of one-step predictions: parameters, with process and measurement noise."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from fes_pin.data.trial import Trial
@@ -80,6 +80,13 @@ def at_noise(fitted: Fit, noise: StateSpaceNoise) -> LikelihoodFit:
     """Return a fit, with its parameters, at another noise."""
     problem = LikelihoodProblem(fitted.model, fitted.trials, noise)
     return fit_of(problem, minimise(problem, fitted.values, fitted.unknowns, 0))
+
+
+def at_values(fitted: LikelihoodFit, values: Mapping[str, float]) -> LikelihoodFit:
+    """Return a fit at other values of some parameters, with the noise that is likeliest there."""
+    problem = LikelihoodProblem(fitted.model.with_parameters(values), fitted.trials, fitted.noise)
+    problem.noise_step(problem.model.parameters(), fitted.unknowns)
+    return fit_of(problem, minimise(problem, problem.model.parameters(), fitted.unknowns, 0))
 
 
 def maximise(

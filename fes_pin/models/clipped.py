@@ -2,9 +2,9 @@
 
     acting = sign(u) min(|u|, stall - slope max(0, v sign(u))),   not below 0
 
-A motor that turns as it is driven has less voltage left for its current, and one that brakes has all of it. The limit is
-estimated by a regression of the acting effort on what position, velocity and acceleration can explain, in the band of
-the motion. It is taken where it leaves far less of the effort unexplained than the complete command does.
+A motor that turns as it is driven has less voltage left for its current, and one that brakes has all of it. The limit
+is estimated by a regression of the acting effort on what position, velocity and acceleration can explain, in the band
+of the motion. It is taken where it leaves far less of the effort unexplained than the complete command does.
 
 Source: Hughes and Drury, Electric Motors and Drives, 4th ed., 2013, chapter 3: torque and speed at a given voltage.
 """

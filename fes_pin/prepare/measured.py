@@ -35,7 +35,8 @@ class Measured:
     left_out
         Samples that were spikes, by trial and column.
     warnings
-        The stretches that were cut out, goal positions, limits of an actuator, and a kind that the data contradict, a line each.
+        The stretches that were cut out, goal positions, limits of an actuator, and a kind that the data contradict, a
+        line each.
     """
 
     study: Study

@@ -48,7 +48,9 @@ def test_friction_is_found_behind_a_limit(tmp_path):
     assert [c.name for c in found.causes] == ["coulomb_friction"]
     values = found.extended.values
     assert values["coulomb_friction.torque_nm"] == pytest.approx(FRICTION, rel=0.1)
-    assert values["damping"] == pytest.approx(DAMPING, rel=0.2) and values["inertia_scale"] == pytest.approx(1, rel=0.02)
+    assert values["damping"] == pytest.approx(DAMPING, rel=0.2) and values["inertia_scale"] == pytest.approx(
+        1, rel=0.02
+    )
 
 
 @pytest.mark.parametrize("seed", range(3))

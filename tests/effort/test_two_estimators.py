@@ -12,6 +12,7 @@ from fes_pin.data.errors import InputError
 from fes_pin.diagnosis import by_effort
 from fes_pin.diagnosis.by_effort import named_by_one
 from fes_pin.effort import search
+from fes_pin.effort.search import FoundByEffort
 from fes_pin.infer.estimators import CHOICE
 
 
@@ -101,3 +102,23 @@ def test_an_inertia_that_moves_between_bands_is_no_answer(tmp_path, monkeypatch)
     found = fp.diagnose(arm(tmp_path, friction=0.1))
     assert f"efforts name no cause: {search.NOT_CARRIED}" in found.warnings
     assert [c.name for c in found.causes] == ["coulomb_friction"]
+
+
+def test_values_that_predict_efforts_worse_than_the_beliefs_are_replaced(tmp_path, monkeypatch):
+    """The likelihood's values are taken for worse here; those of inverse dynamics answer, with wide intervals."""
+    errors, asked = FoundByEffort.error_percent, []
+
+    def worse(found, model):
+        asked.append(model)
+        return errors(found, model) + 1e3 * (len(asked) == 1)
+
+    joint = arm(tmp_path, friction=0.1)
+    own = fp.diagnose(joint)
+    monkeypatch.setattr(FoundByEffort, "error_percent", worse)
+    other = fp.diagnose(joint)
+    assert [c.name for c in other.causes] == [c.name for c in own.causes] == ["coulomb_friction"]
+    assert any("those of least squares of the effort are given" in w for w in other.warnings)
+    assert not any("least squares of the effort" in w for w in own.warnings)
+    for name, value in own.extended.values.items():
+        low, high = other.extended.interval(name)
+        assert low <= value <= high
