@@ -119,6 +119,6 @@ def test_values_that_predict_efforts_worse_than_the_beliefs_are_replaced(tmp_pat
     assert [c.name for c in other.causes] == [c.name for c in own.causes] == ["coulomb_friction"]
     assert any("those of least squares of the effort are given" in w for w in other.warnings)
     assert not any("least squares of the effort" in w for w in own.warnings)
-    for name, value in own.extended.values.items():
+    for name in other.extended.free:
         low, high = other.extended.interval(name)
-        assert low <= value <= high
+        assert low <= own.extended.values[name] <= high
