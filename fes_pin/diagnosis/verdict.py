@@ -6,6 +6,7 @@ on held-out trials. For a rig in closed loop these are errors over a horizon: er
 simulations.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -18,6 +19,8 @@ from fes_pin.diagnosis.errors_ahead import (
     RandomPart,
     are_large,
     errors_ahead,
+    free_errors,
+    noise_that_is_small,
     random_parts,
     squared_errors,
 )
@@ -36,10 +39,15 @@ from fes_pin.identify.error_measures import FREE
 from fes_pin.identify.likelihood_fit import LikelihoodFit, refit
 from fes_pin.identify.per_trial import falls
 from fes_pin.infer.held_out import Errors
+from fes_pin.infer.levels import SMALL_SHARE
+from fes_pin.infer.noise import NoiseModel
 from fes_pin.infer.result import FITTED, Gain, Remainder
+from fes_pin.infer.text import WHOLE
 from fes_pin.infer.verdict import State, Verdict, Weighed
 from fes_pin.remainder.lack_of_fit import lack_of_fit
 
+WORSE = 2.0
+"""Ratio of errors of free simulations from which a cause is refuted: those of two right models differ by less."""
 EFFORT = "the low-passed effort"
 """What inverse dynamics predicts."""
 
@@ -96,10 +104,30 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
             lack_of_fit=lack_of_fit(found.best),
             is_random=are_large(random := random_parts(found.best)),
             is_moved=is_moved_by_what_is_recorded(found.best),
+            carried=self._refuted_in_free_motion(found),
             folds=folds,
             random=random,
             no_noise=no_noise(found.best),
         )
+
+    def _refuted_in_free_motion(self, found: Found) -> dict[str, float]:
+        """Return the gain, percent, of causes with which free simulations of a driven joint are far worse.
+
+        Predictions over a horizon begin again at the readings. A stop that the joint passes by little costs them
+        little, and keeps a free simulation on its other side. In closed loop, where free simulations may drift, they
+        are asked only of a set that follows the trials without the cause.
+        """
+        if self.models.by_effort is None or self.models.judged_s is None or not found.without:
+            return {}
+        noise = noise_that_is_small(found.best)
+        error = {n: self._free_percent(f, noise) for n, f in {"": found.best, **found.without}.items()}
+        far = (n for n in found.without if error[n] < WHOLE * SMALL_SHARE and error[""] > WORSE * error[n])
+        return {n: 100.0 * (1.0 - error[""] / error[n]) for n in far}
+
+    def _free_percent(self, fitted: LikelihoodFit, noise: NoiseModel) -> float:
+        """Return E of free simulations of the fitted trials, percent; infinite where they are not finite."""
+        found = free_errors(fitted.model, self.models.trials, noise, fitted).error_percent()
+        return found if math.isfinite(found) else math.inf
 
     def gains_fitted(self, found: Found) -> dict[str, Gain]:
         """Return the gain of each cause on the fitted trials, by fits to all of them."""
