@@ -70,7 +70,7 @@ class InverseDynamics(Estimator):
     def state(self, first: RigState) -> RigState | None:
         """Return the state of its set, fitted by the likelihood; None where the first state has the same.
 
-        Of the sets that efforts do not distinguish it is the likeliest whose sizes are certain and possible.
+        Of the sets that efforts do not distinguish it is the likeliest.
         """
         models, search = first.search.models, first.search
         by_effort = models.by_effort
@@ -79,8 +79,7 @@ class InverseDynamics(Estimator):
         for one in by_effort.alike:
             if one.names not in models.fits:
                 models.fit_model(by_effort.model(one))
-        fits = [models.fits[one.names] for one in by_effort.alike]
-        possible = [f for f in fits if models.is_possible(f) and all(models.is_certain(f, n) for n in f.names)]
+        possible = [f for one in by_effort.alike if models.is_possible(f := models.fits[one.names])]
         if not possible:
             return None
         assert isinstance(first.verdict, RigVerdict)

@@ -45,10 +45,6 @@ class LikelihoodModels(LikelihoodFits):
         other = by_effort.final(by_effort.models.fitted_set(fitted.names))
         return as_wide_as_estimates_differ(fitted, other, by_effort.of_other_forms(fitted.free, other))
 
-    def is_certain(self, fitted: LikelihoodFit, name: str) -> bool:
-        """Return whether a size of a cause is certain by both estimators; see `search.possible.is_certain`."""
-        return super().is_certain(self.as_wide_as_efforts(fitted), name)
-
     def nominal(self) -> LikelihoodFit:
         """Fit the nominal model, and simulate the family of score tests of all causes in it.
 
