@@ -114,7 +114,7 @@ def never_worse(state: RigState) -> tuple[RigState, list[str]]:
     """
     models, found, first = state.search.models, state.found, state.verdict
     by_effort, best = models.by_effort, state.found.best
-    if by_effort is None or not by_effort.knows(best.names) or best.model.rig.name != "joint":
+    if by_effort is None or not by_effort.knows(best.names):
         return state, []
     now, believed = by_effort.error_percent(best.model), by_effort.error_percent(models.model)
     if now <= believed:
