@@ -6,7 +6,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from driven_rigs.draw import draw
 from driven_rigs.laboratory import draw_laboratory
+from harness import measured
 from harness.never_worse import errors_against, model_of, withheld
 from harness.regression import plain
 from harness.table import never_worse
@@ -110,3 +112,13 @@ def test_ratios_are_counted():
     assert text[2].startswith("free, unseen, ours over believed: median inf, at most 1.02 in 1 of 2")
     assert text[4].startswith("every error at most 1.02 times: 1 of 4") and text[4].endswith("largest inf")
     assert [line.split(":")[0].strip() for line in text[5:]] == ["a", "c", "d"]
+
+
+def test_a_study_of_ones_own_has_a_table(tmp_path, capsys):
+    measured.main([str(draw(("coulomb_friction",), 0.3, 7100, tmp_path).study)])
+    head, columns, *rows = capsys.readouterr().out.splitlines()
+    assert "causes_found coulomb_friction" in head and columns.split()[-1] == "ratio"
+    assert [row.split("  ")[1].split(",")[0] for row in rows] == [*MEASURES, *MEASURES]
+    for row_ in rows:
+        *_, own, believed, regression, ratio = map(float, row_.split()[-4:])
+        assert ratio == pytest.approx(own / min(believed, regression), rel=0.01)
