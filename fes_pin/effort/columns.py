@@ -8,7 +8,6 @@ to the reading is a view: the reading is corrected, and all columns are made aga
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -117,21 +116,25 @@ def nominal_columns(track: Motion, links: Links, tilt: float = 0.0) -> Sequence[
 
 def coulomb_friction(track: Motion, x: Values, sizes: Sizes) -> Sequence[np.ndarray]:
     """Return dry friction, with stiction that falls over the Stribeck speed, or that builds up over a way."""
-    stiction = 1.0 + x["stiction"] * np.exp(-((track.v / x["stribeck_speed"]) ** 2))
     share = presliding(track.q, x["presliding"]) if x["presliding"] else np.tanh(track.v / x["creep_speed"])
-    return (track.low(share * stiction),)
+    if x["stiction"]:
+        share = share * (1.0 + x["stiction"] * np.exp(-((track.v / x["stribeck_speed"]) ** 2)))
+    return (track.low(share),)
 
 
 def presliding(q: np.ndarray, way: float) -> np.ndarray:
     """Return the share of friction that acts along a motion, shape (n,): way z' = |v| (sign(v) - z), from z = 0."""
     moved = np.diff(q, prepend=q[0])
     sign, ways = np.sign(moved), np.cumsum(np.abs(moved)) / way
-    turns = np.flatnonzero(np.diff(sign, prepend=0.0, append=0.0))
-    share, last, out = 0.0, 0.0, np.zeros(len(q))
-    for start, end in itertools.pairwise([*turns, len(q)] if not len(turns) or turns[-1] < len(q) else turns):
-        out[start:end] = sign[start] + (share - sign[start]) * np.exp(last - ways[start:end])
-        share, last = float(out[end - 1]), float(ways[end - 1])
-    return out
+    starts = np.flatnonzero(np.diff(sign, prepend=np.nan) != 0.0)
+    lengths = np.diff(starts, append=len(q))
+    ends = ways[starts + lengths - 1]
+    begun, share = np.concatenate([[0.0], ends[:-1]]), 0.0
+    shares = np.empty(len(starts))
+    for k, (one, keeps) in enumerate(zip(sign[starts].tolist(), np.exp(begun - ends).tolist(), strict=True)):
+        shares[k] = share
+        share = one + (share - one) * keeps
+    return np.asarray(sign + (np.repeat(shares, lengths) - sign) * np.exp(np.repeat(begun, lengths) - ways))
 
 
 def quadratic_damping(track: Motion, x: Values, sizes: Sizes) -> Sequence[np.ndarray]:

@@ -241,9 +241,10 @@ class EffortSets(FittedSets[EffortFit, Values]):
     def is_possible(self, fitted: EffortFit) -> bool:
         """Return whether every size of a cause is off its bounds, and one that these trials can identify.
 
-        So must be its final values: a shape that every row draws to its bound takes the place of another cause.
+        So must be its final shapes: one that every row draws to its bound takes the place of another cause.
         """
-        if not (_is_off_bounds(fitted) and _is_off_bounds(self.final(fitted))):
+        has_shapes = any(self.library[n].free for n in fitted.names)
+        if not _is_off_bounds(fitted) or (has_shapes and not _is_off_bounds(self.final(fitted))):
             return False
         effects = [effect_of(fitted.values, self.library[n]) for n in fitted.names]
         each = ((e, n, size) for e in effects for n, size in e.smallest(self.measured).items())
