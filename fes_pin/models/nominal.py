@@ -1,8 +1,10 @@
 """The nominal model of a study: its rig with the start values."""
 
+import math
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from fes_pin.data.errors import InputError, fault_at
 from fes_pin.data.numbers import instance
@@ -10,7 +12,8 @@ from fes_pin.data.schema import check_known
 from fes_pin.data.study import Study
 from fes_pin.models.model import Model
 from fes_pin.models.rigs.base import Rig
-from fes_pin.models.rigs.rigid import gravity_coefficients, joint_inertia, load_urdf
+from fes_pin.models.rigs.joint import WEIGHTLESS
+from fes_pin.models.rigs.rigid import gravity_coefficients, joint_inertia, joint_is_revolute, load_urdf
 from fes_pin.models.session import session_of
 
 RUN_OUT_S = 10.0
@@ -46,12 +49,18 @@ def rig_of(study: Study) -> type[Rig]:
     return rig
 
 
+def _swings(body: Any) -> bool:
+    """Return whether a joint turns, and feels gravity."""
+    return joint_is_revolute(body) and math.hypot(*gravity_coefficients(body)) > WEIGHTLESS * joint_inertia(body)
+
+
 def guess_start(
     rig: type[Rig], known: Mapping[str, float], urdf: Path | None = None, columns: Collection[str] = ()
 ) -> dict[str, float]:
     """Return start values of a rig's fitted parameters where none are given: only their size matters.
 
-    The weight of a joint is fitted where its effort was recorded, as its inertia is: both are those of the URDF.
+    The weight of a joint that turns is fitted where its effort was recorded, as its inertia is: both are those of the
+    URDF. That of a slide is a constant, which its effort may have as an offset.
 
     Parameters
     ----------
@@ -72,7 +81,7 @@ def guess_start(
     if urdf is not None and out.get("damping") == 0.0:
         body = load_urdf(urdf)
         out["damping"] = joint_inertia(body) / RUN_OUT_S
-        if "effort" in columns and any(gravity_coefficients(body)):
+        if "effort" in columns and _swings(body):
             out["gravity_scale"] = 1.0
     if {"foot_mass_kg", "com_distance_m"} <= set(known) and "inertia_kgm2" in out:
         out["inertia_kgm2"] = known["foot_mass_kg"] * known["com_distance_m"] ** 2
