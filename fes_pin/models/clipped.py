@@ -10,10 +10,11 @@ Source: Hughes and Drury, Electric Motors and Drives, 4th ed., 2013, chapter 3: 
 """
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 
-from fes_pin.data.direction import FEWEST, band_hz, columns_of_motion, moved, smoothed_rows
+from fes_pin.data.direction import ALIKE, FEWEST, band_hz, columns_of_motion, moved, smoothed_rows
 from fes_pin.data.plausibility import trials_named
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
@@ -40,8 +41,7 @@ def with_limited_efforts(trials: Sequence[Trial], rig: Rig) -> tuple[tuple[Trial
     if not isinstance(rig, Joint) or not np.isfinite(band := band_hz(driven)):
         return tuple(trials), []
     commands = _Commands(driven, band)
-    whole = commands.left(np.inf, 0.0)
-    if whole < UNEXPLAINED:
+    if len(commands.rows) < FEWEST or (whole := commands.left(np.inf, 0.0)) < UNEXPLAINED:
         return tuple(trials), []
     stall, slope = commands.likeliest()
     share = commands.share(stall, slope)
@@ -73,9 +73,14 @@ class _Commands:
         q = np.concatenate([m[0] for m in motions])
         middle, half, usual = 0.5 * (q.max() + q.min()), 0.5 * float(np.ptp(q)), float(np.sqrt(np.mean(self.speeds**2)))
         columns = [np.vstack([m[2], columns_of_motion(m[0], m[1], middle, half, usual)]) for m in motions]
-        rows = np.concatenate([smoothed_rows(t, x, band) for t, x in zip(trials, columns, strict=True)])
-        basis, sizes, _ = np.linalg.svd(rows / np.sqrt(np.mean(np.square(rows), axis=0)), full_matrices=False)
-        self.basis = basis[:, sizes > 1e-6 * sizes[0]]
+        self.rows = np.concatenate([smoothed_rows(t, x, band) for t, x in zip(trials, columns, strict=True)])
+
+    @cached_property
+    def basis(self) -> np.ndarray:
+        """Orthonormal columns of the motion at the rows, shape (m, columns); columns that are alike count once."""
+        sizes = np.sqrt(np.mean(np.square(self.rows), axis=0))
+        basis, values, _ = np.linalg.svd(self.rows / np.where(sizes > 0.0, sizes, 1.0), full_matrices=False)
+        return np.asarray(basis[:, values > ALIKE * values[0]])
 
     def left(self, stall: float, slope: float) -> float:
         """Return the share of the variance of the acting effort that the motion does not explain."""
