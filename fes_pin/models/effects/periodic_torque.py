@@ -1,6 +1,5 @@
 """A slow periodic external torque, as of breathing."""
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,7 +49,7 @@ class PeriodicTorque(Effect):
         """No size where a joint that is driven moves with the same period: any torque of such a motion has it too."""
         if not {"effort", "position"} <= {*measured} or _share(measured, self.frequency_hz) < SAME:
             return {}
-        return dict.fromkeys(self.amplitudes(), math.inf)
+        return {n: self.parameters()[n].upper for n in self.amplitudes()}
 
     def apply(self, value: Scalar, s: Signals) -> Scalar:
         phase = TURN * self.frequency_hz * s.time
