@@ -17,7 +17,7 @@ from fes_pin.diagnosis.verdict import RigState, RigVerdict
 from fes_pin.effort.search import NOT_CARRIED, has_efforts, searched
 from fes_pin.identify.likelihood_fit import LikelihoodFit, at_values, refit
 from fes_pin.infer.estimators import AnyState, Estimator
-from fes_pin.infer.scatter import as_wide_as_estimates_differ
+from fes_pin.infer.scatter import as_wide_as
 from fes_pin.infer.search import FITTED, Policy
 from fes_pin.infer.text import percent
 from fes_pin.infer.verdict import State
@@ -96,7 +96,7 @@ class ValuesByEffort(RigVerdict):
         self.refitted = Again(lambda fitted, trials: self.at_efforts(refit(fitted, trials)))
 
     def at_efforts(self, fitted: LikelihoodFit) -> LikelihoodFit:
-        """Return a fit at the values of inverse dynamics of its trials, with intervals that include its own ones.
+        """Return a fit at the values of inverse dynamics of its trials.
 
         A set with a cause that inverse dynamics does not know keeps its values.
         """
@@ -104,7 +104,14 @@ class ValuesByEffort(RigVerdict):
         if by_effort is None or not by_effort.knows(fitted.names):
             return fitted
         known = by_effort.values_in(fitted, [t.name for t in fitted.trials])
-        return as_wide_as_estimates_differ(at_values(fitted, known), fitted)
+        return at_values(fitted, known)
+
+    def with_intervals(self, fitted: LikelihoodFit) -> LikelihoodFit:
+        """See `RigVerdict.with_intervals`; as wide as those of inverse dynamics at least."""
+        by_effort, honest = self.models.by_effort, super().with_intervals(fitted)
+        if by_effort is None or not by_effort.knows(fitted.names):
+            return honest
+        return as_wide_as(honest, by_effort.final(by_effort.models.fitted_set(fitted.names)))
 
 
 def never_worse(state: RigState) -> tuple[RigState, list[str]]:

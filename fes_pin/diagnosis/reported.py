@@ -104,7 +104,8 @@ def _with_intervals(state: RigState, other: LikelihoodFit | None) -> LikelihoodF
         Fit by another estimator, which counts if it is of the same set; None without one.
     """
     again = [f.best for f in state.weighed.folds if f.within]
-    best = as_wide_as_trials_differ(with_honest_intervals(state.found.best), again)
+    assert isinstance(state.verdict, RigVerdict)
+    best = as_wide_as_trials_differ(state.verdict.with_intervals(state.found.best), again)
     if other is None or other.names != best.names:
         return best
     return as_wide_as_estimates_differ(best, with_honest_intervals(other))

@@ -47,10 +47,10 @@ NOT_TESTED = Remainder(False, math.nan, None)
 """The lack of fit of a model that was not fitted."""
 
 
-STARTED = ("coulomb_friction.creep_speed", "coulomb_friction.softness")
-"""Corners of friction of a simulation, which a regression of efforts does not have."""
-WAYS = {n: "coulomb_friction.presliding" for n in ("coulomb_friction.stretch", "coulomb_friction.presliding")}
-"""Ways over which friction builds up, in the catalogue's names and in those of a regression of efforts."""
+CORNERS = ("coulomb_friction.creep_speed", "coulomb_friction.softness")
+"""Corners of friction of a simulation, which have another meaning in a regression of efforts."""
+STRETCH, WAY = "coulomb_friction.stretch", "coulomb_friction.presliding"
+"""Way over which friction builds up, in a simulation and in a regression of efforts."""
 
 
 class LikelihoodValues(Protocol):
@@ -154,8 +154,9 @@ class FoundByEffort:
         """
         names, sets = [e.name for e in model.effects], self.models
         values = {f"{n}.{k}": v for n in names for k, v in sets.library[n].shapes[0].items()} | sets.values
-        values |= {k: v for k, v in model.parameters().items() if k not in STARTED}
-        values |= {to: model.parameters()[n] for n, to in WAYS.items() if model.parameters().get(n)}
+        known = model.parameters()
+        values |= {k: v for k, v in known.items() if k not in CORNERS}
+        values |= {WAY: known[STRETCH]} if known.get(STRETCH) else {}
         left, efforts = sets.problem(names, {}).residuals(values)[0], sets.rows.efforts(values)
         squares, spread = (sum(float(np.sum(one**2)) for one in many) for many in (left, efforts))
         return 100.0 * squares / max(spread, 1e-300)

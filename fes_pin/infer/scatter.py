@@ -49,6 +49,17 @@ def with_honest_intervals(fitted: F) -> F:
     return replace(fitted, covariance=widened(*_information_and_scores(fitted)))
 
 
+def as_wide_as(fitted: F, other: Optimum) -> F:
+    """Return the fit with intervals at least as wide as those of another estimate of the same parameters."""
+    known = dict(zip(other.free, np.diag(other.covariance), strict=True))
+    own = np.diag(fitted.covariance)
+    theirs = np.array([known.get(n, np.nan) for n in fitted.free])
+    with np.errstate(all="ignore"):
+        ratio = np.where(theirs > own, theirs / own, 1.0)
+    wider = np.sqrt(np.where(np.isfinite(ratio), ratio, 1.0))
+    return replace(fitted, covariance=fitted.covariance * np.outer(wider, wider))
+
+
 def as_wide_as_trials_differ(fitted: F, again: Sequence[Optimum]) -> F:
     """Return the fit with jackknife intervals of the parameters that differ more between trials than is expected.
 

@@ -9,7 +9,7 @@ of the motion. It is taken where it leaves far less of the effort unexplained th
 Source: Hughes and Drury, Electric Motors and Drives, 4th ed., 2013, chapter 3: torque and speed at a given voltage.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -18,6 +18,7 @@ from fes_pin.data.direction import ALIKE, FEWEST, band_hz, columns_of_motion, mo
 from fes_pin.data.plausibility import trials_named
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
+from fes_pin.models.goals import fitted_of
 from fes_pin.models.rigs.base import Rig
 from fes_pin.models.rigs.joint import Joint
 
@@ -35,25 +36,34 @@ FALLS = (0.0, 0.3, 0.6, 0.9)
 
 
 def with_limited_efforts(trials: Sequence[Trial], rig: Rig) -> tuple[tuple[Trial, ...], list[str]]:
-    """Return trials with the efforts that acted in the place of commands beyond a limit, and a warning about them."""
+    """Return trials with the efforts that acted in the place of commands beyond a limit, and a warning about them.
+
+    Trials that are held out have no part in the limit.
+    """
     driven = [t for t in trials if t.kind != IMPOSED and {"effort", "position"} <= {*t.columns} and len(t) >= FEWEST]
     driven = [t for t in driven if np.ptp(t["effort"]) > 0.0 and np.ptp(t["position"]) > 0.0]
-    if not isinstance(rig, Joint) or not np.isfinite(band := band_hz(driven)):
+    fitted = fitted_of(driven)
+    if not isinstance(rig, Joint) or not np.isfinite(band := band_hz(fitted)):
         return tuple(trials), []
-    commands = _Commands(driven, band)
+    commands = _Commands(fitted, band)
     if len(commands.rows) < FEWEST or (whole := commands.left(np.inf, 0.0)) < UNEXPLAINED:
         return tuple(trials), []
     stall, slope = commands.likeliest()
     share = commands.share(stall, slope)
     if not (commands.left(stall, slope) < LEFT * whole and FEW < share < MOST):
         return tuple(trials), []
-    pairs = zip(driven, commands.velocities, strict=True)
-    one_of = {id(t): t.with_columns(effort=limited(t["effort"], v, stall, slope)) for t, v in pairs}
-    names, units = trials_named([t.name for t in driven]), rig.units()
-    falls = f", less {slope:.2g} {units['effort']} s/{units['q']} times the speed of a joint that it drives on"
-    said = f"effort is a command beyond what the actuator gave in {names}: {100.0 * share:.2g} % of it is above "
-    said += f"{stall:.3g} {units['effort']}{falls}; the effort within this limit is taken"
-    return tuple(one_of.get(id(t), t) for t in trials), [said]
+    acting = {id(t): limited(t["effort"], moved(t, band)[1], stall, slope) for t in driven}
+    out = (t.with_columns(effort=acting[id(t)]) if id(t) in acting else t for t in trials)
+    return tuple(out), [_words(driven, rig.units(), share, stall, slope)]
+
+
+def _words(driven: Sequence[Trial], units: Mapping[str, str], share: float, stall: float, slope: float) -> str:
+    names, unit = trials_named([t.name for t in driven]), units["effort"]
+    limit = f"{stall:.3g} {unit}, less {slope:.2g} {unit} s/{units['q']} times the speed of a joint that it drives on"
+    beyond = (
+        f"effort is a command beyond what the actuator gave in {names}: {100.0 * share:.2g} % of it is above {limit}"
+    )
+    return f"{beyond}; the effort within this limit is taken"
 
 
 def limited(command: np.ndarray, velocity: np.ndarray, stall: float, slope: float) -> np.ndarray:

@@ -40,14 +40,19 @@ def check_no_goal(study: Study | ToPredict, rig: Rig) -> None:
 def with_efforts_of_goals(trials: Sequence[Trial], rig: Rig) -> tuple[tuple[Trial, ...], list[str]]:
     """Return trials with the effort of a controller in the place of its goal positions, and a warning about them.
 
-    The stiffness of the controller has the scale of the URDF's inertia and gravity. The damping that is fitted to such
-    efforts includes that of the controller.
+    The stiffness of the controller has the scale of the URDF's inertia and gravity. Trials that are held out have no
+    part in it. The damping that is fitted to such efforts includes that of the controller.
     """
     driven = _driven(trials)
-    if (stiffness := _stiffness(driven, rig)) is None:
+    if (stiffness := _stiffness(fitted_of(driven), rig)) is None:
         return tuple(trials), []
     one_of = {id(t): t.with_columns(effort=stiffness * (t["effort"] - t["position"])) for t in driven}
     return tuple(one_of.get(id(t), t) for t in trials), [f"effort {_words(driven, stiffness, rig, 'taken')}"]
+
+
+def fitted_of(trials: Sequence[Trial]) -> list[Trial]:
+    """Return the trials that are not held out; all, where each one is."""
+    return [t for t in trials if t.role != "held_out"] or [*trials]
 
 
 def _driven(trials: Sequence[Trial]) -> list[Trial]:
@@ -59,13 +64,10 @@ def _stiffness(driven: Sequence[Trial], rig: Rig) -> float | None:
 
 
 def _words(driven: Sequence[Trial], stiffness: float, rig: Rig, verb: str) -> str:
-    unit = "N m/rad" if rig.constants["revolute"] else "N/m"
-    looks = (
-        f"looks like a goal position in {trials_named([t.name for t in driven])}: the position follows it one to one"
-    )
-    return (
-        f"{looks}; {verb}: an effort of {stiffness:.2g} {unit} times (goal - position), if the URDF's inertia is right"
-    )
+    names, units = trials_named([t.name for t in driven]), rig.units()
+    looks = f"looks like a goal position in {names}: the position follows it one to one"
+    size = f"{stiffness:.2g} {units['effort']}/{units['q']}"
+    return f"{looks}; {verb}: an effort of {size} times (goal - position), if the URDF's inertia is right"
 
 
 def stiffness_of_goal(trials: Sequence[Trial], constants: Mapping[str, float]) -> float | None:

@@ -1,4 +1,6 @@
-"""Commands that an actuator clips: the limit is told from the data, and what is hidden is found behind it."""
+"""An actuator clips its commands: the limit is estimated from the data, and the hidden friction is found."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -58,3 +60,11 @@ def test_no_limit_is_seen_where_there_is_none(seed, tmp_path):
     studies = [study(tmp_path, [trial(seed), trial(seed + 50)]), study(tmp_path, [driven(seed, np.inf, 0.0)])]
     studies += [fp.read_study(draw_laboratory(("coulomb_friction",), 7300 + seed, tmp_path / "a").study)]
     assert not [w for one in studies for w in fp.check(one).odd if BEYOND in w]
+
+
+def test_trials_that_are_held_out_have_no_part_in_the_limit(tmp_path):
+    trials = [driven(10 * k, 2.5, 0.2) for k in range(3)]
+    held = study(tmp_path, [*trials[:2], replace(trials[2], role="held_out")])
+    both = (fp.check(one).odd for one in (held, study(tmp_path, trials[:2])))
+    limits = [line.split("above ")[1] for odd in both for line in odd if BEYOND in line]
+    assert len(limits) == 2 and limits[0] == limits[1]
