@@ -25,8 +25,8 @@ from fes_pin.models.rigs.joint import Joint
 UNEXPLAINED = 0.02
 """Least share of the variance of a command that the motion leaves unexplained, where a limit is looked for."""
 LEFT = 0.25
-"""Largest share of that which a limit may leave. Of 31 driven rigs without a limit 0.60 is the least, and of 5 with one
-0.012 the largest."""
+"""Largest share of that which a limit may leave. Of 31 driven rigs without a limit 0.60 is the least, and of rigs with
+one 0.02 the largest (`tests/effort/test_clipped.py`)."""
 FEW, MOST = 0.01, 0.8
 """Share of samples beyond a limit: fewer do not show one, and of more a command says little but its sign."""
 STALLS = tuple(0.2 + 0.06 * k for k in range(14))

@@ -9,6 +9,8 @@ from driven_rigs.laboratory import draw_laboratory
 from scipy.integrate import odeint
 
 import fes_pin as fp
+from fes_pin.data.direction import band_hz
+from fes_pin.models.clipped import LEFT, _Commands
 
 DT, SECONDS, FRICTION, STIFFNESS = 0.01, 8.0, 0.15, 20.0
 BEYOND = "a command beyond what the actuator gave"
@@ -68,3 +70,23 @@ def test_trials_that_are_held_out_have_no_part_in_the_limit(tmp_path):
     both = (fp.check(one).odd for one in (held, study(tmp_path, trials[:2])))
     limits = [line.split("above ")[1] for odd in both for line in odd if BEYOND in line]
     assert len(limits) == 2 and limits[0] == limits[1]
+
+
+def share_left(trials):
+    """Return what the likeliest limit leaves unexplained, as a share of what the whole command leaves; 1 of none."""
+    usable = [t for t in trials if np.ptp(t["effort"]) > 0.0]
+    commands = _Commands(usable, band_hz(usable))
+    return commands.left(*commands.likeliest()) / commands.left(np.inf, 0.0)
+
+
+@pytest.mark.parametrize(("stall", "slope"), [(2.5, 0.0), (2.5, 0.3), (3.5, 0.2)])
+def test_a_limit_leaves_a_hundredth(stall, slope):
+    assert share_left([driven(10 * k, stall, slope) for k in range(3)]) < 0.02
+
+
+@pytest.mark.shared
+def test_a_limit_explains_little_of_the_practice_loops_and_of_a_measured_servo(shared):
+    folders = [*sorted((shared / "practice_loops").glob("c*")), shared / "data" / "servo_pendulum"]
+    driven_by = {f.name: [t for t in fp.read_study(f).trials if "effort" in t.columns] for f in folders}
+    shares = {n: share_left(trials) for n, trials in driven_by.items() if np.isfinite(band_hz(trials))}
+    assert len(shares) > 25 and min(shares.values()) > 2.0 * LEFT
