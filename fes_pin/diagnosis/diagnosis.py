@@ -30,6 +30,7 @@ from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.diagnosis.testable import given_away
 from fes_pin.faults.misread import restated_trials
 from fes_pin.identify.feedback import is_answered
+from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.corrected import Correction
 from fes_pin.infer.held_out import FOLDS
 from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
@@ -124,9 +125,12 @@ class _Work:
     ----------
     tests
         The tests of faults of the record of the study that was searched last.
+    nominal
+        The fit of the nominal model to the trials as recorded, where there is one.
     """
 
     tests: list[Correction]
+    nominal: LikelihoodFit | None = None
 
     def __init__(
         self, catalogue: Catalogue, seed: int, tell: Progress, end: float, stops: list[float], thorough: bool = False
@@ -140,7 +144,9 @@ class _Work:
         driven = is_answered(nominal.rig, train)
         logged = driven and all(EFFORT in nominal.rig.input_columns(t) for t in study.trials)
         faults = LogFaults(study.trials, lambda trials: _searched(study, trials, driven), self.end)
-        answer = self._logged(study, Log(effort_noise=faults.of_nominal(nominal)) if logged else Log())
+        first = Log(effort_noise=faults.of_nominal(nominal)) if logged else Log()
+        self.nominal = faults.nominal
+        answer = self._logged(study, first)
         tests = list[Correction]()
         for estimate in ASKED_OF_EFFORTS if logged else ASKED_OF_READINGS:
             fault = None if self.stops else estimate(faults, answer)
@@ -173,6 +179,7 @@ class _Work:
                 own = (known, answered, self.seed, study.horizon_s, first_noise(trials, answered))
                 parts = trials if model.effects else in_parts(model.rig, trials, answered)
                 models = LikelihoodModels(model, parts, *own)
+                models.take_nominal(self.nominal)
                 ran.append(LikelihoodSearch(models, self.tell, begun_by_effort(models, trials, self.thorough)))
                 return ran[-1], ran[-1].run()
 

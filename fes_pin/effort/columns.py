@@ -189,15 +189,14 @@ def frame_vibration(track: Motion, x: Values, inertia: float) -> np.ndarray:
 
     where H' has omega and zeta divided by sqrt(1 + c).
     """
-    from scipy.signal import bilinear, lfilter  # noqa: PLC0415 - as above
+    from scipy.signal import lfilter  # noqa: PLC0415 - as above
 
     softer = math.sqrt(1.0 + x["coupling"])
-    omega = 2.0 * math.pi * x["frequency_hz"] / softer
-    omega = 2.0 / track.dt * math.tan(0.5 * omega * track.dt)  # the bilinear transform keeps this frequency
-    zeta = x["damping_ratio"] / softer
-    b, a = bilinear([1.0, 0.0, 0.0], [1.0, 2.0 * zeta * omega, omega**2], 1.0 / track.dt)
+    w = math.tan(math.pi * x["frequency_hz"] / softer * track.dt)  # s = (z - 1) / (z + 1) keeps this frequency
+    swing = 2.0 * x["damping_ratio"] / softer * w
+    below = np.array([1.0 + swing + w**2, 2.0 * w**2 - 2.0, 1.0 - swing + w**2])
     share = x["coupling"] / (1.0 + x["coupling"])
-    return -inertia * share * track.low(lfilter(b, a, track.a))
+    return -inertia * share * track.low(lfilter([1.0, -2.0, 1.0], below, track.a))
 
 
 def sensor_offset(track: Motion, x: Values, sizes: Sizes) -> np.ndarray:

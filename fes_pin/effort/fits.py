@@ -142,7 +142,7 @@ class EffortSets(FittedSets[EffortFit, Values]):
         Friction and drag bend a torque to opposite sides: one without the other leaves an error of form that scatters.
         """
         none = self.fits[()]
-        self.extend(())
+        self.extend((), FITTED)
         best = self.fits[self.ranked(1)[0]]
         if not self.noise_p_value(none.sse - best.sse, 1) < self.level(best) <= self.p_value(best, none):
             return ()

@@ -195,8 +195,11 @@ class Motion:
 
     def _at_rows(self, values: np.ndarray, weights: np.ndarray) -> np.ndarray:
         half = len(weights) // 2
-        windows = np.lib.stride_tricks.sliding_window_view(np.pad(values, half, mode="edge"), len(weights))
-        return np.asarray(windows[self.rows] @ weights)
+        first, last = half, len(values) - half
+        if len(self.rows) and not first <= self.rows[0] <= self.rows[-1] < last:
+            values, first = np.pad(values, half, mode="edge"), 0
+        windows = np.lib.stride_tricks.sliding_window_view(values, len(weights))
+        return np.asarray(windows[self.rows - first] @ weights)
 
     def reversing(self, fast: float) -> np.ndarray:
         """Return at which rows the joint reverses, shape (m,) of bool."""

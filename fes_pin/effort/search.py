@@ -26,7 +26,7 @@ from fes_pin.infer.held_out import Errors
 from fes_pin.infer.problem import normal_equations
 from fes_pin.infer.result import Cause, ParameterEstimate, Remainder
 from fes_pin.infer.scatter import as_wide_as_estimates_differ, as_wide_as_trials_differ, with_honest_intervals
-from fes_pin.infer.search import Search
+from fes_pin.infer.search import FITTED, Policy, Search
 from fes_pin.infer.verdict import share_in, word_of
 from fes_pin.models.effects import effect_named
 from fes_pin.models.model import Model
@@ -253,7 +253,7 @@ def searched(rig: Joint, trials: Sequence[Trial], seed: int = 0) -> FoundByEffor
     def sets_in(one: Band) -> EffortSets:
         return EffortSets(Rows(records, one, links), values, fitted, seed)
 
-    search: EffortSearch = Search(sets_in(band), lambda share, words: None)
+    search: EffortSearch = Search(sets_in(band), lambda share, words: None, Policy(fitted_first=FITTED))
     verdict = EffortVerdict(search)
     state = verdict.of(search.run())
     bands = [replace(band, low=r * band.low, wide=max(band.wide, r * band.low)) for r in OTHER_BANDS]

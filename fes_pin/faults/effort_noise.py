@@ -41,7 +41,14 @@ class EffortNoise:
         Preparation of trials before they are fitted.
     end
         Time at which searches stop, of `time.perf_counter`.
+
+    Attributes
+    ----------
+    nominal
+        The fit of the nominal model to the trials as recorded, once it was made.
     """
+
+    nominal: LikelihoodFit | None = None
 
     def __init__(self, trials: Sequence[Trial], prepared: Prepared, end: float) -> None:
         self.trials, self.prepared, self._end = tuple(trials), prepared, end
@@ -55,7 +62,8 @@ class EffortNoise:
         """Return the noise of recorded efforts under the nominal model, in their unit; 0 where it is not supported."""
 
         def certain() -> float:
-            noise, gain = self.of(LikelihoodFits(nominal, self.prepared(self.trials), ()).nominal())
+            self.nominal = LikelihoodFits(nominal, self.prepared(self.trials), ()).nominal()
+            noise, gain = self.of(self.nominal)
             return noise if gain > CERTAIN_GAIN else 0.0
 
         return self.in_time(certain, 0.0)

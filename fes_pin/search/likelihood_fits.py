@@ -148,6 +148,13 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         other._converged, other._begun, other._compared = set(), set(), {}
         return other
 
+    def take_nominal(self, fitted: LikelihoodFit | None) -> None:
+        """Begin with a fit where it is that of the nominal model to the same samples."""
+        if fitted is None or self.model.effects or fitted.model.rig.fitted != self.model.rig.fitted:
+            return
+        if fitted.trials == self.trials:
+            self.fits[()] = fitted
+
     def nominal(self) -> LikelihoodFit:
         """Fit the nominal model from several sizes of process noise; return the given fit where there is one."""
         if () in self.fits:
