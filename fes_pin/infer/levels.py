@@ -15,13 +15,13 @@ CLAIM_LEVEL = 0.01
 of a set, all tests of lack of fit. Theory: five rounds keep a diagnosis below `UNUSUAL_LEVEL` (Bonferroni)."""
 DRIVEN_LEVEL = 1e-3
 """Family-wise error where process noise acts: its spectrum is estimated, and the real one has another form.
-Simulation: `scripts/accuracy driven --nulls` prints the p-values of rigs in which nothing is hidden; the least of 54
+Simulation: `scripts/accuracy driven --hidden 0` prints the p-values of rigs in which nothing is hidden; the least of 54
 was 0.002."""
 CERTAIN_LEVEL = 1e-6
 """Level at which an effect is certain, even if its cause is not. Theory: a test that is repeated 10 000 times, in each
 study of a cohort, still alarms in less than `CLAIM_LEVEL` of all."""
 WALK_LEVEL = 1e-4
-"""Family-wise error of a cause of a walk against the simulated null. Simulation: `scripts/accuracy walking --nulls`
+"""Family-wise error of a cause of a walk against the simulated null. Simulation: `scripts/accuracy walking --hidden 0`
 counts alarms where soft tissue follows other laws than in the null; these are more."""
 CONFIDENCE_95 = normal_quantile(1.0 - 0.5 * UNUSUAL_LEVEL)
 """Half a 95 % interval of a normal variable, in standard deviations. Theory."""

@@ -20,9 +20,9 @@ from harness.run import EFFORT, REGRESSION, TEN_LINES, rows_of, run
 from harness.table import HEAD, against, counts, families, lines_of, never_worse, notes, table, totals, worse, wrong
 
 
-def planned(name: str, count: int, seed: int, nulls: bool, only: list[str]) -> list[Item]:
+def planned(name: str, count: int, seed: int, hidden: int | None, only: list[str]) -> list[Item]:
     """The studies that are asked for."""
-    items = (item for item in generator_of(name).plan(seed) if not (nulls and item.hidden))
+    items = (item for item in generator_of(name).plan(seed) if hidden in (None, len(item.hidden)))
     return [item for item in islice(items, count) if not only or item.key in only]
 
 
@@ -39,7 +39,7 @@ def main(
     ],
     count: Annotated[int, typer.Option(help="Studies of each generator.")] = 40,
     seed: Annotated[int, typer.Option(help="Of the first; each next one has the next seed.")] = 0,
-    nulls: Annotated[bool, typer.Option("--nulls", help="Only studies that hide nothing.")] = False,
+    hidden: Annotated[int | None, typer.Option(min=0, help="Only studies that hide so many causes.")] = None,
     only: Annotated[list[str] | None, typer.Option(help="Of these, the one of this key; may be repeated.")] = None,
     workers: Annotated[int, typer.Option(help="Processes.")] = os.cpu_count() or 1,
     store: Annotated[Path | None, typer.Option(help="Folder of answers, with which a run goes on.")] = None,
@@ -74,7 +74,7 @@ def main(
             answers = varied.run(name, plan, place, workers, limit, stored)
             typer.echo(f"\n{name}\n\n{varied.shown(name, plan, answers)}")
             continue
-        items = planned(name, count, seed, nulls, only or [])
+        items = planned(name, count, seed, hidden, only or [])
         by = EFFORT if by_effort else REGRESSION * regression
         label = Path(name).name + f", {by}" * bool(by) + ", withheld" * withholds
         file = store / f"{label}.jsonl" if store else None
@@ -104,7 +104,7 @@ def main(
                 raise typer.BadParameter(f"{label}: {len(rows)} of {len(items)} studies have an answer in the store")
             command = (
                 f"scripts/accuracy {name} --count {count} --seed {seed}"
-                + " --nulls" * nulls
+                + (f" --hidden {hidden}" if hidden is not None else "")
                 + " --regression" * regression
             )
             page.write(label, command, rows)

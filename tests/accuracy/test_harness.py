@@ -263,7 +263,7 @@ def test_the_command_line_says_what_it_does_not_know_and_reads_a_store(fake, tmp
     asked = [str(tmp_path / "mine"), "--store", str(tmp_path / "now"), "--workers", "1"]
     first = command.invoke(app, asked)
     assert first.exit_code == 0 and "| one | 1 of 1" in first.output and Fake.made == 2
-    again = command.invoke(app, [*asked, "--stored", "--compare", str(tmp_path / "now"), "--nulls"])
+    again = command.invoke(app, [*asked, "--stored", "--compare", str(tmp_path / "now"), "--hidden", "0"])
     assert again.exit_code == 0 and Fake.made == 2
     assert "1 of 1 studies were answered by both" in again.output and "b: nothing -> causes_found" in again.output
     assert command.invoke(app, [*asked, "--check"]).output.endswith("no worse than docs/accuracy.md\n")
