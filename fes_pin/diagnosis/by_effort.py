@@ -18,7 +18,7 @@ from fes_pin.effort.search import NOT_CARRIED, has_efforts, searched
 from fes_pin.identify.likelihood_fit import LikelihoodFit, at_values, refit
 from fes_pin.infer.estimators import AnyState, Estimator
 from fes_pin.infer.scatter import as_wide_as
-from fes_pin.infer.search import FITTED, Policy
+from fes_pin.infer.search import BEAM, FITTED, Policy
 from fes_pin.infer.text import percent
 from fes_pin.infer.verdict import State
 from fes_pin.models.rigs.joint import Joint
@@ -43,7 +43,7 @@ def begun_by_effort(models: LikelihoodModels, trials: Sequence[Trial], thorough:
     if thorough:
         return Policy()
     models.proposed = models.by_effort.model()
-    return Policy(fitted_first=FITTED)
+    return Policy(fitted=BEAM, fitted_first=FITTED)
 
 
 class VerdictByEffort(RigVerdict):

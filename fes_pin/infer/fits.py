@@ -275,7 +275,11 @@ class FittedSets(Sets[F], Generic[F, S]):
         A fitted set is started again where candidates of the base have another form than in that set.
         """
         fitted = self.fits[base]
-        known, forms = self.candidates(fitted), self.form_of(fitted)
+        forms = self.form_of(fitted)
+        if (extended := (base, (forms, most))) in self._begun:
+            return
+        self._begun.add(extended)
+        known = self.candidates(fitted)
         chosen = sorted(known, key=lambda n: (-known[n].gain, n))[:most]
         starts = {tuple(sorted((*base, n))): known[n].start for n in chosen}
         wanted = {k: s for k, s in starts.items() if self.is_within(k)}

@@ -12,10 +12,11 @@ from fes_pin.identify.likelihood import LikelihoodProblem, is_simulated
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.problem import answered_columns, measured_columns
 from fes_pin.infer.problem import Unknowns, completed
+from fes_pin.infer.scoring import LITTLE
 from fes_pin.models.catalogue import installed
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import StateSpaceNoise
-from fes_pin.models.stage import Effect
+from fes_pin.models.stage import Effect, Stage
 from fes_pin.search.score import Scores, score_test
 from fes_pin.search.starts import near_null
 from fes_pin.workers import in_parallel
@@ -42,7 +43,7 @@ class Library:
         self.effects = tuple(installed().effects_for(model.rig) if effects is None else effects)
         self.model, self.trials = model, tuple(trials)
         self.measured = (answered_columns if answered else measured_columns)(model, trials)
-        self._scores: dict[int, tuple[LikelihoodFit, Scores]] = {}
+        self._scores: list[tuple[LikelihoodFit, Scores]] = []
         self._probing: dict[tuple, LikelihoodProblem] = {}
 
     def grid(self, effect: type[Effect]) -> list[Effect]:
@@ -66,13 +67,18 @@ class Library:
         return [i for i, t in enumerate(self.trials) if effect.signal in rig.changeable(t.kind, rig.input_columns(t))]
 
     def scores(self, base: LikelihoodFit) -> Scores:
-        """Return score tests of every effect that a fit does not have, at its noise; none in a fit that diverges."""
-        if id(base) not in self._scores:
+        """Return score tests of every effect that a fit does not have, at its noise; none in a fit that diverges.
+
+        A fit that is as likely as one before, in the same form, has its scores.
+        """
+        known = next((scores for one, scores in self._scores if is_as_likely(base, one)), None)
+        if known is None:
             finite = math.isfinite(base.sse)
             wanted = [e for e in self.effects if finite and e.name not in base.names and self.felt(e)]
             groups = in_parallel(lambda e: self._probes(e, base), wanted)
-            self._scores[id(base)] = base, score_test(base.parts, [p for g in groups for p in g])
-        return self._scores[id(base)][1]
+            known = score_test(base.parts, [p for g in groups for p in g])
+            self._scores.append((base, known))
+        return known
 
     def _probes(self, effect: type[Effect], base: LikelihoodFit) -> list[tuple[Effect, np.ndarray]]:
         """Return the effect with every choice of its shapes, linearized at the nominal parameters of a fit."""
@@ -87,7 +93,8 @@ class Library:
         Causes of the model are left out, except those of `screened_with`: the predictor follows the readings with or
         without them.
         """
-        extended = Model(model.rig, tuple(e for e in model.effects if e.is_fault or e.name in one.screened_with)) + one
+        kept = tuple(e for e in model.effects if one.stage is Stage.SENSOR or e.is_fault or e.name in one.screened_with)
+        extended = Model(model.rig, kept) + one
         key = (*extended.structure(), *extended.unused_parameters().items(), is_simulated(noise, self.trials))
         if key not in self._probing:  # its columns are those of a fit, which shares the program
             self._probing[key] = LikelihoodProblem(extended, self.trials, noise)
@@ -96,3 +103,10 @@ class Library:
         problem.noise = noise
         parts = problem.linearize(extended.parameters(), completed(problem.start_unknowns(), unknowns))
         return [p.jacobian[:, places] for p in parts]
+
+
+def is_as_likely(one: LikelihoodFit, other: LikelihoodFit) -> bool:
+    """Return whether two fits of the same data in the same form differ by less than any test sees."""
+    forms = [(f.names, f.free, f.noise.correlation_s, [*f.noise.time], f.noise.timed) for f in (one, other)]
+    near = abs(one.sse - other.sse) < LITTLE and forms[0] == forms[1]
+    return one is other or (near and one.trials == other.trials)
