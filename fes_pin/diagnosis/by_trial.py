@@ -36,6 +36,7 @@ from fes_pin.models.predictor import StateSpaceNoise
 from fes_pin.models.stage import Effect, Stage
 from fes_pin.search.library import Library
 from fes_pin.search.likelihood_maxima import look
+from fes_pin.search.starts import STARTED
 from fes_pin.workers import attempted
 
 Ran = tuple[LikelihoodSearch, Found, Made | None]
@@ -164,20 +165,24 @@ def _begun(ran: Ran, kind: type[Effect]) -> Model:
 def _likeliest(ran: Ran, kinds: Sequence[type[Effect]]) -> type[Effect] | None:
     """Return the kind that lowers the criterion of the best set most, further or in the place of a cause, if any.
 
-    Of kinds that are not distinguished, as where the effort itself is read, it is the first on the signal path.
+    Of kinds that are not distinguished, as where the effort itself is read, it is the first on the signal path. A kind
+    is fitted further only if its first fit, at the noise of the base, gains half of what is required.
     """
     search, found, again = ran
     if search.was_stopped or again is not None:
         return None
-    lowest = dict.fromkeys(kinds, found.best.criterion - SEPARABLE)
+    wanted = found.best.criterion - SEPARABLE
+    lowest = dict.fromkeys(kinds, wanted)
     for base in {f.names: f for f in (found.best, *found.without.values(), found.nominal)}.values():
         for kind in kinds:
             bare = base.model - kind if kind.name in base.names else base.model
-            one = maximum_from(look(bare + kind.of_each_trial(), base), base.trials)
-            lowest[kind] = min(lowest[kind], one.criterion)
+            first = look(bare + kind.of_each_trial(), base)
+            penalty = first.criterion - first.sse
+            if base.sse - first.sse > STARTED * (base.sse + penalty - wanted):
+                lowest[kind] = min(lowest[kind], maximum_from(first, base.trials).criterion)
     best = min(lowest.values(), default=np.inf)
     near = [k for k in kinds if lowest[k] < best + SEPARABLE]
-    return near[0] if best < found.best.criterion - SEPARABLE else None
+    return near[0] if best < wanted else None
 
 
 def _is_scatter(best: LikelihoodFit, effect: Effect) -> bool:

@@ -25,10 +25,10 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from driven_rigs.draw import Base, urdf
 from driven_rigs.laboratory import MOTIONS
+from harness.effort_alone import search_effort
 from harness.never_worse import model_of
 
 import fes_pin as fp
-from fes_pin.effort.search import search_effort
 
 MASS, DAMPING, FRICTION, OFFSET = 95.0, 203.5, 20.4, 3.2
 """kg, N s/m, N, N: the slide feels the recorded effort and the offset."""

@@ -31,7 +31,7 @@ REGRESSION, TEN_LINES, EFFORT = "regression", "ten lines", "effort"
 ESTIMATORS = {
     REGRESSION: ("harness.regression", "regressed"),
     TEN_LINES: ("harness.ten_lines", "solved"),
-    EFFORT: ("fes_pin.effort.search", "search_effort"),
+    EFFORT: ("harness.effort_alone", "search_effort"),
 }
 """What answers instead of a diagnosis: the module that holds it, which is imported where it answers, and its name."""
 GRACE = 3.0

@@ -5,6 +5,7 @@ from contextlib import nullcontext
 import numpy as np
 import pytest
 from bench import DAMPING, INERTIA, WEIGHT, study, trial
+from harness.effort_alone import search_effort
 
 import fes_pin as fp
 from fes_pin.effort import search
@@ -38,9 +39,9 @@ def fast_loop(seed, rate, log, friction=0.05):
 def answers(trials, folder, monkeypatch):
     """The parameters of the extended model, and those with commands that are held for a row."""
     made = study(folder, trials)
-    timed = search.search_effort(made).extended
+    timed = search_effort(made).extended
     monkeypatch.setattr(search, "timed", lambda fitted, every: nullcontext(fitted))
-    return timed, search.search_effort(made).extended
+    return timed, search_effort(made).extended
 
 
 @pytest.mark.parametrize(("rate", "log"), [(200, 50), (1000, 50)])

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 from bench import DAMPING, study, trial
+from harness.effort_alone import NO_EFFORT, REJECTED, search_effort
 
 from fes_pin.data.errors import InputError
 from fes_pin.effort.columns import presliding
 from fes_pin.effort.motion import Band, Motion, Record, band_of, deviation_of, kernel
-from fes_pin.effort.search import NO_EFFORT, REJECTED, search_effort
 
 
 def inside(estimate, true):
