@@ -223,7 +223,8 @@ def _final(verdict: EffortVerdict, fitted: EffortFit, others: Sequence[EffortSet
         again.append(sets.final(fitted, moving))
     for other in again:
         wide = as_wide_as_estimates_differ(wide, with_honest_intervals(other))
-    return _with_noisy_regressor(wide, sets.rows)
+    bias = attenuation(wide, sets.rows)
+    return replace(wide, covariance=wide.covariance + np.outer(bias, bias))
 
 
 def near_to(some: np.ndarray) -> np.ndarray:
@@ -231,20 +232,20 @@ def near_to(some: np.ndarray) -> np.ndarray:
     return np.convolve(some, np.ones(3, bool), mode="same")
 
 
-def _with_noisy_regressor(fitted: EffortFit, rows: Rows) -> EffortFit:
-    """Return a fit with intervals that include the attenuation by the noise of the acceleration.
+def attenuation(fitted: EffortFit, rows: Rows) -> np.ndarray:
+    """Return what noise of the acceleration takes from each fitted parameter, shape (p,); instruments would return it.
 
     With C the covariance of a right model and n rows, noise of variance s^2 in the column of a parameter J moves the
-    estimate by C_J n s^2 J / variance (Fuller, Measurement Error Models, 1987).
+    estimate by C_J n s^2 J / variance (Fuller, Measurement Error Models, 1987). The band keeps it small
+    (`NOISE_SHARE`), so that no instrumental variables are needed.
     """
     name = "inertia_scale"
     if name not in fitted.free:
-        return fitted
+        return np.zeros(len(fitted.free))
     system = normal_equations(fitted.parts)
     known = covariance_of(system.hessian, np.isin(fitted.free, fitted.at_bound, invert=True))[:, fitted.place(name)]
     power = rows.links.inertia**2 * noise_of_bend(rows.band) / fitted.variances[0]
-    bias = np.where(np.isfinite(known), known, 0.0) * fitted.samples * power * fitted.values[name]
-    return replace(fitted, covariance=fitted.covariance + np.outer(bias, bias))
+    return np.where(np.isfinite(known), known, 0.0) * fitted.samples * power * fitted.values[name]
 
 
 def _moves(final: EffortFit, fitted: EffortFit, others: Sequence[EffortSets]) -> bool:
