@@ -8,7 +8,7 @@ from typing import Any
 from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.show import DataFrame, by_columns, frame, table_html
 from fes_pin.data.study import Study
-from fes_pin.diagnosis.diagnosis import few_trials
+from fes_pin.diagnosis.diagnosis import extrapolated, few_trials
 from fes_pin.diagnosis.testable import Testable, testable_causes
 from fes_pin.infer.result import shown
 from fes_pin.models.catalogue import Source, catalogue_of
@@ -91,9 +91,10 @@ def check_rig(study: Study, *, library: Source | Sequence[Source] | None = None)
     clean, odd = odd_numbers(study)
     found = testable_causes(clean, catalogue_of(library))
     given_away = () if isinstance(found, str) else found.warnings
-    count = len(split(clean)[0])
+    train, test = split(clean)
+    count = len(train)
     alone = ["one trial: nothing can be held out, and no other trial can confirm a cause"] * (count == 1)
-    return Checked(study, (*odd, *given_away), (*few_trials(count), *alone), found)
+    return Checked(study, (*odd, *given_away), (*few_trials(count), *alone, *extrapolated(train, test)), found)
 
 
 def odd_numbers(study: Study) -> tuple[Study, list[str]]:

@@ -33,6 +33,7 @@ from fes_pin.identify.feedback import is_answered
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.corrected import Correction
 from fes_pin.infer.held_out import FOLDS
+from fes_pin.infer.text import listed
 from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
@@ -102,7 +103,8 @@ def diagnose_joint(
         diagnosis = work.diagnosis_of_log(measured.study)
     tell(1.0, "done")
     warnings += diagnosis.warnings
-    warnings += few_trials(len(split(measured.study)[0])) if diagnosis.causes else []
+    train, test = split(measured.study)
+    warnings += [*(few_trials(len(train)) if diagnosis.causes else []), *extrapolated(train, test)]
     found = replace(diagnosis, left_out=measured.left_out, warnings=tuple(warnings), catalogue=catalogue)
     return found.ended(began, made, limit if stops else None)
 
@@ -224,3 +226,10 @@ def few_trials(count: int) -> list[str]:
     """Return a warning that the names rest on few trials; none if there are many."""
     few = f"the names rest on {count} trial{'s' if count > 1 else ''}, fewer than {FOLDS}: more may change them"
     return [few] * (count < FOLDS)
+
+
+def extrapolated(train: Sequence[Trial], test: Sequence[Trial]) -> list[str]:
+    """Return a warning for each kind of held-out trial that no fitted trial has."""
+    new = dict.fromkeys(t.kind for t in test if t.kind not in {one.kind for one in train})
+    names = {kind: listed([t.name for t in test if t.kind == kind]) for kind in new}
+    return [f"no fitted trial is of kind {kind}: errors of {names[kind]} are of an extrapolation" for kind in new]

@@ -6,7 +6,8 @@ import numpy as np
 from diagnosis.hidden import study_of
 
 from fes_pin.data.study import read_study
-from fes_pin.diagnosis.diagnosis import diagnose_joint
+from fes_pin.diagnosis.checked import check_rig
+from fes_pin.diagnosis.diagnosis import diagnose_joint, extrapolated
 from fes_pin.diagnosis.likelihood_models import LikelihoodModels
 from fes_pin.diagnosis.rejected import no_noise
 from fes_pin.models.least_squares import least_squares
@@ -32,6 +33,25 @@ def test_a_missing_input_does_not_end_as_noise():
     for trials, expected in ((study.trials, False), (lost, True)):
         reason = no_noise(LikelihoodModels(nominal_model(study), trials, (), False, noise=MEASUREMENT).nominal())
         assert (reason is not None and "is no measurement noise" in reason) == expected
+
+
+def test_a_held_out_trial_of_another_kind_is_an_extrapolation():
+    """Its error is that of a model where no trial was fitted; a motion next to fitted motions is none."""
+    trials = study_of("ankle", n_motion=2, n_isometric=1, duration_s=1.0).trials
+    motions, still = [t for t in trials if t.kind == "motion"], [t for t in trials if t.kind != "motion"]
+    said = [f"no fitted trial is of kind isometric: errors of {still[0].name} are of an extrapolation"]
+    assert (extrapolated(motions, still), extrapolated(motions[:1], motions[1:]), extrapolated(trials, [])) == (
+        said,
+        [],
+        [],
+    )
+
+
+def test_a_check_says_that_a_held_out_trial_is_an_extrapolation():
+    study = study_of("ankle", n_motion=2, n_isometric=1, duration_s=1.0)
+    held = [replace(t, role="fit" if t.kind == "motion" else "held_out") for t in study.trials]
+    limits = check_rig(replace(study, trials=tuple(held))).limits
+    assert any("are of an extrapolation" in one for one in limits)
 
 
 def test_the_headline_says_how_much_is_explained():
