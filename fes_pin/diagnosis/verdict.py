@@ -49,6 +49,8 @@ from fes_pin.remainder.lack_of_fit import lack_of_fit
 
 WORSE = 2.0
 """Ratio of errors of free simulations from which a cause is refuted: those of two right models differ by less."""
+LATER_S = 1.0
+"""Later horizon by which two estimators are compared, s: a slow cause, as a spring, shows there."""
 EFFORT = "the low-passed effort"
 """What inverse dynamics predicts."""
 
@@ -169,13 +171,24 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
         return self.models.alike(found, name)
 
     @property
+    def ahead(self) -> dict[str, float | None]:
+        """Horizons, s, of the errors of motion by currency; None of free simulations.
+
+        Of a joint whose effort was recorded there is a later horizon too, where trials are that long.
+        """
+        if (near := self.models.judged_s) is None:
+            return {FREE: None}
+        shortest = min(t.duration for t in self.models.trials)
+        later = self.models.by_effort is not None and near < LATER_S < shortest
+        return {f"predictions {s:g} s ahead": s for s in (near, *(LATER_S,) * later)}
+
+    @property
     def currencies(self) -> tuple[str, ...]:
         """Predictions over the horizon of a rig in closed loop or of imposed motion, else free simulations.
 
         Where the effort of a joint was recorded, the low-passed effort that its motion takes as well.
         """
-        motion = FREE if (ahead_s := self.models.judged_s) is None else f"predictions {ahead_s:g} s ahead"
-        return (motion, EFFORT) if self.models.by_effort is not None else (motion,)
+        return (*self.ahead, EFFORT) if self.models.by_effort is not None else (*self.ahead,)
 
     def errors_in(self, state: RigState, currency: str, unit: State[Any, Any, Any]) -> Errors | None:
         """Return cross-validated errors of a set on the fitted trials; of a single trial, those of the fit itself.
@@ -190,7 +203,7 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
         if [[*f.out] for f in folds] != held:
             folds = make_folds(replace(state.found, nominal=best, without={}), train, (), self.refitted, held)
         pairs = [(f.chosen or f.best, floor, f.test) for f in folds]
-        return squared_errors(pairs or [(best, floor, train)], self.models.judged_s)
+        return squared_errors(pairs or [(best, floor, train)], self.ahead[currency])
 
     def chosen(self, state: RigState) -> list[LikelihoodFit]:
         """Return for each fold the fit to all trials of the set that is chosen without its own; none without folds."""
