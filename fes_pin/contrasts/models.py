@@ -36,7 +36,7 @@ FITTED, FITTED_DRIVEN, CONVERGED = 10, 6, 3
 """Items of largest score that are fitted with a set, as on driven rigs a fit takes some five times as long; and sets of
 a size that are fitted until they converge."""
 
-POLICY = Policy(fitted=None)
+POLICY = Policy(fitted=None, rivals=None)
 """`candidates` are those of largest score."""
 
 Found = SearchResult[Grouped]

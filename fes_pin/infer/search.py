@@ -35,6 +35,8 @@ class Policy:
         Number of candidates of largest score that are fitted together with a set; None for all.
     fitted_first
         The same together with the nominal model.
+    rivals
+        The same in the place of each candidate of the best set.
     given
         A set that is judged without a search and without further rivals; None for a search.
     """
@@ -42,6 +44,7 @@ class Policy:
     beam: int = BEAM
     fitted: int | None = FITTED
     fitted_first: int | None = None
+    rivals: int | None = FITTED
     given: Names | None = None
 
 
@@ -261,7 +264,7 @@ class Search(Generic[F, M]):
         for name in filter(self.sets.is_claimed, names):
             rest = tuple(n for n in names if n != name)
             self.sets.without(names, name)
-            self.sets.extend(rest, self._most_with(rest))
+            self.sets.extend(rest, self.policy.rivals if rest else self.policy.fitted_first)
             self.sets.converge_rivals(names, name)
         return next(n for n in self.sets.ranked(len(names)) if n == names or self._may_be(n, rejected))
 

@@ -73,7 +73,7 @@ def _without_a_cause(designs: Designs, variance: np.ndarray) -> np.ndarray:
     return drawn + always.reshape(drawn.shape)
 
 
-POLICY = Policy(beam=4, fitted=None)
+POLICY = Policy(beam=4, fitted=None, rivals=None)
 """Every form is fitted, so that no score test is needed."""
 MOST_FOR_NOISE = 2
 """Most causes in the set from whose residual the noise is estimated."""

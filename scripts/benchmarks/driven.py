@@ -18,7 +18,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from harness.driven import Driven
+from harness.generators import generator_of
 
 import fes_pin as fp
 from fes_pin.diagnosis import diagnosis
@@ -37,8 +37,8 @@ Rows = list[tuple[str, float, float | None, str]]
 def run() -> Rows:
     """Rows of (name, measured, target, unit); each study is diagnosed twice, and the second time counts."""
     with tempfile.TemporaryDirectory(prefix="driven") as folder:
-        many = [(name, one) for name in GENERATORS for one in islice(Driven(name).plan(SEED), COUNT)]
-        studies = [(one.hidden, Driven(name).make(one, _within(Path(folder), one.key))[0]) for name, one in many]
+        many = [(name, one) for name in GENERATORS for one in islice(generator_of(name).plan(SEED), COUNT)]
+        studies = [(one.hidden, generator_of(name).make(one, _within(Path(folder), one.key))[0]) for name, one in many]
         taken = np.array([_times(study, hidden) for hidden, study in studies])
     whole, effort, known = taken.T
     return [
