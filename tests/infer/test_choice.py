@@ -123,7 +123,9 @@ class ByAbsoluteErrors(Estimator):
 
     def state(self, first):
         self.asked += 1
-        search = Search(LeastAbsolute(self.columns, self.runs), lambda share, words: None, Policy(fitted=None, rivals=None))
+        search = Search(
+            LeastAbsolute(self.columns, self.runs), lambda share, words: None, Policy(fitted=None, rivals=None)
+        )
         return ByErrors(search).of(search.run(), replaced=first)
 
 
