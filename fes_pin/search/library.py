@@ -90,8 +90,8 @@ class Library:
     ) -> Sequence[np.ndarray]:
         """Return the whitened sensitivities of each trial to the amplitudes of a cause, shape (m, amplitudes).
 
-        Causes of the model are left out, except those of `screened_with`: the predictor follows the readings with or
-        without them.
+        Other causes of the model are left out, except those of `screened_with`: the predictor follows the readings with
+        or without them. A cause of the reading has them all, as their torques change with the reading.
         """
         kept = tuple(e for e in model.effects if one.stage is Stage.SENSOR or e.is_fault or e.name in one.screened_with)
         extended = Model(model.rig, kept) + one
@@ -107,6 +107,9 @@ class Library:
 
 def is_as_likely(one: LikelihoodFit, other: LikelihoodFit) -> bool:
     """Return whether two fits of the same data in the same form differ by less than any test sees."""
+    if one is other:
+        return True
     forms = [(f.names, f.free, f.noise.correlation_s, [*f.noise.time], f.noise.timed) for f in (one, other)]
-    near = abs(one.sse - other.sse) < LITTLE and forms[0] == forms[1]
-    return one is other or (near and one.trials == other.trials)
+    orders = [{n: len(a) for n, a in f.noise.ar.items()} for f in (one, other)]
+    near = abs(one.sse - other.sse) < LITTLE and forms[0] == forms[1] and orders[0] == orders[1]
+    return near and one.trials == other.trials

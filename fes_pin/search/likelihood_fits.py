@@ -149,7 +149,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         return other
 
     def take_nominal(self, fitted: LikelihoodFit | None) -> None:
-        """Begin with a fit where it is that of the nominal model to the same samples."""
+        """Begin with a fit, where it is that of the nominal model to the same samples, with process noise."""
         if fitted is None or self.model.effects or fitted.model.rig.fitted != self.model.rig.fitted:
             return
         if fitted.trials == self.trials:

@@ -1,4 +1,4 @@
-"""The answer of inverse dynamics alone, `fes_pin.effort`, beside the package: `scripts/accuracy driven --effort`."""
+"""The answer to a study by inverse dynamics alone, without the likelihood: `scripts/accuracy driven --effort`."""
 
 from __future__ import annotations
 
