@@ -5,9 +5,9 @@ same units, in each currency that both have: what is predicted, as free motion.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -80,6 +80,12 @@ class Compared:
         """Whether the first does."""
         return self.loss.low > NOTHING_PERCENT
 
+    @classmethod
+    def of(cls, currency: str, before: Errors, after: Errors, seed: int) -> Self:
+        """Compare errors of the same data, of which none is taken for noise."""
+        gains = (held_out_gain(a, a, _without_noise(b), seed) for a, b in ((before, after), (after, before)))
+        return cls(currency, before, after, *gains)
+
     def __str__(self) -> str:
         errors = f"{percent(self.before.error_percent())} -> {percent(self.after.error_percent())}"
         return f"E of {self.currency} {errors}, gain {self.gain}"
@@ -98,13 +104,14 @@ def choose(first: AnyState, others: Sequence[Estimator], seed: int = 0) -> AnySt
         other = estimator.state(first)
         if other is None:
             continue
-        compared = _compared(first, other, seed)
+        both = [one for one in first.verdict.currencies if one in other.verdict.currencies]
+        found = compared(first, other, both, seed)
         same = other.names == first.names
-        better = any(c.is_better and all(_agree(c, o, same) for o in compared if o is not c) for c in compared)
+        better = any(c.is_better and all(_agree(c, o, same) for o in found if o is not c) for c in found)
         smaller = estimator.prefers_smaller and len(other.names) < len(first.names)
-        if better or (smaller and compared and not any(c.is_worse for c in compared)):
+        if better or (smaller and found and not any(c.is_worse for c in found)):
             said = "predicts better" if better else "predicts as well with fewer causes"
-            words = f"{estimator.words(other)} {said}: {'; '.join(map(str, compared))}"
+            words = f"{estimator.words(other)} {said}: {'; '.join(map(str, found))}"
             return replace(other, steps=(*first.steps, *other.steps, Step(CHOICE, words=words)))
     return first
 
@@ -114,14 +121,13 @@ def _agree(better: Compared, other: Compared, same: bool) -> bool:
     return not other.is_worse if same or better.is_whole else other.is_felt
 
 
-def _compared(first: AnyState, other: AnyState, seed: int) -> list[Compared]:
-    """Return the comparison of two states in each currency that both have."""
+def compared(first: AnyState, other: AnyState, currencies: Iterable[str], seed: int) -> list[Compared]:
+    """Return the comparison of two states in each currency in which both have errors."""
     out = []
-    for currency in (one for one in first.verdict.currencies if one in other.verdict.currencies):
+    for currency in currencies:
         before, after = (one.verdict.errors_in(one, currency, first) for one in (first, other))
         if before is not None and after is not None:
-            gains = (held_out_gain(a, a, _without_noise(b), seed) for a, b in ((before, after), (after, before)))
-            out.append(Compared(currency, before, after, *gains))
+            out.append(Compared.of(currency, before, after, seed))
     return out
 
 

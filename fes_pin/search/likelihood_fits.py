@@ -466,17 +466,22 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         return in_parallel(lambda f: at_noise(f, other.noise), fits)
 
     def converge_rivals(self, names: Names, name: str) -> None:
-        """Converge the rivals of a candidate; where a set without it is far from the data, they begin at its place.
+        """Converge the rivals of a candidate; those in another form of the other causes also begin at its place.
 
-        First fits of rivals extend the set without the candidate. From far off they may end elsewhere.
+        First fits of rivals extend the set without the candidate. From far off, or in another form, they may end
+        elsewhere.
         """
         whole, rest = self.fits[names], tuple(n for n in names if n != name)
+        less_one = Model(whole.model.rig, tuple(e for e in whole.model.effects if e.name != name))
+        is_far = self.is_far(self.fits[rest]) and not self.is_far(whole)
+        same = frozenset(one for one in self.form_of(whole) if one[0] != name)
         others = [k for k in self.fits if len(k) == len(names) and set(rest) < set(k) and k != names]
-        if self.is_far(self.fits[rest]) and not self.is_far(whole):
-            less_one = Model(whole.model.rig, tuple(e for e in whole.model.effects if e.name != name))
-            own = [next(e for e in self.fits[k].model.effects if e.name in {*k} - {*rest}) for k in others]
-            looks = in_parallel(lambda e: look(less_one + at_null(e), whole), own)
-            self.fits |= {k: f for k, f in zip(others, looks, strict=True) if f.criterion < self.fits[k].criterion}
+        others = [k for k in others if is_far or not same <= self.form_of(self.fits[k])]
+        own = [next(e for e in self.fits[k].model.effects if e.name in {*k} - {*rest}) for k in others]
+        looks = in_parallel(lambda e: look(less_one + at_null(e), whole), own)
+        better = {k: f for k, f in zip(others, looks, strict=True) if f.criterion < self.fits[k].criterion}
+        self.fits.update(better)
+        self._converged -= set(better)
         super().converge_rivals(names, name)
 
     def step_gain(self, fitted: LikelihoodFit) -> float:
