@@ -12,11 +12,11 @@ import numpy as np
 from fes_pin.data.errors import InputError
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.held_out import Again
-from fes_pin.diagnosis.likelihood_models import Found, LikelihoodModels
-from fes_pin.diagnosis.verdict import EFFORT, RigState, RigVerdict
+from fes_pin.diagnosis.likelihood_models import Found, LikelihoodModels, LikelihoodSearch
+from fes_pin.diagnosis.verdict import RigState, RigVerdict
 from fes_pin.effort.search import NOT_CARRIED, has_efforts, searched
-from fes_pin.identify.likelihood_fit import LikelihoodFit, at_values
-from fes_pin.infer.estimators import AnyState, Compared, Estimator, compared
+from fes_pin.identify.likelihood_fit import LikelihoodFit, at_values, refit
+from fes_pin.infer.estimators import AnyState, Estimator
 from fes_pin.infer.scatter import as_wide_as
 from fes_pin.infer.search import BEAM, FITTED, Policy
 from fes_pin.infer.text import percent
@@ -91,15 +91,9 @@ class InverseDynamics(Estimator):
 class ValuesByEffort(RigVerdict):
     """The verdict on a set with the values of inverse dynamics, of all trials or of those that are not held out."""
 
-    def __init__(self, first: RigVerdict) -> None:
-        super().__init__(first.search, first.test)
-        self._begun: dict[int, tuple[LikelihoodFit, LikelihoodFit]] = {}
-
-        def refitted(fitted: LikelihoodFit, trials: Sequence[Trial]) -> LikelihoodFit:
-            _, begun = self._begun.get(id(fitted), (fitted, fitted))
-            return self.at_efforts(*first.refitted([(begun, trials)]))
-
-        self.refitted = Again(refitted)
+    def __init__(self, search: LikelihoodSearch, test: Sequence[Trial]) -> None:
+        super().__init__(search, test)
+        self.refitted = Again(lambda fitted, trials: self.at_efforts(refit(fitted, trials)))
 
     def at_efforts(self, fitted: LikelihoodFit) -> LikelihoodFit:
         """Return a fit at the values of inverse dynamics of its trials.
@@ -107,11 +101,10 @@ class ValuesByEffort(RigVerdict):
         A set with a cause that inverse dynamics does not know keeps its values.
         """
         by_effort = self.models.by_effort
-        other = fitted
-        if by_effort is not None and by_effort.knows(fitted.names):
-            other = at_values(fitted, by_effort.values_in(fitted, [t.name for t in fitted.trials]))
-        self._begun[id(other)] = other, fitted
-        return other
+        if by_effort is None or not by_effort.knows(fitted.names):
+            return fitted
+        known = by_effort.values_in(fitted, [t.name for t in fitted.trials])
+        return at_values(fitted, known)
 
     def with_intervals(self, fitted: LikelihoodFit) -> LikelihoodFit:
         """See `RigVerdict.with_intervals`; as wide as those of inverse dynamics at least."""
@@ -121,32 +114,28 @@ class ValuesByEffort(RigVerdict):
         return as_wide_as(honest, by_effort.final(by_effort.models.fitted_set(fitted.names)))
 
 
-def with_better_values(state: RigState) -> tuple[RigState, list[str]]:
-    """Return a state with a warning, and with other values of its set where these predict the effort better.
+def never_worse(state: RigState) -> tuple[RigState, list[str]]:
+    """Return a state with a warning, and with other values where its own predict efforts worse than the beliefs do.
 
-    They are those of inverse dynamics. They answer where the effort tells them apart as two estimators are, and where
-    they predict motion no worse, or the effort is predicted worse than by the beliefs.
+    They are those of inverse dynamics then, of the same set.
     """
     models, found, first = state.search.models, state.found, state.verdict
     by_effort, best = models.by_effort, state.found.best
-    if by_effort is None or state.search.was_stopped or not by_effort.knows(best.names):
+    if by_effort is None or not by_effort.knows(best.names):
+        return state, []
+    now, believed = by_effort.error_percent(best.model), by_effort.error_percent(models.model)
+    if now <= believed:
         return state, []
     assert isinstance(first, RigVerdict)
-    verdict = ValuesByEffort(first)
-    after = verdict.at_efforts(best)
-    now, then, believed = map(by_effort.errors_at, (best.model, after.model, models.model))
-    effort = Compared.of(EFFORT, now, then, models.seed)
-    if not (effort.is_better and effort.is_felt):
-        return state, []
+    verdict = ValuesByEffort(state.search, first.test)
     without = {n: verdict.at_efforts(f) for n, f in found.without.items()}
-    again = replace(found, best=after, nominal=verdict.at_efforts(found.nominal), without=without)
-    other = replace(state, verdict=verdict, found=again, weighed=verdict.weigh(again))
-    refuted = now.error_percent() > believed.error_percent()
-    if not refuted and any(c.is_worse for c in compared(state, other, verdict.ahead, models.seed)):
+    again = replace(found, best=verdict.at_efforts(best), nominal=verdict.at_efforts(found.nominal), without=without)
+    then = by_effort.error_percent(again.best.model)
+    if then >= now:
         return state, []
-    errors = (percent(one.error_percent()) for one in (now, believed, then))
-    words = "the likelihood's values predict the effort with E {}, the believed ones {}; those of least squares of the "
-    return other, [(words + "effort are given: {}").format(*errors)]
+    words = f"the likelihood's values predict the effort with E {percent(now)}, the believed ones {percent(believed)}; "
+    words += f"those of least squares of the effort are given: {percent(then)}"
+    return replace(state, verdict=verdict, found=again, weighed=verdict.weigh(again)), [words]
 
 
 def named_by_one(first: RigState, answer: RigState) -> list[str]:

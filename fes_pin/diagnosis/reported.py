@@ -8,7 +8,7 @@ import numpy as np
 
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.by_effort import InverseDynamics, named_by_one, with_better_values
+from fes_pin.diagnosis.by_effort import InverseDynamics, named_by_one, never_worse
 from fes_pin.diagnosis.decide.chosen_again import share_of
 from fes_pin.diagnosis.decide.rivals import estimates, experiment, not_identifiable, ranking, seen_sizes
 from fes_pin.diagnosis.errors_ahead import AheadErrors, free_errors, noise_that_is_small
@@ -49,7 +49,7 @@ def diagnosis_of(
     first, white = RigVerdict(search, trials[1]).of(found), WhiteProcessNoise()
     estimators = (InverseDynamics(), white, LeastSquares())
     chosen: RigState = choose(first, estimators, search.models.seed)
-    state, said = with_better_values(chosen)
+    state, said = never_worse(chosen)
     verdict, found = state.verdict, state.found
     assert isinstance(verdict, RigVerdict)
     left, best = verdict.lack_of_fit(state), _with_intervals(state, white.fit if chosen is first else first.found.best)

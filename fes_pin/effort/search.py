@@ -94,8 +94,8 @@ class FoundByEffort:
         """Return cross-validated errors of the low-passed effort of a set, of which it `knows` every cause."""
         return self.verdict.errors_of(self.models.fitted_set(names), self.state.found.best)
 
-    def errors_at(self, model: Model) -> Errors:
-        """Return errors of the low-passed effort by a model of whose causes it `knows` every one.
+    def error_percent(self, model: Model) -> float:
+        """Return E of the low-passed effort by a model of whose causes it `knows` every one, percent.
 
         Friction that builds up over a way has the stretch of its contact as that way; its corners are those of a start.
         """
@@ -104,7 +104,9 @@ class FoundByEffort:
         known = model.parameters()
         values |= {k: v for k, v in known.items() if k not in CORNERS}
         values |= {WAY: known[STRETCH]} if known.get(STRETCH) else {}
-        return self.verdict.errors(sets.problem(names, {}).residuals(values)[0], sets.rows.efforts(values))
+        left, efforts = sets.problem(names, {}).residuals(values)[0], sets.rows.efforts(values)
+        squares, spread = (sum(float(np.sum(one**2)) for one in many) for many in (left, efforts))
+        return 100.0 * squares / max(spread, 1e-300)
 
     def values_in(self, fitted: LikelihoodValues, names: Collection[str]) -> dict[str, float]:
         """Return the final values of the set of another fit, by trials of some names; those that mean the same in it.

@@ -83,12 +83,9 @@ class EffortVerdict(Verdict[EffortFit, EffortSets, Weighed]):
     def errors_of(self, fitted: EffortFit, best: EffortFit) -> Errors:
         """Return squared errors of the low-passed effort by fits without the part of a row, at the weights of a set."""
         roots, efforts = self.search.models.roots(best), self.search.models.rows.efforts(fitted.values)
-        left = [r * w for r, w in zip(self.left(fitted), roots, strict=True)]
-        return self.errors(left, [(u - u.mean()) * w for u, w in zip(efforts, roots, strict=True)])
-
-    def errors(self, left: Sequence[np.ndarray], efforts: Sequence[np.ndarray]) -> Errors:
-        """Return squared errors by units of evidence, from residuals and efforts of the rows of each trial."""
-        return replace(self._errors(left), spread=self._errors(efforts).squares)
+        errors = self._errors([r * w for r, w in zip(self.left(fitted), roots, strict=True)])
+        spread = self._errors([(u - u.mean()) * w for u, w in zip(efforts, roots, strict=True)])
+        return replace(errors, spread=spread.squares)
 
     def _errors(self, left: Sequence[np.ndarray]) -> Errors:
         """Return squared errors by units of evidence; the spread is that of the effort's noise."""

@@ -5,9 +5,9 @@ same units, in each currency that both have: what is predicted, as free motion.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
@@ -80,12 +80,6 @@ class Compared:
         """Whether the first does."""
         return self.loss.low > NOTHING_PERCENT
 
-    @classmethod
-    def of(cls, currency: str, before: Errors, after: Errors, seed: int) -> Self:
-        """Compare errors of the same data, of which none is taken for noise."""
-        gains = (held_out_gain(a, a, _without_noise(b), seed) for a, b in ((before, after), (after, before)))
-        return cls(currency, before, after, *gains)
-
     def __str__(self) -> str:
         errors = f"{percent(self.before.error_percent())} -> {percent(self.after.error_percent())}"
         return f"E of {self.currency} {errors}, gain {self.gain}"
@@ -104,14 +98,13 @@ def choose(first: AnyState, others: Sequence[Estimator], seed: int = 0) -> AnySt
         other = estimator.state(first)
         if other is None:
             continue
-        both = [one for one in first.verdict.currencies if one in other.verdict.currencies]
-        found = compared(first, other, both, seed)
+        compared = _compared(first, other, seed)
         same = other.names == first.names
-        better = any(c.is_better and all(_agree(c, o, same) for o in found if o is not c) for c in found)
+        better = any(c.is_better and all(_agree(c, o, same) for o in compared if o is not c) for c in compared)
         smaller = estimator.prefers_smaller and len(other.names) < len(first.names)
-        if better or (smaller and found and not any(c.is_worse for c in found)):
+        if better or (smaller and compared and not any(c.is_worse for c in compared)):
             said = "predicts better" if better else "predicts as well with fewer causes"
-            words = f"{estimator.words(other)} {said}: {'; '.join(map(str, found))}"
+            words = f"{estimator.words(other)} {said}: {'; '.join(map(str, compared))}"
             return replace(other, steps=(*first.steps, *other.steps, Step(CHOICE, words=words)))
     return first
 
@@ -121,13 +114,14 @@ def _agree(better: Compared, other: Compared, same: bool) -> bool:
     return not other.is_worse if same or better.is_whole else other.is_felt
 
 
-def compared(first: AnyState, other: AnyState, currencies: Iterable[str], seed: int) -> list[Compared]:
-    """Return the comparison of two states in each currency in which both have errors."""
+def _compared(first: AnyState, other: AnyState, seed: int) -> list[Compared]:
+    """Return the comparison of two states in each currency that both have."""
     out = []
-    for currency in currencies:
+    for currency in (one for one in first.verdict.currencies if one in other.verdict.currencies):
         before, after = (one.verdict.errors_in(one, currency, first) for one in (first, other))
         if before is not None and after is not None:
-            out.append(Compared.of(currency, before, after, seed))
+            gains = (held_out_gain(a, a, _without_noise(b), seed) for a, b in ((before, after), (after, before)))
+            out.append(Compared(currency, before, after, *gains))
     return out
 
 
