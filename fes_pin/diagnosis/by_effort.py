@@ -70,7 +70,7 @@ class InverseDynamics(Estimator):
     def state(self, first: RigState) -> RigState | None:
         """Return the state of its set, fitted by the likelihood; None where the first state has the same.
 
-        Of the sets that efforts do not distinguish it is the likeliest.
+        Of the sets that efforts do not distinguish it is the likeliest, without causes that are not significant in it.
         """
         models, search = first.search.models, first.search
         by_effort = models.by_effort
@@ -85,7 +85,10 @@ class InverseDynamics(Estimator):
         assert isinstance(first.verdict, RigVerdict)
         names, verdict = min(possible, key=lambda f: f.criterion).names, VerdictByEffort(search, first.verdict.test)
         found = search.result(names)
-        return State(verdict, found, verdict.weigh(found), {}, frozenset(names), replaced=first)
+        state = State(verdict, found, verdict.weigh(found), {}, frozenset(names), replaced=first)
+        while (fewer := verdict.drop_insignificant(state)) is not None:
+            state = fewer
+        return None if state.names == first.names else state
 
 
 class ValuesByEffort(RigVerdict):
