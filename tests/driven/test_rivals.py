@@ -5,7 +5,7 @@ from driven_rigs.draw import draw
 
 from fes_pin.data.study import read_study
 from fes_pin.diagnosis.diagnosis import diagnose_joint
-from fes_pin.models.effects import CoulombFriction, EffortOffset
+from fes_pin.models.effects import CoulombFriction, EffortOffset, ParallelStiffness
 from fes_pin.search.likelihood_fits import LikelihoodFits
 from fes_pin.search.likelihood_forms import refined_form
 
@@ -28,6 +28,21 @@ def test_a_set_is_fitted_again_beside_a_cause_whose_form_has_changed():
     sets.extend(FRICTION)
     assert sets.fits[BOTH].model.effects[0].refined() == form
     assert sets.fits[BOTH].criterion < first.criterion - 10.0
+
+
+def test_a_rival_begins_in_the_form_that_friction_has_beside_the_cause():
+    """A spring beside plain friction had been told from an offset beside friction with more of it at rest."""
+    sets = LikelihoodFits(believed(), [trial(1), trial(2)], [CoulombFriction, EffortOffset, ParallelStiffness])
+    plain = sets.nominal().model + CoulombFriction()
+    sets.fits[FRICTION] = sets._maximum(plain, sets.nominal().noise)
+    sets.extend(FRICTION)
+    sets.fits[BOTH] = better = refined_form(sets.fits[BOTH], sets.library.measured)
+    rival = ("coulomb_friction", "parallel_stiffness")
+    before, form = sets.fits[rival], better.model.effects[0].refined()
+    assert form and not before.model.effects[0].refined()
+    sets.converge_rivals(BOTH, "effort_offset")
+    after = sets.fits[rival]
+    assert after.model.effects[0].refined() == form and after.criterion < before.criterion - 10.0
 
 
 def test_a_spring_that_gravity_and_a_constant_torque_stand_for_is_among_their_rivals(tmp_path):

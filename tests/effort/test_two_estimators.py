@@ -13,7 +13,7 @@ from fes_pin.diagnosis import by_effort
 from fes_pin.diagnosis.by_effort import named_by_one
 from fes_pin.effort import search
 from fes_pin.effort.search import FoundByEffort
-from fes_pin.infer.estimators import CHOICE
+from fes_pin.infer.estimators import CHOICE, Compared
 
 
 def test_a_cause_that_effort_alone_shows_is_named_where_it_lessens_both_errors(tmp_path):
@@ -41,8 +41,12 @@ def test_both_estimators_agree_on_an_arm(tmp_path):
     assert not [w for w in found.warnings if "is named by" in w]
 
 
-def test_a_set_that_lessens_the_error_of_effort_alone_is_no_answer(tmp_path, monkeypatch):
-    """Inverse dynamics is made to name a cause that is not there: the motion contradicts it, and a warning says so."""
+@pytest.mark.parametrize("is_better", [False, True])
+def test_a_set_that_lessens_the_error_of_effort_alone_is_no_answer(is_better, tmp_path, monkeypatch):
+    """Inverse dynamics is made to name a cause that is not there: the motion contradicts it, and a warning says so.
+
+    The cause is not significant in the likelihood, so that it is no answer even where its set predicts better.
+    """
     original = by_effort.searched
 
     def too_much(rig, trials, seed):
@@ -52,6 +56,9 @@ def test_a_set_that_lessens_the_error_of_effort_alone_is_no_answer(tmp_path, mon
         return replace(found, state=replace(found.state, found=found.state.search.result(("cogging",))))
 
     monkeypatch.setattr(by_effort, "searched", too_much)
+    if is_better:
+        for name, answer in {"is_better": True, "is_felt": True, "is_worse": False}.items():
+            monkeypatch.setattr(Compared, name, property(lambda _, answer=answer: answer))
     found = fp.diagnose(arm(tmp_path))
     assert found.verdict == "adequate"
     assert "cogging is named by effort, not by motion; it is not in the answer" in found.warnings
