@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 import fes_pin as fp
 from fes_pin.cli.main import app
 from fes_pin.data.trial import Trial
+from fes_pin.diagnosis import by_trial
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import fit_of
 from fes_pin.identify.per_trial import amplitude, as_parameters, cross_fitted_unknowns
@@ -49,6 +50,16 @@ def test_a_zero_of_each_trial_is_told_and_then_the_cause_alone(seed, causes):
     assert first.gain_held_out.low > 0.0 and first.p_value < 1e-6
     assert [c.name for c in others] == list(causes) and not any(c.equivalents for c in others)
     assert f"the zero of effort differs between trials: 00 {first.parameters['00'].value:.3g}, 01 " in str(diagnosis)
+
+
+@pytest.mark.parametrize(("zeros", "further"), [(ZEROS, True), ((0.0,) * 4, False)])
+def test_a_zero_is_fitted_further_only_where_a_first_fit_gains(zeros, further, monkeypatch):
+    asked = []
+    fitted = by_trial.maximum_from
+    monkeypatch.setattr(by_trial, "maximum_from", lambda one, trials: asked.append(one) or fitted(one, trials))
+    found = fp.diagnose(arm(1, FRICTION, zeros))
+    assert any(c.name == "zero_by_trial" for c in found.causes) is further
+    assert bool(asked) is further
 
 
 def test_a_scale_of_each_trial_is_told_and_then_the_cause_alone():

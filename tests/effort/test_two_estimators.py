@@ -1,6 +1,7 @@
 """Two estimators of a joint whose effort was recorded: the likelihood, and inverse dynamics."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,9 +12,13 @@ import fes_pin as fp
 from fes_pin.data.errors import InputError
 from fes_pin.diagnosis import by_effort
 from fes_pin.diagnosis.by_effort import named_by_one
+from fes_pin.diagnosis.verdict import RigVerdict
 from fes_pin.effort import search
 from fes_pin.effort.search import FoundByEffort
 from fes_pin.infer.estimators import CHOICE, Compared
+from fes_pin.infer.search import FITTED
+from fes_pin.search import likelihood_fits
+from fes_pin.search.likelihood_fits import LikelihoodFits
 
 
 def test_a_cause_that_effort_alone_shows_is_named_where_it_lessens_both_errors(tmp_path):
@@ -80,6 +85,45 @@ def test_a_thorough_search_has_no_set_to_begin_with(tmp_path, monkeypatch):
     low, high = found.causes[0].parameters["torque_nm"].interval
     assert low < 0.1 < high
     assert begun and all(one == (None, None) for one in begun)
+
+
+def test_the_search_that_begins_there_fits_few_sets_and_the_nominal_model_once(tmp_path, monkeypatch):
+    """The candidates of largest score are fitted, instead of all: the set itself is a proposal."""
+    once, begun = [], []
+    nominal, begin = likelihood_fits.with_new_noise, LikelihoodFits.begin
+
+    def fitted(*asked):
+        once.append(asked)
+        return nominal(*asked)
+
+    def noted(sets, base, starts):
+        begun.append((base.names, len(starts)))
+        return begin(sets, base, starts)
+
+    monkeypatch.setattr(likelihood_fits, "with_new_noise", fitted)
+    monkeypatch.setattr(LikelihoodFits, "begin", noted)
+    found = fp.diagnose(arm(tmp_path, friction=0.1, drag=0.05))
+    assert {c.name for c in found.causes} == {"coulomb_friction", "quadratic_damping"}
+    assert len(once) == 1
+    assert max(count for _, count in begun) == FITTED
+
+
+@pytest.mark.parametrize(
+    ("near", "seconds", "efforts", "horizons"),
+    [
+        (0.3, 5.0, True, (0.3, 1.0)),
+        (0.3, 0.8, True, (0.3,)),
+        (0.3, 5.0, False, (0.3,)),
+        (2.0, 5.0, True, (2.0,)),
+        (None, 5.0, True, (None,)),
+    ],
+)
+def test_a_joint_with_efforts_is_judged_a_second_ahead_too(near, seconds, efforts, horizons):
+    """Where its trials are that long, and its own horizon is shorter."""
+    models = SimpleNamespace(judged_s=near, by_effort=object() if efforts else None)
+    models.trials = [SimpleNamespace(duration=seconds), SimpleNamespace(duration=9.0)]
+    verdict = SimpleNamespace(models=models)
+    assert tuple(RigVerdict.ahead.fget(verdict).values()) == horizons
 
 
 def test_a_joint_without_efforts_has_one_estimator(tmp_path):
