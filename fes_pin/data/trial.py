@@ -57,6 +57,8 @@ class Trial(ReadOnly):
         is simulated of the trial is low-passed there as well.
     as_read
         The files that it was read from; None of a trial that was made in memory. Not compared.
+    origin_s
+        Time from which its causes act, s, where it is a part of a trial; None: that of its own first sample.
 
     Raises
     ------
@@ -76,6 +78,7 @@ class Trial(ReadOnly):
     remarks: tuple[str, ...] = ()
     low_pass_hz: float | None = None
     as_read: AsRead | None = field(default=None, compare=False)
+    origin_s: float | None = None
 
     def __post_init__(self) -> None:
         error = self.key_error
@@ -140,6 +143,11 @@ class Trial(ReadOnly):
         """Time from the first to the last sample, s."""
         return float(self.time[-1] - self.time[0])
 
+    @property
+    def since_origin(self) -> np.ndarray:
+        """Time since it began, or since the trial did of which it is a part, s, shape (n,)."""
+        return self.time - (self.time[0] if self.origin_s is None else self.origin_s)
+
     def first(self, count: int) -> Trial:
         """The trial's first samples, itself if it has no more than `count`.
 
@@ -155,7 +163,7 @@ class Trial(ReadOnly):
         return self.part(slice(0, count))
 
     def between(self, start_s: float, end_s: float) -> Trial:
-        """The samples of a stretch of time, both ends among them; the times stay as they are.
+        """The samples of a stretch of time, both ends among them, as a trial of its own; the times stay as they are.
 
         What was stated of its beginning (`position0`, `velocity0`) is lost where that is cut off, and a remark says so:
         a model of an ankle or a muscle begins at rest.
@@ -171,15 +179,18 @@ class Trial(ReadOnly):
             raise self.error(f"expected at least {MIN_ROWS} samples, found {len(rows)} of those from {ends}", "time_s")
         part = self.part(slice(int(rows[0]), int(rows[-1]) + 1))
         cut = f"the first {part.time[0] - self.time[0]:.4g} s are cut off"
-        return part if part.time[0] == self.time[0] else derived_trial(part, remarks=(*self.remarks, cut))
+        return (
+            part if part.time[0] == self.time[0] else derived_trial(part, remarks=(*self.remarks, cut), origin_s=None)
+        )
 
     def part(self, rows: slice) -> Trial:
-        """Some rows of the trial; what was stated of its first sample is lost with it."""
+        """Some rows of the trial, whose causes act from where they did; what was stated of its first sample is lost."""
         stated = {n: v for n, v in self.conditions.items() if not rows.start or n not in OF_THE_START}
         if rows.start and BEGAN in stated:
             stated[BEGAN] += float(self.time[rows.start] - self.time[0])
         columns = {n: v[rows] for n, v in self.columns.items()}
-        return derived_trial(self, columns=columns, time=self.time[rows], conditions=stated)
+        origin = float(self.time[0]) if rows.start and self.origin_s is None else self.origin_s
+        return derived_trial(self, columns=columns, time=self.time[rows], conditions=stated, origin_s=origin)
 
     def with_columns(self, **columns: np.ndarray) -> Trial:
         """The same trial with columns added or replaced, each of shape (n,)."""

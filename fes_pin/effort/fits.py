@@ -254,7 +254,7 @@ class EffortSets(FittedSets[EffortFit, Values]):
     def measured(self) -> dict[str, np.ndarray]:
         """Columns of the trials, end to end, as `identify.problem.measured_columns` has them."""
         records = [t.record for t in self.rows.tracks]
-        each = {"time": [r.time - r.time[0] for r in records], "position": [r.reading for r in records]}
+        each = {"time": [r.time for r in records], "position": [r.reading for r in records]}
         return {n: np.concatenate(v) for n, v in {**each, "effort": [r.effort for r in records]}.items()}
 
     def is_a_model(self, fitted: EffortFit) -> bool:

@@ -108,7 +108,7 @@ def _erfcx(x: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """One trial as it was read: times, readings and efforts, shape (n,), and the kind of the trial."""
+    """One trial as it was read: times since causes act, readings and efforts, shape (n,), and the kind of the trial."""
 
     name: str
     time: np.ndarray
@@ -119,7 +119,7 @@ class Record:
     @classmethod
     def of(cls, trial: Trial) -> Record:
         """Return a trial with the columns "position" and "effort" as it was read."""
-        return cls(trial.name, trial.time, trial["position"], trial["effort"], trial.kind)
+        return cls(trial.name, trial.since_origin, trial["position"], trial["effort"], trial.kind)
 
     @cached_property
     def dt(self) -> float:
@@ -154,7 +154,7 @@ class Motion:
     ) -> None:
         self.record, self.band, self.dt = record, band, record.dt
         self.reading = record.reading if reading is None else reading
-        self.time = record.time - record.time[0]
+        self.time = record.time
         self._narrow, self._wide = deviation_of(band.low), deviation_of(band.wide)
         edge = math.ceil(WIDTHS * (self._narrow + self._wide) / self.dt)
         stride = max(1, round(1.0 / (ROWS_EACH * band.low * self.dt)))

@@ -125,12 +125,10 @@ def products_of(names: Sequence[str], info: Mapping[str, ParameterInfo]) -> list
 def measured_columns(model: Model, trials: Sequence[Trial]) -> dict[str, np.ndarray]:
     """Return every measured output, imposed motion and effort, all trials end to end, by column name.
 
-    `time` since each trial began, s, or since the trial did that it continues; `reading` the first output of each that
-    passes a sensor.
+    `time` since each trial began, s, or since the trial did of which it is a part; `reading` the first output of each
+    that passes a sensor.
     """
-    begun = [k for k, t in enumerate(trials) if not k or not _continues(trials[k - 1], t)]
-    since = np.repeat([trials[k].time[0] for k in begun], np.diff([*begun, len(trials)]))
-    out: dict[str, list[np.ndarray]] = {"time": [t.time - s for t, s in zip(trials, since, strict=True)]}
+    out: dict[str, list[np.ndarray]] = {"time": [t.since_origin for t in trials]}
     rig = model.rig
     for trial in trials:
         for name in dict.fromkeys((*rig.outputs(trial.kind), *rig.schema.motion(trial.kind), "effort")):
@@ -139,11 +137,6 @@ def measured_columns(model: Model, trials: Sequence[Trial]) -> dict[str, np.ndar
         if rig.output(trial.kind) in trial.columns and "reading" in rig.signals(trial.kind):
             out.setdefault("reading", []).append(trial[rig.output(trial.kind)])
     return {n: np.concatenate(v) for n, v in out.items()}
-
-
-def _continues(before: Trial, trial: Trial) -> bool:
-    """Return whether a trial begins a step after another one ends, as parts of a recording do."""
-    return round((trial.time[0] - before.time[-1]) / trial.dt) == 1
 
 
 def answered_columns(model: Model, trials: Sequence[Trial]) -> dict[str, np.ndarray]:

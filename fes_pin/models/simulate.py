@@ -292,8 +292,8 @@ def lane_values(layout: Layout, values: EachTrial, unknowns: EachTrial) -> np.nd
 
 
 def timing(trial: Trial, steps: int) -> dict[str, float]:
-    """Return the constants that every program reads."""
-    return {"t0": float(trial.time[0]), "dt": trial.dt, "step": trial.dt / steps, "shift": 0.0}
+    """Return the constants that every program reads; the first is the time of the first sample since causes act, s."""
+    return {"t0": float(trial.since_origin[0]), "dt": trial.dt, "step": trial.dt / steps, "shift": 0.0}
 
 
 def is_delayed(model: Model) -> bool:

@@ -53,8 +53,8 @@ def withheld(study: fp.Study) -> tuple[fp.Study, tuple[fp.Trial, ...]]:
 
 
 def _part(trial: fp.Trial, rows: slice, **more: np.ndarray) -> fp.Trial:
-    columns = {n: values[rows] for n, values in trial.columns.items()} | more
-    return derived_trial(trial, columns=columns, time=trial.time[rows], conditions={})
+    part = trial.part(rows)
+    return derived_trial(part, columns={**part.columns, **more}, conditions={})
 
 
 def values_of(study: fp.Study, found: Any) -> dict[str, float]:

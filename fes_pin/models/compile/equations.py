@@ -82,7 +82,7 @@ class Symbols:
             u=SimpleNamespace(**self.u),
             c=SimpleNamespace(**self.c),
             initial=SimpleNamespace(**{n: p[n] for n in layout.unknowns if "." not in n}),
-            time=self.t - self.c["t0"],
+            time=self.t,
             step=self.c["step"],
             elapsed=0.0,
             pace=1.0,
