@@ -71,11 +71,6 @@ class Compared:
         return self.gain.percent > WHOLE * FORM_SHARE
 
     @property
-    def is_whole(self) -> bool:
-        """Whether the other leaves no more than an error of form may, with certainty."""
-        return self.gain.low > WHOLE * (1.0 - FORM_SHARE)
-
-    @property
     def is_worse(self) -> bool:
         """Whether the first does."""
         return self.loss.low > NOTHING_PERCENT
@@ -90,28 +85,23 @@ def choose(first: AnyState, others: Sequence[Estimator], seed: int = 0) -> AnySt
 
     It predicts better where the 95 % interval of the share of the squared error that it removes is above
     `NOTHING_PERCENT` in one currency, and that share is above `FORM_SHARE` in each other one: what lessens the error of
-    one currency alone is an error of form. With the same set, or where no more than `FORM_SHARE` stays in that one
-    currency, it must be worse in none. Noise is not subtracted: each estimator has its own, and that of a wrong model
-    is large. Data that the study itself holds out are not used: gains on them would be optimistic.
+    one currency alone is an error of form. With the same set it must be worse in none. Noise is not subtracted: each
+    estimator has its own, and that of a wrong model is large. Data that the study itself holds out are not used: gains
+    on them would be optimistic.
     """
     for estimator in others:
         other = estimator.state(first)
         if other is None:
             continue
         compared = _compared(first, other, seed)
-        same = other.names == first.names
-        better = any(c.is_better and all(_agree(c, o, same) for o in compared if o is not c) for c in compared)
+        agrees = (lambda o: not o.is_worse) if other.names == first.names else (lambda o: o.is_felt)
+        better = any(c.is_better and all(agrees(o) for o in compared if o is not c) for c in compared)
         smaller = estimator.prefers_smaller and len(other.names) < len(first.names)
         if better or (smaller and compared and not any(c.is_worse for c in compared)):
             said = "predicts better" if better else "predicts as well with fewer causes"
             words = f"{estimator.words(other)} {said}: {'; '.join(map(str, compared))}"
             return replace(other, steps=(*first.steps, *other.steps, Step(CHOICE, words=words)))
     return first
-
-
-def _agree(better: Compared, other: Compared, same: bool) -> bool:
-    """Return whether another currency agrees with one in which an estimator predicts better."""
-    return not other.is_worse if same or better.is_whole else other.is_felt
 
 
 def _compared(first: AnyState, other: AnyState, seed: int) -> list[Compared]:

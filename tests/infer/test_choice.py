@@ -243,8 +243,6 @@ SURE, UNSURE = np.full(12, 1.0), np.tile([-40.0, 60.0], 6)
         (0.0 * SURE, 50.0 * SURE, "ab", False, False),  # an error of form of the effort
         (0.5 * UNSURE, 50.0 * SURE, "ab", False, False),  # as above: 5 % that is not sure is no sixteenth
         (SURE, 50.0 * SURE, "ab", False, True),  # sure in both
-        (0.0 * SURE, 99.0 * SURE, "ab", False, True),  # an error of form cannot remove all of it
-        (-0.5 * SURE, 99.0 * SURE, "ab", False, False),  # it predicts motion worse
         (0.0 * SURE, 0.0 * SURE, "", True, True),  # neither predicts better: the smaller set
         (0.0 * SURE, 0.0 * SURE, "", False, False),
         (0.0 * SURE, 0.0 * SURE, "ab", True, False),  # it is not smaller
