@@ -85,9 +85,8 @@ class InverseDynamics(Estimator):
         assert isinstance(first.verdict, RigVerdict)
         names, verdict = min(possible, key=lambda f: f.criterion).names, VerdictByEffort(search, first.verdict.test)
         found = search.result(names)
-        state = State(verdict, found, verdict.weigh(found), {}, frozenset(names), replaced=first)
-        while (fewer := verdict.drop_insignificant(state)) is not None:
-            state = fewer
+        own = State(verdict, found, verdict.weigh(found), {}, frozenset(names), replaced=first)
+        state = verdict.significant(own)
         return None if state.names == first.names else state
 
 

@@ -251,6 +251,12 @@ class Verdict(ABC, Generic[F, M, W]):
             else:
                 return state
 
+    def significant(self, state: State[F, M, W]) -> State[F, M, W]:
+        """Return the state without the candidates that are not significant; no other claim is asked."""
+        while (fewer := self.drop_insignificant(state)) is not None:
+            state = _noted(fewer, "drop_insignificant")
+        return state
+
     def drop_unmoved(self, state: State[F, M, W]) -> State[F, M, W] | None:
         """Reject the weakest candidate of a set by which the recorded inputs do not move the system."""
         return self._without_weakest(state, [] if state.weighed.is_moved else list(state.weighed.gains))
