@@ -138,8 +138,8 @@ def _likeliest(
 def errors_against(study: fp.Study, found: Any, unseen: Sequence[fp.Trial]) -> dict[str, tuple[float, float, float]]:
     """Errors E of the model of an answer, of the believed model and of the regression, percent, by measure.
 
-    A measure is left out where one of the causes has no such column; an error is infinite where a simulation is not
-    finite. Nothing is measured of studies that are no joints with a recorded effort.
+    A measure is left out where one of the causes has no such column, and free motion where the answer prints no error
+    of it since the rig falls; an error is infinite where a simulation is not finite. Nothing is measured of studies that are no joints with a recorded effort.
     """
     shown = [t for t in study.trials if t.role != "held_out"]
     if study.rig != "joint" or any("effort" not in t.columns for t in (*shown, *unseen)):
@@ -149,11 +149,11 @@ def errors_against(study: fp.Study, found: Any, unseen: Sequence[fp.Trial]) -> d
     own = _of_model(models[0]) if hasattr(found, "model") else values_of(study, found)
     values = [own, models[1].parameters(), values_of(study, regressed)]
     models[0], values[0] = _likeliest(study, shown, models[0], own)
-    out = {}
+    out, falls = {}, getattr(found, "extended_error", (0.0,))[0] is None
     for word, trials in (("fitted", shown), ("unseen", list(unseen))):
         each = [_moved(model, trials) for model in models]
         both = [one | more for one, more in zip(each, _efforts(study, shown, trials, values), strict=True)]
-        names = [n for n in both[0] if all(n in one for one in both)]
+        names = [n for n in both[0] if all(n in one for one in both) and not (falls and n == "free")]
         out |= {f"{n}, {word}": (both[0][n], both[1][n], both[2][n]) for n in names}
     return out
 

@@ -53,6 +53,12 @@ def test_the_true_model_is_better_than_the_believed_one_in_every_error(drawn):
         assert true < 0.3 * believed and regressed < 0.5 * believed
 
 
+def test_free_motion_is_left_out_where_the_answer_prints_no_error_of_it(drawn):
+    study, _ = drawn
+    answer = SimpleNamespace(model=fp.nominal_model(study), extended_error=(None, None))
+    assert {*errors_against(study, answer, ())} == {f"{m}, fitted" for m in MEASURES if m != "free"}
+
+
 def test_the_believed_model_has_its_own_errors(drawn):
     study, _ = drawn
     shown, unseen = withheld(study)
