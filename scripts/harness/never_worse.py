@@ -139,7 +139,8 @@ def errors_against(study: fp.Study, found: Any, unseen: Sequence[fp.Trial]) -> d
     """Errors E of the model of an answer, of the believed model and of the regression, percent, by measure.
 
     A measure is left out where one of the causes has no such column, and free motion where the answer prints no error
-    of it since the rig falls; an error is infinite where a simulation is not finite. Nothing is measured of studies that are no joints with a recorded effort.
+    of it since the rig falls; an error is infinite where a simulation is not finite. Nothing is measured of studies
+    that are no joints with a recorded effort.
     """
     shown = [t for t in study.trials if t.role != "held_out"]
     if study.rig != "joint" or any("effort" not in t.columns for t in (*shown, *unseen)):
