@@ -70,7 +70,8 @@ class InverseDynamics(Estimator):
     def state(self, first: RigState) -> RigState | None:
         """Return the state of its set, fitted by the likelihood; None where the first state has the same.
 
-        Of the sets that efforts do not distinguish it is the likeliest, without causes that are not significant in it.
+        Causes that both sets have may have the forms of the first. Of the sets that efforts do not distinguish it is
+        the likeliest, without causes that are not significant in it.
         """
         models, search = first.search.models, first.search
         by_effort = models.by_effort
@@ -79,6 +80,9 @@ class InverseDynamics(Estimator):
         for one in by_effort.alike:
             if one.names not in models.fits:
                 models.fit_model(by_effort.model(one))
+        again = models.in_other_forms(first.found.best, [one.names for one in by_effort.alike])
+        models.begin_at(first.found.best, again)
+        models.converge_these(again)
         possible = [f for one in by_effort.alike if models.is_possible(f := models.fits[one.names])]
         if not possible:
             return None

@@ -184,7 +184,7 @@ class Sets(ABC, Generic[F]):
     def converge(self, size: int, without: Sequence[Names] = ()) -> None:
         """Fit the best sets of a size, and those near the best, until they converge, except some."""
         while slow := [n for n in self._hopeful(size, without) if n not in self._converged]:
-            self._converge(slow)
+            self.converge_these(slow)
 
     def under_noise_of(self, other: F, fits: Sequence[F]) -> Sequence[F]:
         """Return fits, with their parameters, under the noise of another fit of the same data."""
@@ -207,9 +207,10 @@ class Sets(ABC, Generic[F]):
         self.fits.update(likelier)
         self._converged -= set(likelier)
         half, slow = 0.5 * (less.criterion + whole.criterion), [k for k in rivals if k not in self._converged]
-        self._converge([k for k in slow if under[k].criterion - self.step_gain(under[k]) < half])
+        self.converge_these([k for k in slow if under[k].criterion - self.step_gain(under[k]) < half])
 
-    def _converge(self, slow: Sequence[Names]) -> None:
+    def converge_these(self, slow: Sequence[Names]) -> None:
+        """Fit some sets until they converge."""
         self.fits.update(zip(slow, self.converged([self.fits[n] for n in slow]), strict=True))
         self._converged.update(slow)
 

@@ -326,7 +326,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
             fits = [self.from_least_squares(model)]
         best = min(fits, key=lambda f: f.criterion)
         self.fits[best.names] = best
-        self._converge([best.names])
+        self.converge_these([best.names])
         while (better := self.better_form(self.fits[best.names])) is not None:
             self.fits[best.names] = better
         return best.names
@@ -466,23 +466,37 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         return in_parallel(lambda f: at_noise(f, other.noise), fits)
 
     def converge_rivals(self, names: Names, name: str) -> None:
-        """Converge the rivals of a candidate; those in another form of the other causes also begin at its place.
+        """Converge the rivals of a candidate, which also begin at its place where they may have ended elsewhere.
 
         First fits of rivals extend the set without the candidate. From far off, or in another form, they may end
         elsewhere.
         """
         whole, rest = self.fits[names], tuple(n for n in names if n != name)
-        less_one = Model(whole.model.rig, tuple(e for e in whole.model.effects if e.name != name))
         is_far = self.is_far(self.fits[rest]) and not self.is_far(whole)
-        same = frozenset(one for one in self.form_of(whole) if one[0] != name)
         others = [k for k in self.fits if len(k) == len(names) and set(rest) < set(k) and k != names]
-        others = [k for k in others if is_far or not same <= self.form_of(self.fits[k])]
-        own = [next(e for e in self.fits[k].model.effects if e.name in {*k} - {*rest}) for k in others]
-        looks = in_parallel(lambda e: look(less_one + at_null(e), whole), own)
-        better = {k: f for k, f in zip(others, looks, strict=True) if f.criterion < self.fits[k].criterion}
+        self.begin_at(whole, others if is_far else self.in_other_forms(whole, others))
+        super().converge_rivals(names, name)
+
+    def in_other_forms(self, whole: LikelihoodFit, sets: Sequence[Names]) -> list[Names]:
+        """Return the fitted sets in which a cause that a fit has too has another form."""
+        known = {k: frozenset(one for one in self.form_of(whole) if one[0] in k) for k in sets}
+        return [k for k in sets if not known[k] <= self.form_of(self.fits[k])]
+
+    def begin_at(self, whole: LikelihoodFit, sets: Sequence[Names]) -> None:
+        """Begin fitted sets again at a fit: its causes that they have, in its forms, and their others at no effect."""
+
+        def looked(names: Names) -> LikelihoodFit:
+            shared = [e for e in whole.model.effects if e.name in names]
+            model = Model(whole.model.rig, tuple(shared))
+            for effect in self.fits[names].model.effects:
+                if effect.name not in whole.names:
+                    model += at_null(effect)
+            return look(model, whole)
+
+        looks = dict(zip(sets, in_parallel(looked, sets), strict=True))
+        better = {k: f for k, f in looks.items() if f.criterion < self.fits[k].criterion}
         self.fits.update(better)
         self._converged -= set(better)
-        super().converge_rivals(names, name)
 
     def step_gain(self, fitted: LikelihoodFit) -> float:
         """Return the gain of a further step of a fit by its slope and curvature; 0 where it has converged."""
