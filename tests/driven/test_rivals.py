@@ -40,7 +40,9 @@ def test_a_rival_begins_in_the_form_that_friction_has_beside_the_cause():
     rival = ("coulomb_friction", "parallel_stiffness")
     before, form = sets.fits[rival], better.model.effects[0].refined()
     assert form and not before.model.effects[0].refined()
+    assert sets.in_other_forms(better, [rival, FRICTION]) == [rival, FRICTION]
     sets.converge_rivals(BOTH, "effort_offset")
+    assert sets.in_other_forms(better, [rival, BOTH]) == []
     after = sets.fits[rival]
     assert after.model.effects[0].refined() == form and after.criterion < before.criterion - 10.0
 
