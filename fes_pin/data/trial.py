@@ -20,7 +20,14 @@ from fes_pin.data.numbers import instance
 from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.recorded.columns import Columns
 from fes_pin.data.recorded.sniff import NEW_STUDY, read_csv_or_hint
-from fes_pin.data.schema import NumberKey, RigSchema, check_conditions, checked_numbers, schema_of
+from fes_pin.data.schema import (
+    NumberKey,
+    RigSchema,
+    check_conditions,
+    checked_numbers,
+    number_or_none,
+    schema_of,
+)
 from fes_pin.data.show import DataFrame, frame
 from fes_pin.data.table import MIN_ROWS, Table, check_time, check_times, format_csv
 
@@ -58,14 +65,15 @@ class Trial(ReadOnly):
     as_read
         The files that it was read from; None of a trial that was made in memory. Not compared.
     origin_s
-        Time from which its causes act, s, where it is a part of a trial; None: that of its own first sample.
+        Time at which the trial began of which it is a part, s: causes that depend on time count from there. None: it
+        begins with its own first sample.
 
     Raises
     ------
     InputError
         Fewer than 3 samples, times that do not increase in equal steps (as `fes_pin.data.table.check_times` says), a
-        column that is not as long as the time, numbers that are not finite, another role, a condition that is not a
-        number.
+        column that is not as long as the time, numbers that are not finite, another role, a condition or an
+        origin that is not a number.
     """
 
     name: str
@@ -87,6 +95,7 @@ class Trial(ReadOnly):
             checked_label(self.kind, error, "kind", "a kind")
         given = {key: checked_mapping(getattr(self, key), error, key) for key in ("columns", "conditions")}
         conditions = checked_numbers(given["conditions"], dict.fromkeys(given["conditions"], NumberKey("")), error)
+        origin = number_or_none(self.origin_s, NumberKey("s"), "origin_s", error)
         time = _numbers(self.time, "time_s", self)
         columns = {name: _numbers(values, name, self) for name, values in given["columns"].items()}
         if self.as_read is not None:
@@ -96,7 +105,7 @@ class Trial(ReadOnly):
         if odd := [name for name, values in columns.items() if values.shape != time.shape]:
             raise self.error(f"expected shape {time.shape} as of the time, found {columns[odd[0]].shape}", odd[0])
         check_times(time, self.error, half_digit=self.as_read.half_digit if self.as_read else None)
-        vars(self).update(labels, time=time, columns=columns, conditions=conditions)
+        vars(self).update(labels, time=time, columns=columns, conditions=conditions, origin_s=origin)
         self._freeze()
 
     def error(self, message: str, column: str, sample: int | None = None) -> InputError:
@@ -177,14 +186,12 @@ class Trial(ReadOnly):
         if len(rows) < MIN_ROWS:
             ends = f"{self.time[0]:g} to {self.time[-1]:g} s"
             raise self.error(f"expected at least {MIN_ROWS} samples, found {len(rows)} of those from {ends}", "time_s")
-        part = self.part(slice(int(rows[0]), int(rows[-1]) + 1))
+        part = derived_trial(self.part(slice(int(rows[0]), int(rows[-1]) + 1)), origin_s=None)
         cut = f"the first {part.time[0] - self.time[0]:.4g} s are cut off"
-        return (
-            part if part.time[0] == self.time[0] else derived_trial(part, remarks=(*self.remarks, cut), origin_s=None)
-        )
+        return part if part.time[0] == self.time[0] else derived_trial(part, remarks=(*self.remarks, cut))
 
     def part(self, rows: slice) -> Trial:
-        """Some rows of the trial, whose causes act from where they did; what was stated of its first sample is lost."""
+        """Some rows of the trial, with its origin; what was stated of its first sample is lost with that sample."""
         stated = {n: v for n, v in self.conditions.items() if not rows.start or n not in OF_THE_START}
         if rows.start and BEGAN in stated:
             stated[BEGAN] += float(self.time[rows.start] - self.time[0])

@@ -70,8 +70,8 @@ class InverseDynamics(Estimator):
     def state(self, first: RigState) -> RigState | None:
         """Return the state of its set, fitted by the likelihood; None where the first state has the same.
 
-        Causes that both sets have may have the forms of the first. Of the sets that efforts do not distinguish it is
-        the likeliest, without causes that are not significant in it.
+        Causes of both sets begin in the forms of the first. Of the sets that efforts do not distinguish it is the
+        likeliest, without causes that are not significant in it.
         """
         models, search = first.search.models, first.search
         by_effort = models.by_effort

@@ -108,7 +108,7 @@ def _erfcx(x: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """One trial as it was read: times since causes act, readings and efforts, shape (n,), and the kind of the trial."""
+    """One trial as it was read: times from its origin, readings and efforts, shape (n,), and the kind of the trial."""
 
     name: str
     time: np.ndarray

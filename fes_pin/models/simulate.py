@@ -292,7 +292,7 @@ def lane_values(layout: Layout, values: EachTrial, unknowns: EachTrial) -> np.nd
 
 
 def timing(trial: Trial, steps: int) -> dict[str, float]:
-    """Return the constants that every program reads; the first is the time of the first sample since causes act, s."""
+    """Return the constants that every program reads, s; `t0` is the time of the first sample from the origin."""
     return {"t0": float(trial.since_origin[0]), "dt": trial.dt, "step": trial.dt / steps, "shift": 0.0}
 
 

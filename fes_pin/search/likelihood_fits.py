@@ -478,12 +478,12 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         super().converge_rivals(names, name)
 
     def in_other_forms(self, whole: LikelihoodFit, sets: Sequence[Names]) -> list[Names]:
-        """Return the fitted sets in which a cause that a fit has too has another form."""
+        """Return the sets in which a cause has another form than in a fit."""
         known = {k: frozenset(one for one in self.form_of(whole) if one[0] in k) for k in sets}
         return [k for k in sets if not known[k] <= self.form_of(self.fits[k])]
 
     def begin_at(self, whole: LikelihoodFit, sets: Sequence[Names]) -> None:
-        """Begin fitted sets again at a fit: its causes that they have, in its forms, and their others at no effect."""
+        """Fit sets again from a fit, and keep what is likelier: shared causes have its values, the others no effect."""
 
         def looked(names: Names) -> LikelihoodFit:
             shared = [e for e in whole.model.effects if e.name in names]

@@ -1,13 +1,11 @@
 """What fits only where a cause ends that can be is no answer, however well it fits."""
 
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
 from driven_rigs.draw import BASES, draw
 
-from fes_pin.data.stuck import piece
 from fes_pin.data.study import read_study
 from fes_pin.identify.fit import fit_problem
 from fes_pin.identify.likelihood import LikelihoodProblem
@@ -77,15 +75,3 @@ def test_a_lag_of_less_than_half_a_row_is_the_logs(rows, possible, tmp_path):
 def test_an_effort_that_hardly_acts_is_no_cause(error, possible):
     """Something else moves such a joint; an effort of the wrong sign is one that acts."""
     assert are_possible([EffortGain(error=error)], (), {}) is possible
-
-
-def test_a_part_of_a_recording_keeps_the_time_of_the_recording(tmp_path):
-    """Half a recording holds about one wave of a slow motion, whatever moves it; the recording holds more."""
-    study = in_another_unit(tmp_path, 1.0)
-    model, trial = nominal_model(study), study.trials[0]
-    ends = np.linspace(0, len(trial), 4).round().astype(int)
-    parts = [piece(trial, slice(int(a), int(b)), k) for k, (a, b) in enumerate(pairwise(ends))]
-    whole, cut = (measured_columns(model, [*many, study.trials[1]]) for many in ([trial], parts))
-    for name, values in whole.items():
-        np.testing.assert_array_equal(cut[name], values)
-    assert (np.diff(cut["time"]) < 0.0).sum() == 1

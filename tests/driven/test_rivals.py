@@ -31,7 +31,7 @@ def test_a_set_is_fitted_again_beside_a_cause_whose_form_has_changed():
 
 
 def test_a_rival_begins_in_the_form_that_friction_has_beside_the_cause():
-    """A spring beside plain friction had been told from an offset beside friction with more of it at rest."""
+    """Else a spring with one form of friction would be compared with an offset with another form of it."""
     sets = LikelihoodFits(believed(), [trial(1), trial(2)], [CoulombFriction, EffortOffset, ParallelStiffness])
     plain = sets.nominal().model + CoulombFriction()
     sets.fits[FRICTION] = sets._maximum(plain, sets.nominal().noise)

@@ -51,5 +51,12 @@ def test_causes_of_a_part_act_from_the_beginning_of_its_trial(cause, begins_s):
 def test_a_stretch_that_a_user_cuts_is_a_trial_of_its_own():
     trial = swung(Model(RIG))
     assert trial.between(2.0, 5.0).origin_s is None and trial.between(2.0, 5.0).since_origin[0] == 0.0
-    late = trial.part(slice(500, 900)).part(slice(100, 300))
+    late = trial.part(slice(500, 900))
+    assert late.between(2.0, 9.0).origin_s is None
+    late = late.part(slice(100, 300))
     assert late.origin_s == 0.0 and late.since_origin[0] == pytest.approx(2.4)
+
+
+def test_an_origin_is_a_number():
+    with pytest.raises(fp.InputError, match=r"origin_s: expected a number"):
+        Trial("a", "motion", {"position": np.zeros(5)}, np.arange(5.0), origin_s="a")
