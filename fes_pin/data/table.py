@@ -50,6 +50,8 @@ class Table:
         The same of any column by its name, in its unit; 0 where numbers are not printed.
     called
         The file's own names of columns that have other ones here.
+    said
+        What its reader assumed, changed or left out, a sentence each; they become remarks of the trial.
     """
 
     path: Path
@@ -61,6 +63,7 @@ class Table:
     half_digit: float | None = None
     half_digit_of: Callable[[str], float] = lambda _name: 0.0
     called: Mapping[str, str] = field(default_factory=dict)
+    said: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.rows)

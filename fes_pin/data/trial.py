@@ -397,9 +397,9 @@ def read_trial(
             columns, time = _body_columns(path, inputs_only)
             check_values(columns, schema, lambda message, column, _: error(column, message))
             return _made(columns, time, AsRead(sha256, b""), **labels)
-        table, said = (read_csv_or_hint(path), "") if own is None else own.read(path, schema, kind, inputs_only)
+        table = read_csv_or_hint(path) if own is None else own.read(path, schema, kind, inputs_only)
     columns, time = _checked_columns(table, schema, kind, inputs_only)
-    labels["remarks"] += (said,) if said else ()
+    labels["remarks"] += table.said
     return _made(columns, time, AsRead(sha256, b"", table.half_digit), **labels)
 
 

@@ -158,7 +158,8 @@ def test_jitter_and_missing_samples_are_filled_in_where_the_study_says_so(tmp_pa
     assert np.allclose(trial["position"], np.radians(40.0 * np.sin(3.0 * trial.time)), atol=2e-3)
     held = np.searchsorted(time, trial.time + 1e-9, side="right") - 1
     assert np.array_equal(trial["effort"], held // 10)  # an input keeps its value until the next sample
-    assert trial.remarks[0].startswith("3 missing samples are filled in; time steps of 9")
+    assert trial.remarks[0] == "3 missing samples are filled in"
+    assert trial.remarks[1].startswith("time steps of 9")
 
 
 def test_gaps_are_not_filled_in(tmp_path):

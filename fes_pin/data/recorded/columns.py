@@ -80,12 +80,8 @@ class Columns:
     resample_hz: float | None = None
     fills: bool = False
 
-    def read(self, path: str | Path, schema: RigSchema, kind: str, inputs_only: bool = False) -> tuple[Table, str]:
-        """The rig's columns of one recording, in the study format's units, time first.
-
-        Returns
-        -------
-        Table, and what was done to its samples, in words: "" for nothing
+    def read(self, path: str | Path, schema: RigSchema, kind: str, inputs_only: bool = False) -> Table:
+        """The rig's columns of one recording, in the study format's units, time first; `said` has what was done to them.
 
         Raises
         ------
@@ -100,8 +96,8 @@ class Columns:
         columns = {c: s(recording.columns[s.name]) for c, s in taken.items() if c != "time_s"}
         called = {column: source.name or column for column, source in taken.items()}
         table = replace(recording, called=called, names=("time_s", *columns), columns={"time_s": time, **columns})
-        table, said = self._regular(table, schema.stimuli(kind))
-        return replace(table, half_digit=half_digit if self.resample_hz is None else 0.0), said
+        table = self._regular(table, schema.stimuli(kind))
+        return replace(table, half_digit=half_digit if self.resample_hz is None else 0.0)
 
     def _taken(self, recording: Table, schema: RigSchema, kind: str, inputs_only: bool) -> dict[str, ColumnSource]:
         """Sources of this file's columns; a column of the file that no source names is an error."""
@@ -138,9 +134,9 @@ class Columns:
         half_digit = abs(source.scale * source.factor) * recording.half_digit_of(source.name)
         return source(recording.columns[source.name]), half_digit
 
-    def _regular(self, table: Table, held: tuple[str, ...]) -> tuple[Table, str]:
-        """Times and columns without holes, and what was done, in words."""
-        said = []
+    def _regular(self, table: Table, held: tuple[str, ...]) -> Table:
+        """Times and columns without holes."""
+        said = list(table.said)
         for name, values in table.columns.items():
             if np.isnan(values).any() and (name == "time_s" or not self.fills):
                 hint = f'a number, found nothing; missing = "{INTERPOLATE}" in [columns.file] fills in short gaps'
@@ -156,7 +152,7 @@ class Columns:
             table = resampled(table, held, self.resample_hz)
             was = f"{1e3 * steps.min():.4g} to {1e3 * steps.max():.4g} ms"
             said.append(f"time steps of {was} are interpolated to {self.resample_hz:g} Hz, without a filter")
-        return table, "; ".join(said)
+        return replace(table, said=tuple(said))
 
 
 def columns_of(table: Mapping[str, Any], schema: RigSchema, revolute: bool | None, error: KeyFault) -> Columns:
