@@ -22,17 +22,28 @@ from fes_pin.data.files import as_path, hold, what_is_at, write_files
 from fes_pin.data.numbers import instance
 from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.recorded.columns import Columns
-from fes_pin.data.schema import Rigs, RigSchema, check_conditions, check_known, checked_numbers, known_rigs, schema_of
+from fes_pin.data.recorded.view import View, view_of
+from fes_pin.data.schema import (
+    OF_A_VIEW,
+    Rigs,
+    RigSchema,
+    check_conditions,
+    check_known,
+    checked_numbers,
+    known_rigs,
+    schema_of,
+)
 from fes_pin.data.show import DataFrame, by_columns, frame, table_html
 from fes_pin.data.study_text import HORIZON, StudyTables, check_files, checked_horizon
 from fes_pin.data.table import format_csv
 from fes_pin.data.toml import Document, document_of, read_toml
 from fes_pin.data.trial import (
+    Recordings,
     Trial,
     check_trial,
     derived_trial,
     read_body_trial,
-    read_trial,
+    read_view,
     trial_csv,
     walk_recordings,
 )
@@ -364,9 +375,13 @@ class _Reader(StudyTables):
     def study(self) -> Study:
         constants, files = self.rig_table()
         start = self.start_table(constants)
-        own, tables = self.columns_table(files), self._trial_tables()
-        each = enumerate(zip(tables, self._trial_names(tables), strict=True))
-        trials = with_kinds([self._trial(f"trial[{i}]", table, name, own) for i, (table, name) in each], self.schema)
+        written, tables = self.recordings_tables(files), self._trial_tables()
+        views = [self._view(f"trial[{i}]", table, written) for i, table in enumerate(tables)]
+        names = self._trial_names(tables, views)
+        each = enumerate(zip(tables, views, names, strict=True))
+        read = [self._trials(f"trial[{i}]", table, view, name) for i, (table, view, name) in each]
+        self._places = [i for i, some in enumerate(read) for _ in some]
+        trials = with_kinds([one for some in read for one in some], self.schema)
         check_same_inputs([(t.kind, t.columns) for t in trials], self.schema, constants, self._fault_of)
         horizon = checked_horizon(self.document.table("study").get(HORIZON), self.document.under("study"))
         folder = self.folder.absolute()
@@ -380,40 +395,63 @@ class _Reader(StudyTables):
             raise self.error("trial", "missing; expected at least one table [[trial]]")
         return tables
 
-    def _trial_names(self, tables: Sequence[Mapping[str, Any]]) -> list[str]:
-        """What trials call themselves, else the stems of their files, or their paths where stems are the same."""
-        main = self.schema.recordings[0]
-        paths: list[PurePosixPath] = []
-        seen: dict[Path, str] = {}
-        for index, table in enumerate(tables):
-            key = f"trial[{index}].{main}"
-            if main not in table:
-                raise self.error(key, "missing; expected the path of a file inside the study")
-            path = self.document.path_of(key, table[main]).resolve()
-            if path in seen:
-                raise self.error(key, f"the same file as {seen[path]}")
-            seen[path] = key
-            paths.append(PurePosixPath(table[main].replace("\\", "/")))
-        stems = Counter(path.stem for path in paths)
-        names = [path.stem if stems[path.stem] == 1 else str(path.with_suffix("")) for path in paths]
-        return [table.get("name", name) for table, name in zip(tables, names, strict=True)]
-
-    def _trial(self, where: str, table: Mapping[str, Any], name: str, own: Columns | None) -> Trial:
+    def _view(
+        self, where: str, table: Mapping[str, Any], written: Mapping[str, Columns | None]
+    ) -> tuple[Recordings, View]:
+        """The files of a trial by their sources, and which part of them it is."""
         named, error = self.schema.recordings, self.document.under(where)
+        stated = [key for key in ("file", "sources") if key in table]
+        if len(named) > 1 or stated != ["sources"]:
+            if len(named) == 1 and len(stated) > 1:
+                raise error("sources", "expected file or sources, found both")
+            for key in named:
+                if key not in table:
+                    raise error(key, "missing; expected the path of a file inside the study")
+            paths = {key: self.document.path_of(f"{where}.{key}", table[key]) for key in named}
+            return {key: (path, written.get("")) for key, path in paths.items()}, view_of(table, (), error)
+        sources = table["sources"]
+        if not isinstance(sources, dict) or not sources:
+            raise error("sources", 'expected a table like { motor = "a.csv", force = "b.csv" }')
+        check_known(sources, [n for n in written if n], lambda key, message: error(f"sources.{key}", message))
+        files = {n: self.document.path_of(f"{where}.sources.{n}", f) for n, f in sources.items()}
+        return {n: (path, written[n]) for n, path in files.items()}, view_of(table, tuple(sources), error)
+
+    def _trial_names(self, tables: Sequence[Mapping[str, Any]], views: Sequence[tuple[Recordings, View]]) -> list[str]:
+        """What trials call themselves, else the stems of their files, or their paths where stems are the same."""
+        paths: list[PurePosixPath] = []
+        seen: dict[Path, list[tuple[str, View]]] = {}
+        for index, (table, (recordings, view)) in enumerate(zip(tables, views, strict=True)):
+            main, (path, _) = next(iter(recordings.items()))
+            key = f"trial[{index}].{main if main in table else f'sources.{main}'}"
+            for other, earlier in seen.get(path.resolve(), []):
+                if view.overlaps(earlier):
+                    raise self.error(key, f"the same file as {other}; expected from and to that tell them apart")
+            seen.setdefault(path.resolve(), []).append((key, view))
+            paths.append(PurePosixPath((table[main] if main in table else table["sources"][main]).replace("\\", "/")))
+        stems = Counter(path.stem for path in dict.fromkeys(paths))
+        names = [path.stem if stems[path.stem] == 1 else str(path.with_suffix("")) for path in paths]
+        count = Counter(names)
+        twice = [f"{n}-{names[:k].count(n) + 1}" if count[n] > 1 else n for k, n in enumerate(names)]
+        return [table.get("name", name) for table, name in zip(tables, twice, strict=True)]
+
+    def _trials(self, where: str, table: Mapping[str, Any], seen: tuple[Recordings, View], name: str) -> list[Trial]:
+        """The trials of one `[[trial]]`: one, or the parts that its view is split into."""
+        recordings, view = seen
+        error = self.document.under(where)
         kind, labels = self.schema.kind_of(table.get("kind"), error), checked_labels(name, table, error)
-        rest = {key: value for key, value in table.items() if key not in (*named, "kind", *labels)}
+        of_all = (*self.schema.recordings, *OF_A_VIEW, "kind", *labels)
+        rest = {key: value for key, value in table.items() if key not in of_all}
         labels["conditions"] = check_conditions(self.schema, kind, rest, error)
-        for key in named:
-            if key not in table:
-                raise error(key, "missing; expected the path of a file inside the study")
-        paths = [self.document.path_of(f"{where}.{key}", table[key]) for key in named]
-        if len(paths) == 1:
-            trial = read_trial(paths[0], rig=self.schema, kind=kind, own=own, **labels)
-            return trial if "kind" in table else derived_trial(trial, kind="")
-        return read_body_trial(paths[0], paths[1], **labels)
+        if len(self.schema.recordings) > 1:
+            (coordinates, _), (reaction, _) = recordings.values()
+            if odd := [key for key in OF_A_VIEW if key in table and key not in ("from", "to")]:
+                raise error(odd[0], f"expected no {odd[0]} of a rig {self.rig}: from and to alone")
+            return [read_body_trial(coordinates, reaction, view, **labels)]
+        trials = read_view(recordings, view, self.schema, {**labels, "kind": kind})
+        return trials if "kind" in table else [derived_trial(t, kind="") for t in trials]
 
     def _fault_of(self, place: int | None, key: str, message: str) -> InputError:
-        return self.error(f"rig.{key}" if place is None else f"trial[{place}].{key}", message)
+        return self.error(f"rig.{key}" if place is None else f"trial[{self._places[place]}].{key}", message)
 
 
 def write_study(study: Study, folder: str | Path) -> None:

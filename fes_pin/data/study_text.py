@@ -61,7 +61,7 @@ class StudyTables:
         self.document, self.rigs = document, rigs
         self.folder = document.path.parent
         self.error = document.error
-        check_known(document.data, ("study", "rig", "start", "columns", "trial"), self.error)
+        check_known(document.data, ("study", "rig", "start", "columns", "sources", "trial"), self.error)
         self.name, self.rig = self._study_table()
         self.schema = rigs[self.rig]
 
@@ -105,11 +105,20 @@ class StudyTables:
         """How the recordings are written, where the study says so."""
         if "columns" not in self.document.data:
             return None
+        return self._columns("columns", self.document.table("columns"), files)
 
+    def recordings_tables(self, files: Mapping[str, Path]) -> dict[str, Columns | None]:
+        """How the files of each source are written, by its name; "" for those of trials with one file."""
+        sources = self.document.table("sources")
+        tables = {name: self.document.table(f"sources.{name}", sources) for name in sources}
+        own = {name: self._columns(f"sources.{name}", table, files) for name, table in tables.items()}
+        return {"": self.columns_table(files), **own}
+
+    def _columns(self, where: str, table: Mapping[str, Any], files: Mapping[str, Path]) -> Columns:
         def error(key: str, message: str) -> InputError:
-            return self.error(f"columns.{key}".rstrip("."), message)
+            return self.error(f"{where}.{key}".rstrip("."), message)
 
-        return columns_of(self.document.table("columns"), self.schema, is_revolute(files.get("urdf")), error)
+        return columns_of(table, self.schema, is_revolute(files.get("urdf")), error)
 
 
 HEADER = ("# Written by `fes-pin new-study`; every line may be changed. docs/study_format.md says what each means.",)

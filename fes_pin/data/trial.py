@@ -19,7 +19,9 @@ from fes_pin.data.motion import GROUND_REACTION, coordinates_of, ground_reaction
 from fes_pin.data.numbers import instance
 from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.recorded.columns import Columns
+from fes_pin.data.recorded.parts import RESTARTS, restarts
 from fes_pin.data.recorded.sniff import NEW_STUDY, read_csv_or_hint
+from fes_pin.data.recorded.view import View, joined
 from fes_pin.data.schema import (
     NumberKey,
     RigSchema,
@@ -392,15 +394,74 @@ def read_trial(
     labels |= {"kind": kind, "conditions": check_conditions(schema, kind, given, error)}
     if own is not None:
         instance(own, Columns, "own")
-    with hashing() as sha256:
-        if len(schema.recordings) > 1:
+    if len(schema.recordings) > 1:
+        with hashing() as sha256:
             columns, time = _body_columns(path, inputs_only)
-            check_values(columns, schema, lambda message, column, _: error(column, message))
-            return _made(columns, time, AsRead(sha256, b""), **labels)
-        table = read_csv_or_hint(path) if own is None else own.read(path, schema, kind, inputs_only)
-    columns, time = _checked_columns(table, schema, kind, inputs_only)
-    labels["remarks"] += table.said
-    return _made(columns, time, AsRead(sha256, b"", table.half_digit), **labels)
+        check_values(columns, schema, lambda message, column, _: error(column, message))
+        return _made(columns, time, AsRead(sha256, b""), **labels)
+    return read_view({"": (path, own)}, View(), schema, labels, inputs_only)[0]
+
+
+Recordings = Mapping[str, tuple[Path, Columns | None]]
+"""Files of a trial by the name of their source, and how each is written: None as the study format has it."""
+
+
+def read_view(
+    recordings: Recordings, view: View, schema: RigSchema, labels: Mapping[str, Any], inputs_only: bool = False
+) -> list[Trial]:
+    """The trials that a view makes of recordings: one, or its parts, which are called NAME-1, NAME-2 ...
+
+    Parameters
+    ----------
+    labels
+        Fields of each trial, checked; `position0` and `velocity0` are those of the first part alone.
+
+    Raises
+    ------
+    InputError
+        As `read_trial`, `joined`, `View.parts` and `View.derived`.
+    """
+    kind, held = labels["kind"], schema.stimuli(labels["kind"])
+    with hashing() as sha256:
+        tables = {n: _as_recorded(*one, schema, kind, inputs_only, view) for n, one in recordings.items()}
+    own = next(iter(recordings.values()))[1] or Columns({})
+    if len(tables) > 1:
+        whole = {n: replace(recordings[n][1] or own, resample_hz=None).regular(t, held) for n, t in tables.items()}
+        table = joined(whole, view.offsets, held)
+    else:
+        table = next(iter(tables.values()))
+    if view.rate_hz is not None:
+        own = replace(own, resample_hz=view.rate_hz)
+    moved = [n for n in (*schema.outputs.values(), *schema.imposed, "velocity") if n in table.columns]
+    parts = view.parts(table, [n for n in moved if n not in held] or moved)
+    trials = []
+    for place, part in enumerate(parts):
+        regular = view.derived(own.regular(part, held))
+        columns, time = _checked_columns(regular, schema, kind, inputs_only)
+        fields_of = dict(labels) | {"remarks": (*labels["remarks"], *regular.said)}
+        if len(parts) > 1:
+            fields_of["name"] = f"{labels['name']}-{place + 1}"
+            fields_of["conditions"] = _conditions_of(place, time[0] - table.time[0], labels["conditions"], view)
+        trials.append(_made(columns, time, AsRead(sha256, b"", regular.half_digit), **fields_of))
+    return trials
+
+
+def _as_recorded(path: Path, own: Columns | None, schema: RigSchema, kind: str, inputs_only: bool, view: View) -> Table:
+    """The rig's columns of one file, sample by sample; of several sources none has them all."""
+    if own is None:
+        return read_csv_or_hint(path)
+    return own.taken(path, schema, kind, inputs_only or bool(view.derive) or view.is_joined, view.also)
+
+
+def _conditions_of(place: int, later_s: float, stated: Mapping[str, float], view: View) -> dict[str, float]:
+    """Conditions of a part of a recording: of its later parts nothing states where they begin."""
+    kept = {n: v for n, v in stated.items() if not place or n not in OF_THE_START}
+    if place and BEGAN in kept:
+        if view.split == RESTARTS:  # how long the pause was nobody recorded
+            del kept[BEGAN]
+        else:
+            kept[BEGAN] += later_s
+    return kept
 
 
 def _made(columns: Mapping[str, np.ndarray], time: np.ndarray, as_read: AsRead, **labels: Any) -> Trial:
@@ -418,6 +479,9 @@ def _checked_columns(
     if table.names[0] != "time_s":
         raise table.error(f"expected time_s as the first column, found {table.names[0][:40]!r}; {NEW_STUDY}", "time_s")
     check_columns(table.names[1:], schema, kind, inputs_only, table.error)
+    if len(anew := restarts(table.time)):
+        hint = f'split = "{RESTARTS}" in its [[trial]] makes {len(anew) + 1} trials of it'
+        raise table.error(f"expected time to increase, it starts anew; {hint}", "time_s", int(anew[0]))
     check_time(table)
     columns = {name: table.columns[name] for name in table.names[1:]}
     check_values(columns, schema, table.error, -math.inf)  # a study with its threshold judges widths
@@ -433,9 +497,17 @@ def _body_columns(path: Path, inputs_only: bool) -> tuple[dict[str, np.ndarray],
 
 
 def read_body_trial(
-    coordinates: Path, ground_reaction: Path, *, name: str, conditions: Mapping[str, float], **labels: Any
+    coordinates: Path,
+    ground_reaction: Path,
+    view: View | None = None,
+    *,
+    name: str,
+    conditions: Mapping[str, float],
+    **labels: Any,
 ) -> Trial:
     """Read a walking trial from its two files, on the coordinates' times; `labels` are further fields of it.
+
+    Of a view its two ends are taken.
 
     Raises
     ------
@@ -445,6 +517,8 @@ def read_body_trial(
     with hashing() as sha256:
         moves, in_degrees = read_motion(coordinates)
         pushes, _ = read_motion(ground_reaction)
+    if view is not None:
+        (moves,), (pushes,) = view.parts(moves, ()), view.parts(pushes, ())
     recordings = ((moves.time, coordinates_of(moves, in_degrees)), (pushes.time, ground_reaction_of(pushes)))
     time, columns = on_common_time(*recordings[0], *recordings[1])
     if len(time) < MIN_ROWS:

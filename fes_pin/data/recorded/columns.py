@@ -1,6 +1,6 @@
 """The table `[columns]` of a study: which column of the recordings is which of the rig's, in which unit."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -81,25 +81,53 @@ class Columns:
     fills: bool = False
 
     def read(self, path: str | Path, schema: RigSchema, kind: str, inputs_only: bool = False) -> Table:
-        """The rig's columns of one recording, in the study format's units, time first; `said` has what was done to them.
+        """The rig's columns of one recording, as a trial has them: `taken`, then `regular`."""
+        return self.regular(self.taken(path, schema, kind, inputs_only), schema.stimuli(kind))
+
+    def taken(
+        self, path: str | Path, schema: RigSchema, kind: str, inputs_only: bool = False, also: Collection[str] = ()
+    ) -> Table:
+        """The rig's columns of one recording, in the study format's units, time first, sample by sample as recorded.
+
+        Parameters
+        ----------
+        also
+            Columns of the file that are read as they are, where it has them.
 
         Raises
         ------
         InputError
-            As `read_recording`; a column that is missing, or neither taken nor ignored; samples that are missing or
-            times that are not equally spaced, where the table does not say what to do with them.
+            As `read_recording`; a column that is missing, or neither taken nor ignored.
         """
         names = tuple(dict.fromkeys([s.name for s in self.sources.values() if s.name] + list(schema.columns)))
-        recording = read_recording(path, self.form, names)
-        taken = self._taken(recording, schema, kind, inputs_only)
+        recording = read_recording(path, self.form, (*names, *also))
+        taken = self._taken(recording, schema, kind, inputs_only, also)
         time, half_digit = self._time(recording, taken.get("time_s"))
         columns = {c: s(recording.columns[s.name]) for c, s in taken.items() if c != "time_s"}
+        columns |= {n: recording.columns[n] for n in also if n in recording.columns and n not in columns}
         called = {column: source.name or column for column, source in taken.items()}
-        table = replace(recording, called=called, names=("time_s", *columns), columns={"time_s": time, **columns})
-        table = self._regular(table, schema.stimuli(kind))
-        return replace(table, half_digit=half_digit if self.resample_hz is None else 0.0)
+        columns = {"time_s": time, **columns}
+        return replace(recording, called=called, names=tuple(columns), columns=columns, half_digit=half_digit)
 
-    def _taken(self, recording: Table, schema: RigSchema, kind: str, inputs_only: bool) -> dict[str, ColumnSource]:
+    def regular(self, table: Table, held: tuple[str, ...]) -> Table:
+        """A table without missing samples, at equally spaced times where a rate is stated.
+
+        Parameters
+        ----------
+        held
+            Columns whose value holds until the next sample.
+
+        Raises
+        ------
+        InputError
+            Samples that are missing or times that are not equally spaced, where nothing says what to do with them.
+        """
+        table = self._regular(table, held)
+        return replace(table, half_digit=table.half_digit if self.resample_hz is None else 0.0)
+
+    def _taken(
+        self, recording: Table, schema: RigSchema, kind: str, inputs_only: bool, also: Collection[str]
+    ) -> dict[str, ColumnSource]:
         """Sources of this file's columns; a column of the file that no source names is an error."""
         measured = () if inputs_only else (schema.outputs[kind],)
         needed = {"time_s", *schema.stimuli(kind), *schema.motion(kind)[:1], *measured}
@@ -115,7 +143,7 @@ class Columns:
                     raise recording.error(message, source.name)
                 continue
             taken[column] = source
-        declared = {*self.ignored, *(s.name for s in self.sources.values())}
+        declared = {*self.ignored, *also, *(s.name for s in self.sources.values())}
         for name in recording.names:
             if name in declared:
                 continue
@@ -143,7 +171,7 @@ class Columns:
                 expected = "a time, found nothing" if name == "time_s" else hint
                 raise table.error(f"expected {expected}", name, int(np.argmax(np.isnan(values))))
         if self.resample_hz is not None:
-            check_steps(table)
+            said += check_steps(table, self.resample_hz)
         if self.fills:
             table, count = filled(table, held)
             said += [f"{count} missing samples are filled in"] if count else []

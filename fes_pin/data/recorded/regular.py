@@ -38,7 +38,7 @@ def filled(table: Table, held: Collection[str]) -> tuple[Table, int]:
         if not there.all():
             _check_gaps(table, there, name)
             count += int(np.count_nonzero(~there))
-            out[name] = _at(table.time, table.time[there], values[there], name in held)
+            out[name] = at_times(table.time, table.time[there], values[there], name in held)
     return replace(table, columns=out), count
 
 
@@ -69,25 +69,36 @@ def resampled(table: Table, held: Collection[str], rate_hz: float) -> Table:
             out[name] = np.zeros(len(grid))
             out[name][places] = 1.0
         elif name != "time_s":
-            out[name] = _at(grid, time, values, name in held)
+            out[name] = at_times(grid, time, values, name in held)
     return replace(table, columns=out, rows=table.rows[np.searchsorted(time, grid + 1e-9, side="right") - 1])
 
 
-def check_steps(table: Table) -> None:
-    """Require times that increase, without a hole.
+def check_steps(table: Table, rate_hz: float) -> tuple[str, ...]:
+    """What is said of holes that are bridged: longer than `LONGEST_GAP` recorded steps, not than so many at a rate.
+
+    Parameters
+    ----------
+    rate_hz
+        At which the table will be resampled: with longer steps a hole of a fast recording is a short one.
 
     Raises
     ------
     InputError
-        With the row.
+        Times that do not increase, or a longer hole, with the row.
     """
     steps = np.diff(table.time)
     if not (steps > 0).all():
         raise table.error("expected time to increase", "time_s", int(np.argmax(steps <= 0)) + 1)
     longest, usual = int(np.argmax(steps)), float(np.median(steps))
-    if steps[longest] > LONGEST_GAP * usual:
-        found = f"expected steps of at most {LONGEST_GAP} usual ones of {usual:.4g} s, found {steps[longest]:.4g} s"
-        raise table.error(f"{found}; make two trials of it", "time_s", longest + 1)
+    longer = max(usual, 1.0 / rate_hz)
+    if steps[longest] > LONGEST_GAP * longer:
+        found = f"expected steps of at most {LONGEST_GAP} usual ones of {longer:.4g} s, found {steps[longest]:.4g} s"
+        hint = 'split = "holes" of its [[trial]] makes two trials of it'
+        raise table.error(f"{found}; {hint}", "time_s", longest + 1)
+    if not (bridged := np.flatnonzero(steps > LONGEST_GAP * usual)).size:
+        return ()
+    most = f"{1e3 * steps[longest]:.4g} ms at {table.time[longest]:.6g} s"
+    return (f"holes in time are bridged: {len(bridged)}, the longest {most}",)
 
 
 def _check_gaps(table: Table, there: np.ndarray, name: str) -> None:
@@ -98,10 +109,13 @@ def _check_gaps(table: Table, there: np.ndarray, name: str) -> None:
     steps = np.diff(known)
     if (most := int(steps.max())) > LONGEST_GAP:
         found = f"{most - 1} samples in a row are missing; expected at most {LONGEST_GAP - 1}"
-        raise table.error(f"{found}; make two trials of it", name, int(known[np.argmax(steps > LONGEST_GAP)]) + 1)
+        raise table.error(
+            f"{found}; from and to of a [[trial]] leave them out", name, int(known[np.argmax(steps > LONGEST_GAP)]) + 1
+        )
 
 
-def _at(times: np.ndarray, known: np.ndarray, values: np.ndarray, held: bool) -> np.ndarray:
+def at_times(times: np.ndarray, known: np.ndarray, values: np.ndarray, held: bool) -> np.ndarray:
+    """Values of known times at others: the last one before where they are held, else interpolated linearly."""
     if not held:
         return np.interp(times, known, values)
     after = np.searchsorted(known, times + 1e-9 * (known[-1] - known[0]), side="right")
