@@ -30,7 +30,22 @@ if TYPE_CHECKING:
 
 @needs(
     **dict.fromkeys(
-        ("urdf", "rig", "name", "column", "setting", "role", "group", "resample", "fill", "library"), "files"
+        (
+            "urdf",
+            "rig",
+            "name",
+            "column",
+            "setting",
+            "role",
+            "group",
+            "resample",
+            "source",
+            "offset",
+            "split",
+            "fill",
+            "library",
+        ),
+        "files",
     ),
     upright="pendulum rod",
 )
@@ -72,6 +87,16 @@ def new_study(
     resample: Annotated[
         float | None, typer.Option(min=0.0, help="Hz: interpolate times that are not equally spaced.")
     ] = None,
+    source: Annotated[
+        list[str] | None,
+        typer.Option(help="Several files a trial: motor=*_motor, force=*_force; columns are then motor.NAME."),
+    ] = None,
+    offset: Annotated[
+        list[str] | None, typer.Option(help="Added to the times of a source, s: force=0.004, or force=fit.")
+    ] = None,
+    split: Annotated[
+        str | None, typer.Option(help="Several trials a file: restarts, holes, rests, a column that changes; or none.")
+    ] = None,
     fill: Annotated[bool, typer.Option("--fill", help="Fill in short gaps of missing samples.")] = False,
     force: Annotated[
         bool, typer.Option("--force", help="Write over a study.toml that is there, and a URDF that was changed.")
@@ -86,6 +111,7 @@ def new_study(
     from fes_pin.data.new_body_study import new_body_study
     from fes_pin.data.new_study import new_study as make
     from fes_pin.data.new_study import with_kind
+    from fes_pin.data.new_view import offsets_of
     from fes_pin.data.wanted import Wanted
     from fes_pin.diagnosis.checked import odd_lines
     from fes_pin.models.nominal import guess_start
@@ -117,6 +143,9 @@ def new_study(
         labels={"role": pairs("--role", role), "group": pairs("--group", group)},
         resample_hz=resample,
         fill=fill,
+        sources=pairs("--source", source),
+        split=split,
+        offsets=offsets_of(pairs("--offset", offset)),
         ask=_ask if sys.stdin.isatty() and sys.stdout.isatty() else None,
     )
     if schema.owner is None:
@@ -133,7 +162,7 @@ def new_study(
     outputs.write(folder, made.contents)
     for own, theirs, unit in made.taken:
         typer.echo(f"{own:16s} is {theirs}{f', in {unit}' if unit else ''}")
-    print_text("\n".join([*left_out, *odd_lines(study, warnings)]))
+    print_text("\n".join([*made.said, *left_out, *odd_lines(study, warnings)]))
     place = shlex.quote(str(folder))
     typer.echo(f"wrote {folder / 'study.toml'}: look at it, then run")
     typer.echo(f"  fes-pin check {place}\n  fes-pin diagnose {place} --out answer")

@@ -15,12 +15,14 @@ import numpy as np
 from fes_pin.data.as_read import HeldFile
 from fes_pin.data.errors import InputError, fault_at
 from fes_pin.data.files import inside, read_bytes
+from fes_pin.data.new_view import APART, Recorded, free_part, recorded, view_keys
 from fes_pin.data.recorded.columns import INTERPOLATE
 from fes_pin.data.recorded.sniff import Proposal, propose
 from fes_pin.data.recorded.text import TextForm
-from fes_pin.data.schema import NumberKey, check_known, one_of, unknown
+from fes_pin.data.recorded.view import INTEGRATED
+from fes_pin.data.schema import NumberKey, any_number, check_known, one_of, unknown
 from fes_pin.data.study_text import HEADER, columns_text, form_in_words, source_from_option, source_in_words, toml_table
-from fes_pin.data.units import known_unit, own_unit, quantities_of
+from fes_pin.data.units import factor_of, known_unit, own_unit, quantities_of
 from fes_pin.data.wanted import Wanted, labels_of, number_set, of_files
 
 
@@ -34,12 +36,15 @@ class NewStudy:
         By path below the study's folder: `study.toml`, and what is copied there.
     taken
         The rig's column, the file's name of it and its unit, as a person wants to see them.
+    said
+        What is odd about the files' times, and which part of them is proposed, a sentence each.
     origins
         Where each recording, and the URDF, lies, by its path below the study's folder.
     """
 
     contents: Mapping[str, str | bytes]
     taken: tuple[tuple[str, str, str], ...]
+    said: tuple[str, ...]
     origins: Mapping[str, Path]
 
 
@@ -66,7 +71,9 @@ def new_study(wanted: Wanted, guess: Guess) -> NewStudy:
 
 def with_kind(made: NewStudy, kind: str) -> NewStudy:
     """Return a new study with a kind for the trials that state none."""
-    text = re.sub(r"(\[\[trial\]\]\nfile = .*\n)(?!kind)", rf'\1kind = "{kind}"\n', str(made.contents["study.toml"]))
+    text = re.sub(
+        r"(\[\[trial\]\]\n(?:file|sources) = .*\n)(?!kind)", rf'\1kind = "{kind}"\n', str(made.contents["study.toml"])
+    )
     return replace(made, contents={**made.contents, "study.toml": text})
 
 
@@ -77,57 +84,144 @@ class _Making:
         self.wanted, self.schema = wanted, wanted.schema
         self.missing: list[str] = []
         self.own = of_files(wanted.files, "--set", wanted.settings)
-        self.proposals = [propose(path, self.schema, wanted.revolute) for path in wanted.files]
-        self.form = self._one_form()
+        each = [propose(path, self.schema, wanted.revolute) for path in wanted.files]
+        self.trials = recorded(each, self.schema, wanted.sources)
+        self.proposals = [one.proposal for one in self.trials]
         self.names = tuple(dict.fromkeys(n for p in self.proposals for n in p.recording.names))
         check_known(wanted.columns, self.schema.columns, fault_at("--column"))
+        self.derived = {n: source for n, source in INTEGRATED.items() if self._is_integrated(n, source)}
+        self.said: list[str] = []
 
     def made(self, guess: Guess) -> NewStudy:
         kinds = [self._kind(p) for p in self.proposals]
-        sources = self._sources(set(kinds))
+        columns = self._sources(set(kinds))
+        times = self._times(columns)
         rig, passive = self._numbers(self.schema.constants), self._numbers(self.schema.passive)
         trials = [self._trial(p, kind) for p, kind in zip(self.proposals, kinds, strict=True)]
-        known, start = self._start(guess, {**rig, **passive}, sources)
+        known, start = self._start(guess, {**rig, **passive}, [*columns, *self.derived])
         self._check_settings(sorted(set(kinds)))
         if self.missing:
             raise InputError("the files do not say everything; please add " + ", ".join(dict.fromkeys(self.missing)))
         contents: dict[str, str | bytes] = {}
         files = self._urdf(contents)
-        places = [placed(path, self.wanted.folder, contents, "trials/") for path in self.wanted.files]
-        options = {"resample_hz": self.wanted.resample_hz, "missing": INTERPOLATE if self.wanted.fill else None}
+        places = {path: placed(path, self.wanted.folder, contents, "trials/") for path in self.wanted.files}
         text = [
             *toml_table("study", {"name": self.wanted.name, "rig": self.schema.name}),
             *toml_table("rig", {**files, **rig, **known}, "known before the trials, never fitted", self._units()),
             *toml_table("rig.passive", passive, "known as well", self._units()),
             *toml_table("start", start, "start values of what the nominal model fits", self._units()),
-            *columns_text(sources, self.names, self.form, options),
+            *self._columns_text(columns, times),
         ]
         named = [{} if self._is_open(*one) else {"kind": one[1]} for one in zip(self.proposals, kinds, strict=True)]
-        for path, place, kind, conditions in zip(self.wanted.files, places, named, trials, strict=True):
-            text += toml_table("[trial]", {"file": place, **kind, **labels_of(self.wanted, path), **conditions})
+        for one, kind, conditions in zip(self.trials, named, trials, strict=True):
+            text += toml_table("[trial]", self._trial_keys(one, places, kind, columns, times) | conditions)
         contents["study.toml"] = "\n".join([*HEADER, *text]) + "\n"
         taken = tuple(
-            (c, s.get("name", "from its rate"), source_in_words(s, c, self.wanted.revolute)) for c, s in sources.items()
+            (c, s.get("name", "from its rate"), source_in_words(s, c, self.wanted.revolute)) for c, s in columns.items()
         )
-        origins = dict(zip(places, self.wanted.files, strict=True))
+        origins = {place: path for path, place in places.items()}
         if self.wanted.urdf is not None:
             origins[files["urdf"]] = self.wanted.urdf
-        return NewStudy(contents, taken, origins)
+        return NewStudy(contents, taken, tuple(self.said), origins)
 
-    def _one_form(self) -> TextForm | None:
-        forms = {p.form: p for p in self.proposals}
+    def _trial_keys(
+        self,
+        one: Recorded,
+        places: Mapping[Path, str],
+        kind: Mapping[str, str],
+        columns: Mapping[str, Mapping[str, Any]],
+        times: Mapping[str, Mapping[str, Any]],
+    ) -> dict[str, Any]:
+        """Keys of a `[[trial]]` but its conditions: its files, kind and labels, and which part of its files it is."""
+        files = {source: places[p.recording.path] for source, p in one.files.items()}
+        stated: dict[str, Any] = {"split": self.wanted.split} if self.wanted.split is not None else {}
+        stated |= {k: n for k in ("from", "to") if (n := self._end(k, one.path)) is not None}
+        stated |= {"offset_s": self.wanted.offsets} if self.wanted.offsets else {}
+        seconds = {source: self._seconds(p, times[source]) for source, p in one.files.items()}
+        view, said = view_keys(one, seconds, self.wanted.resample_hz, stated)
+        position = columns.get("position", {}).get("name")
+        if not view and not self.schema.inputs_required and not set(columns) & set(self.schema.inputs) and position:
+            view, more = free_part(
+                one.path.name, next(iter(seconds.values())), one.proposal.recording.columns[position]
+            )
+            said += more
+        self.said += said
+        view |= {"derive": self.derived} if self.derived else {}
+        whole = {"sources": files} if one.is_joined else {"file": files[""]}
+        paths = [p.recording.path for p in one.files.values()]
+        return {**whole, **kind, **view, **labels_of(self.wanted, *paths)}
+
+    def _end(self, key: str, path: Path) -> float | None:
+        """When a trial begins or ends in its recording, s, as `--set` says of its file or of all."""
+        text = self.own.get((path, key)) or self.wanted.settings.get(key)
+        return None if text is None else number_set(key, text, any_number("s", False))
+
+    def _seconds(self, proposal: Proposal, source: Mapping[str, Any]) -> np.ndarray:
+        """Times of one file, s, shape (n,)."""
+        if "rate_hz" in source:
+            return np.arange(len(proposal.recording)) / float(source["rate_hz"])
+        factor = factor_of(source["unit"], "time_s") if "unit" in source else 1.0
+        return factor * float(source.get("scale", 1.0)) * proposal.recording.columns[source["name"]]
+
+    def _is_integrated(self, column: str, source: str) -> bool:
+        """Return whether no file has a column and one from which it can be integrated is there."""
+        missing = self.wanted.columns.get(column, "") == "" and not self._candidates(column)
+        has = {*self.schema.optional, *self.schema.imposed}
+        return missing and source in has and bool(self.wanted.columns.get(source) or self._candidates(source))
+
+    def _times(self, columns: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
+        """For each source of the trials what its table says of `time_s`, with the file's own name of the column."""
+        if not self.trials[0].is_joined:
+            return {"": columns["time_s"]} if "time_s" in columns else {}
+        return {source: self._time_of(source) for source in self.trials[0].files}
+
+    def _time_of(self, source: str) -> dict[str, Any]:
+        proposals = [one.files[source] for one in self.trials]
+        names = tuple(dict.fromkeys(n for p in proposals for n in p.recording.names))
+        option = self.wanted.columns.get("time_s", "")
+        if option.startswith("rate=") or option.rpartition(":")[0] in names or option in names:
+            return source_from_option("time_s", option, names)
+        candidates = tuple(dict.fromkeys(n for p in proposals for n in p.candidates["time_s"]))
+        if len(candidates) != 1:
+            could = " or ".join(candidates or names)
+            return self._asked("time_s", f"--column time_s=NAME:UNIT (of {source}: {could})") or {}
+        found = self._with_unit("time_s", f"{source}{APART}{candidates[0]}") or {}
+        return found | {"name": candidates[0]}
+
+    def _columns_text(
+        self, columns: Mapping[str, Mapping[str, Any]], times: Mapping[str, Mapping[str, Any]]
+    ) -> list[str]:
+        """Lines of [columns], or of a table [sources.NAME] for each source."""
+        options = {"resample_hz": self.wanted.resample_hz, "missing": INTERPOLATE if self.wanted.fill else None}
+        if not self.trials[0].is_joined:
+            return columns_text(columns, self.names, self._one_form(""), options)
+        text = []
+        for source, time in times.items():
+            before = f"{source}{APART}"
+            own = {"time_s": time}
+            for column, one in columns.items():
+                if str(one.get("name", "")).startswith(before):
+                    own[column] = {**one, "name": one["name"].removeprefix(before)}
+            names = [n.removeprefix(before) for n in self.names if n.startswith(before)]
+            text += columns_text(own, names, self._one_form(source), options, f"sources.{source}")
+        return text
+
+    def _one_form(self, source: str) -> TextForm | None:
+        forms = {p.form: p for p in (one.files[source] for one in self.trials)}
         if len(forms) > 1:
             one, other = list(forms.items())[:2]
             forms_found = " and ".join(f"{p.recording.path.name} has {form_in_words(form)}" for form, p in (one, other))
             raise InputError(f"expected files that are written alike, but {forms_found}; make a study of each kind")
-        return self.proposals[0].form
+        return next(iter(forms))
 
     def _kind(self, proposal: Proposal) -> str:
         """The kind of trial that a file's columns make."""
         path, outputs = proposal.recording.path, self.schema.outputs
         if (given := self.own.get((path, "kind"), self.wanted.kind)) is not None:
             return one_of(given, tuple(outputs), partial(InputError, column="--set kind"))
-        fits = [k for k, c in outputs.items() if c in self.wanted.columns or proposal.candidates[c]]
+        fits = [
+            k for k, c in outputs.items() if c in self.wanted.columns or c in self.derived or proposal.candidates[c]
+        ]
         default = self.schema.default_kind
         read = {k: sum(bool(proposal.candidates[c]) for c in self.schema.columns_of(k)) for k in fits}
         return max(fits, key=lambda k: (read[k], k == default), default=default)
@@ -135,13 +229,15 @@ class _Making:
     def _is_open(self, proposal: Proposal, kind: str) -> bool:
         """Return whether nobody said a kind, and the data show which of two it is."""
         stated = self.own.get((proposal.recording.path, "kind"), self.wanted.kind)
-        read = [c for c in self.schema.columns_of(kind) if c in self.wanted.columns or proposal.candidates[c]]
+        has = {*self.wanted.columns, *self.derived, *(c for c, names in proposal.candidates.items() if names)}
+        read = [c for c in self.schema.columns_of(kind) if c in has]
         return stated is None and self.schema.is_driven_or_read(read)
 
     def _sources(self, kinds: set[str]) -> dict[str, dict[str, Any]]:
         """For each of the rig's columns what `[columns]` says of it."""
         schema, order = self.schema, sorted(kinds)
-        needed = ["time_s", *(schema.outputs[k] for k in order), *(c for k in order for c in schema.motion(k)[:1])]
+        needed = [*(schema.outputs[k] for k in order), *(c for k in order for c in schema.motion(k)[:1])]
+        needed = [*["time_s"] * (not self.trials[0].is_joined), *(self.derived.get(c, c) for c in needed)]
         stimuli = dict.fromkeys(c for k in order for c in schema.stimuli(k))
         inputs = [c for c in stimuli if c in self.wanted.columns or self._candidates(c)]
         if not inputs and schema.inputs_required:
@@ -263,11 +359,11 @@ class _Making:
     def _check_settings(self, kinds: Collection[str]) -> None:
         """Refuse what was said and nothing reads."""
         schema = self.schema
-        known = [*schema.constants, *schema.passive, *schema.start, *schema.conditions]
+        known = [*schema.constants, *schema.passive, *schema.start, *schema.conditions, "from", "to"]
         also = [f"rig.{key}" for key in schema.start] if schema.start_may_be_known else []
         for key in self.wanted.settings:
             file, _, last = key.rpartition(":")
-            if last not in ([*schema.conditions, "kind"] if file else [*known, *also]):
+            if last not in ([*schema.conditions, "kind", "from", "to"] if file else [*known, *also]):
                 raise InputError(unknown(last, known), column=f"--set {key}")
             if not file and (kind := schema.only.get(key)) not in (None, *kinds):
                 raise InputError(f"no trial is of kind {kind}, and others have none", column=f"--set {key}")

@@ -138,7 +138,9 @@ def toml_table(
 
 
 def toml_value(value: Any) -> str:
-    """A string or a number as TOML."""
+    """A string, a number, or a table in one line, as TOML."""
+    if isinstance(value, Mapping):
+        return inline_table(value)
     return quoted(value) if isinstance(value, str) else repr(value) if isinstance(value, int) else in_full(value)
 
 
@@ -153,20 +155,27 @@ def inline_table(source: Mapping[str, Any]) -> str:
 
 
 def columns_text(
-    sources: Mapping[str, Mapping[str, Any]], names: Sequence[str], form: TextForm | None, options: Mapping[str, Any]
+    sources: Mapping[str, Mapping[str, Any]],
+    names: Sequence[str],
+    form: TextForm | None,
+    options: Mapping[str, Any],
+    where: str = "columns",
 ) -> list[str]:
-    """Lines of [columns], and of [columns.file] with the options that are set; none where all is as by default."""
+    """Lines of [columns], or of [sources.NAME], and of its table `file` with the options that are set.
+
+    There are none of [columns] where all is as by default.
+    """
     used = {source["name"] for source in sources.values() if "name" in source}
     ignored = [name for name in names if name not in used]
     plain = all(source == {"name": column} for column, source in sources.items()) and tuple(names[:1]) == ("time_s",)
-    if plain and form == TextForm() and not ignored and not any(options.values()):
+    if where == "columns" and plain and form == TextForm() and not ignored and not any(options.values()):
         return []
-    out = ["", "[columns]  # the rig's columns, as the recordings call them, and their units there"]
+    out = ["", f"[{where}]  # the rig's columns, as the recordings call them, and their units there"]
     out += [f"{column} = {inline_table(source)}" for column, source in sources.items()]
     out += [f"ignored = [{', '.join(map(quoted, ignored))}]"] if ignored else []
     about: dict[str, Any] = {k: v for k, v in options.items() if v is not None}
     about |= {k: v for k, v in asdict(form or TextForm()).items() if v != getattr(TextForm(), k)}
-    return out + toml_table("columns.file", about, "how the recordings are written")
+    return out + toml_table(f"{where}.file", about, "how the recordings are written")
 
 
 def source_from_option(column: str, option: str, names: Sequence[str]) -> dict[str, Any]:

@@ -57,6 +57,19 @@ def slide(mass_kg: float) -> str:
     return slide_urdf("slide", f"{what} Positive moves along +x.{_WRITTEN}", mass_kg, 0.0, 100.0)
 
 
+def wheel(inertia_kgm2: float) -> str:
+    """URDF of a balanced wheel or rotor, on which gravity has no lever.
+
+    Raises
+    ------
+    InputError
+        An inertia that is not above 0.
+    """
+    _check(inertia=inertia_kgm2)
+    what = f"A balanced wheel of {inertia_kgm2:g} kg m2 about its axis. Position 0: where you say. Positive turns about +y."
+    return arm_urdf("wheel", f"{what}{_WRITTEN}", 1.0, 0.0, inertia_kgm2, inertia_kgm2)
+
+
 def _turning(name: str, what: str, mass: float, centre: float, about_centre: float, upright: bool) -> str:
     zero, height = ("upright", centre) if upright else ("hanging straight down", -centre)
     return arm_urdf(name, f"{what} Position 0: {zero}. {_SWING}{_WRITTEN}", mass, height, about_centre)
@@ -90,5 +103,5 @@ def slide_urdf(name: str, what: str, mass_kg: float, inertia_kgm2: float, reach_
 def _check(**numbers: float) -> None:
     for name, value in numbers.items():
         if not 1e-6 < value < 1e6:
-            unit = "m" if name == "length" else "kg"
+            unit = {"length": "m", "mass": "kg"}.get(name, "kg m2")
             raise InputError(f"expected a {name} above 0 {unit}, found {value:g}", column=name)

@@ -41,6 +41,10 @@ class Wanted:
         Of trials: by "role" and "group" what was said of files, by `FILE`.
     resample_hz, fill
         See `[columns.file]`.
+    sources
+        By the name of a source the pattern of its files, where a trial has several.
+    split, offsets
+        See `[[trial]]`; None and empty where nothing was said.
     ask
         None where nobody can be asked.
     """
@@ -56,6 +60,9 @@ class Wanted:
     labels: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     resample_hz: float | None = None
     fill: bool = False
+    sources: Mapping[str, str] = field(default_factory=dict)
+    split: str | None = None
+    offsets: Mapping[str, float | str] = field(default_factory=dict)
     ask: Ask | None = None
 
     @cached_property

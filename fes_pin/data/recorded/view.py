@@ -129,7 +129,8 @@ class View:
                 raise table.error(f"missing; {name} is derived from it", source)
             steps = 0.5 * np.diff(table.time) * (columns[source][1:] + columns[source][:-1])
             columns[name] = np.concatenate([[0.0], np.cumsum(steps)])
-            said.append(f"{name} is the integral of {source}, from 0")
+            del columns[source]  # which says nothing more
+            said.append(f"{name} is the integral of {source}, from 0, and takes its place")
         return replace(table, names=tuple(columns), columns=columns, said=tuple(said))
 
 

@@ -1,0 +1,217 @@
+"""Which recordings a new study's trials are made of: several files a trial, and what is odd about their times."""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fes_pin.data.errors import InputError
+from fes_pin.data.recorded.free_part import free_from
+from fes_pin.data.recorded.parts import HOLES, RESTARTS, holes, restarts
+from fes_pin.data.recorded.sniff import Proposal
+from fes_pin.data.recorded.view import FITTED, INTEGRATED
+from fes_pin.data.schema import MEANT, RigSchema
+from fes_pin.data.table import STEP_TOLERANCE
+
+APART = "."
+"""Between the name of a source and that of its column."""
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """The files that make one trial, and what they seem to hold together.
+
+    Attributes
+    ----------
+    files
+        By the name of the source; "" of one file alone.
+    proposal
+        Of all of them: names of columns begin with that of their source.
+    """
+
+    files: Mapping[str, Proposal]
+    proposal: Proposal
+
+    @property
+    def path(self) -> Path:
+        """The first file."""
+        return self.proposal.recording.path
+
+    @property
+    def is_joined(self) -> bool:
+        """Whether it has several files."""
+        return "" not in self.files
+
+
+def recorded(proposals: Sequence[Proposal], schema: RigSchema, stated: Mapping[str, str]) -> list[Recorded]:
+    """Which files make a trial together: those that `--source` says, else those that their names show; else each alone.
+
+    Files are sources of one trial where their names differ in one word alone, each trial has a file of each word, and
+    one of them is no trial by itself.
+
+    Parameters
+    ----------
+    stated
+        By the name of a source the pattern of its files.
+
+    Raises
+    ------
+    InputError
+        A pattern of no file, a file of no pattern, trials that do not have a file of each source.
+    """
+    proposals = [_with_time(one) for one in proposals]
+    by_path = {one.recording.path: one for one in proposals}
+    groups = _stated(tuple(by_path), stated) if stated else _by_name(proposals, schema)
+    if not groups:
+        return [Recorded({"": one}, one) for one in proposals]
+    return [_joined({source: by_path[path] for source, path in files.items()}, schema) for files in groups]
+
+
+def _with_time(proposal: Proposal) -> Proposal:
+    """The time of a file without names is its first column that rises in equal steps."""
+    recording = proposal.recording
+    if proposal.form is None or proposal.form.header_row or proposal.candidates.get("time_s"):
+        return proposal
+    rising = (n for n, v in recording.columns.items() if _rises(v))
+    found = next(rising, None)
+    return replace(proposal, candidates={**proposal.candidates, "time_s": (found,)}) if found else proposal
+
+
+def _rises(values: np.ndarray) -> bool:
+    steps = np.diff(values)
+    usual = float(np.median(steps))
+    return bool(usual > 0.0 and np.mean(np.abs(steps - usual) <= STEP_TOLERANCE * usual) > 0.9)
+
+
+def _stated(paths: Sequence[Path], stated: Mapping[str, str]) -> list[dict[str, Path]]:
+    found: dict[str, list[Path]] = {}
+    for source, pattern in stated.items():
+        of_it = [p for p in paths if fnmatchcase(p.name, pattern) or fnmatchcase(p.stem, pattern)]
+        if not of_it:
+            raise InputError(f"expected a pattern of one of the files, found {pattern!r}", column=f"--source {source}")
+        found[source] = of_it
+    if left := [p for p in paths if sum(p in some for some in found.values()) != 1]:
+        raise InputError("expected each file to be of one --source", file=left[0])
+    if len({len(some) for some in found.values()}) > 1:
+        counts = ", ".join(f"{source} {len(some)}" for source, some in found.items())
+        raise InputError(f"expected as many files of each source, found {counts}", column="--source")
+    return [dict(zip(found, files, strict=True)) for files in zip(*found.values(), strict=True)]
+
+
+def _by_name(proposals: Sequence[Proposal], schema: RigSchema) -> list[dict[str, Path]]:
+    """Files by trial and source, as their names show; none where each is a trial of its own."""
+    paths = [one.recording.path for one in proposals]
+    words = [re.findall(r"[a-z]+|\d+|[^a-z\d]+", path.stem.lower()) for path in paths]
+    each = zip(proposals, words, strict=True)
+    if len({len(some) for some in words}) > 1 or not any(_needs_another(one, some, schema) for one, some in each):
+        return []
+    for place in range(len(words[0])):
+        trials: dict[tuple[str, ...], dict[str, Path]] = defaultdict(dict)
+        for path, some in zip(paths, words, strict=True):
+            trials[(*some[:place], *some[place + 1 :])][some[place]] = path
+        sources = {tuple(sorted(files)) for files in trials.values()}
+        known = next(iter(sources))
+        if len(sources) == 1 and len(known) > 1 and all(word.isalpha() for word in known):
+            return list(trials.values())
+    return []
+
+
+def _needs_another(proposal: Proposal, of_name: Sequence[str], schema: RigSchema) -> bool:
+    """Return whether a file is no trial by itself: its columns, or where they have no names its own, are too few."""
+    found = {n for n, names in proposal.candidates.items() if names and n != "time_s"}
+    found = found or {n for n in schema.columns if MEANT.get(n, frozenset()) & set(of_name)}
+    found |= {n for n, source in INTEGRATED.items() if source in found}
+    kinds = ({schema.outputs[kind], *schema.motion(kind)[:1]} for kind in schema.outputs)
+    is_moved = not schema.inputs_required or bool(found & set(schema.inputs))
+    return not (is_moved and any(needed <= found for needed in kinds))
+
+
+def _joined(files: Mapping[str, Proposal], schema: RigSchema) -> Recorded:
+    columns: dict[str, np.ndarray] = {}
+    units: dict[str, str] = {}
+    candidates: dict[str, tuple[str, ...]] = dict.fromkeys(schema.columns, ())
+    for source, one in files.items():
+        columns |= {f"{source}{APART}{n}": v for n, v in one.recording.columns.items()}
+        units |= {f"{source}{APART}{n}": u for n, u in one.units.items()}
+        for column, names in one.candidates.items():
+            if column != "time_s":
+                candidates[column] += tuple(f"{source}{APART}{n}" for n in names)
+    first = next(iter(files.values())).recording
+    names = tuple(f"{source}{APART}{n}" for source, one in files.items() for n in one.recording.names)
+    whole = replace(first, names=names, columns=columns)
+    return Recorded(files, Proposal(whole, None, candidates, units))
+
+
+def view_keys(
+    files: Recorded, time: Mapping[str, np.ndarray], rate_hz: float | None, stated: Mapping[str, Any]
+) -> tuple[dict[str, Any], list[str]]:
+    """Keys of the `[[trial]]` of some files that say which part of them it is, and what is odd about their times.
+
+    Parameters
+    ----------
+    time
+        Of each source, s, shape (n,).
+    rate_hz
+        At which it will be resampled.
+    stated
+        Keys that a person gave; `split = "none"` leaves the recording whole.
+
+    Returns
+    -------
+    (keys, sentences)
+    """
+    keys: dict[str, Any] = {k: v for k, v in stated.items() if v not in ("none", {})}
+    name, said = files.path.name, list[str]()
+    main = next(iter(time.values()), None)
+    if main is None:
+        return keys, said
+    if len(anew := restarts(main)):
+        said.append(f"{name}: time starts anew {len(anew)} times: {len(anew) + 1} recordings in one file")
+        if "split" not in stated:
+            keys["split"] = RESTARTS
+    elif len(found := holes(main, 1.0 / rate_hz if rate_hz else None)):
+        longest = 1e3 * float(np.diff(main).max())
+        said.append(f"{name}: {len(found)} holes, the longest {longest:.4g} ms: {len(found) + 1} trials")
+        if "split" not in stated and "from" not in stated:
+            keys["split"] = HOLES
+    if files.is_joined:
+        said.append(f"{' and '.join(one.recording.path.name for one in files.files.values())} are one trial")
+        first, *others = time
+        apart = [n for n in others if len(time[n]) != len(main) or not np.allclose(time[n], main, atol=1e-9)]
+        offsets = {**dict.fromkeys(apart, FITTED), **stated.get("offset_s", {})}
+        if unknown := [n for n in stated.get("offset_s", {}) if n not in others]:
+            message = f"expected a source other than the first, {first}: {', '.join(others)}"
+            raise InputError(message, column=f"--offset {unknown[0]}")
+        keys |= {"offset_s": offsets} if offsets else {}
+    return keys, said
+
+
+def free_part(name: str, time: np.ndarray, position: np.ndarray) -> tuple[dict[str, float], list[str]]:
+    """The beginning of the free motion of a rig that nothing drives, as a key, and a sentence; empty where all is free."""
+    begin = free_from(time, position)
+    if begin is None:
+        return {}, []
+    at = float(f"{begin:.6g}")
+    return {"from": at}, [f"{name}: rest, a push by hand, free motion: the free part from {at:g} s is used"]
+
+
+def offsets_of(said: Mapping[str, str]) -> dict[str, float | str]:
+    """Offsets of clocks as `--offset SOURCE=SECONDS` or `SOURCE=fit` states them.
+
+    Raises
+    ------
+    InputError
+        Anything else.
+    """
+    from fes_pin.data.numbers import number_in  # noqa: PLC0415 - numbers are checked where they are read
+
+    error = {name: partial(InputError, column=f"--offset {name}") for name in said}
+    return {name: text if text == FITTED else number_in(text, error[name]) for name, text in said.items()}

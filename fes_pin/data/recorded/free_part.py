@@ -1,0 +1,37 @@
+"""Where the free motion of a rig begins that rests first, is pushed by hand, and then swings or runs out by itself.
+
+A passive rig that rests where it also ends does not begin to move by itself: what moves it first is no part of the
+model. From its largest deviation on, energy only falls.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fes_pin.data.recorded.parts import REST_S, STILL
+
+SETTLED = 0.05
+"""Share of the largest deviation within which the end counts as the place of rest that the record began at."""
+LARGER = 0.99
+"""Share of the largest deviation from which a sample counts as being at it."""
+
+
+def free_from(time: np.ndarray, position: np.ndarray) -> float | None:
+    """Time at which the free motion begins, s; None where the record does not begin with a rest at the place of its end.
+
+    Parameters
+    ----------
+    time, position
+        Shape (n,); nothing drives the rig.
+    """
+    count = round(REST_S / max(float(np.median(np.diff(time))), 1e-12))
+    if count < 2 or len(time) < 4 * count:
+        return None
+    reach = float(np.ptp(position))
+    first, last = position[:count], position[-count:]
+    if reach <= 0.0 or np.ptp(first) > STILL * reach or abs(float(np.mean(last) - np.mean(first))) > SETTLED * reach:
+        return None
+    away = np.abs(position - np.mean(first))
+    is_far = away[int(np.argmax(away)) :] >= LARGER * away.max()
+    begin = int(np.argmax(away)) + int(np.argmin(is_far)) - 1  # the end of a plateau: a hand may hold it there
+    return float(time[begin]) if count < begin < len(time) - count else None
