@@ -5,10 +5,10 @@ from __future__ import annotations
 import os
 import shlex
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -69,6 +69,9 @@ def new_study(
     slide: Annotated[
         float | None, typer.Option(metavar="MASS", help="Write a URDF: a carriage on a level rail; kg.")
     ] = None,
+    wheel: Annotated[
+        float | None, typer.Option(metavar="INERTIA", help="Write a URDF: a balanced wheel or rotor; kg m2.")
+    ] = None,
     upright: Annotated[bool, typer.Option("--upright", help="Position 0 is upright; else it hangs there.")] = False,
     out: Annotated[Path | None, output("Folder of the study. [default: where the recordings are]")] = None,
     name: Annotated[str | None, typer.Option(help="Of the study. [default: its folder's]")] = None,
@@ -105,7 +108,7 @@ def new_study(
 ) -> None:
     """Make a study of your own recordings, which stay as they are: reads headers, writes study.toml, checks it.
 
-    With --pendulum, --rod or --slide and no recordings it writes the URDF alone.
+    With --pendulum, --rod, --slide or --wheel and no recordings it writes the URDF alone.
     """
     from fes_pin.data.direction import LEFT_OUT
     from fes_pin.data.new_body_study import new_body_study
@@ -116,9 +119,9 @@ def new_study(
     from fes_pin.diagnosis.checked import odd_lines
     from fes_pin.models.nominal import guess_start
 
-    template = _template(pendulum, rod, slide, upright)
+    template = _template({"pendulum": pendulum, "rod": rod}, {"slide": slide, "wheel": wheel}, upright)
     if template is not None and urdf is not None:
-        raise InputError("expected one of --urdf, --pendulum, --rod and --slide, found several")
+        raise InputError("expected one of --urdf, --pendulum, --rod, --slide and --wheel, found several")
     believed = template or urdf
     if not files:
         if template is None:
@@ -184,16 +187,15 @@ def check(
 
 
 def _template(
-    pendulum: tuple[float, float] | None, rod: tuple[float, float] | None, slide: float | None, upright: bool
+    turning: Mapping[str, tuple[float, float] | None], others: Mapping[str, float | None], upright: bool
 ) -> HeldFile | None:
     """The URDF that was asked for, which is on no disk."""
     from fes_pin.data import templates
 
-    turning = {"pendulum": pendulum, "rod": rod}
-    asked = {name: (*numbers, upright) for name, numbers in turning.items() if numbers is not None}
-    given = {**asked, **({} if slide is None else {"slide": (slide,)})}
+    given: dict[str, tuple[Any, ...]] = {n: (*both, upright) for n, both in turning.items() if both is not None}
+    given |= {n: (one,) for n, one in others.items() if one is not None}
     if len(given) > 1:
-        raise InputError("expected one of --pendulum, --rod and --slide, found several")
+        raise InputError("expected one of --pendulum, --rod, --slide and --wheel, found several")
     for name, numbers in given.items():
         try:
             return HeldFile.holding(f"{name}.urdf", getattr(templates, name)(*numbers).encode())
@@ -221,7 +223,7 @@ def _schema(rig: str | None, catalogue: Catalogue, urdf: Path | None, of_rigs: S
     if schema.owner is None and (urdf is not None or catalogue.origins() or any(of_rigs)):
         raise InputError("expected no URDF, --column, --resample, --fill or --library for walking", column="--rig")
     if schema.owner is not None and ("urdf" in schema.files) != (urdf is not None):
-        wanted = "--urdf FILE, or --pendulum LENGTH MASS, --rod or --slide" if urdf is None else "no URDF"
+        wanted = "--urdf FILE, or --pendulum LENGTH MASS, --rod, --slide or --wheel" if urdf is None else "no URDF"
         raise InputError(f"expected {wanted} for rig {schema.name}", column="--urdf")
     if urdf is not None and schema.check_files is not None:
         schema.check_files({"urdf": urdf})

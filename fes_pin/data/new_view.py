@@ -141,13 +141,22 @@ def _joined(files: Mapping[str, Proposal], schema: RigSchema) -> Recorded:
     for source, one in files.items():
         columns |= {f"{source}{APART}{n}": v for n, v in one.recording.columns.items()}
         units |= {f"{source}{APART}{n}": u for n, u in one.units.items()}
-        for column, names in one.candidates.items():
+        for column, names in {**one.candidates, **_meant(source, one, schema)}.items():
             if column != "time_s":
                 candidates[column] += tuple(f"{source}{APART}{n}" for n in names)
     first = next(iter(files.values())).recording
     names = tuple(f"{source}{APART}{n}" for source, one in files.items() for n in one.recording.names)
     whole = replace(first, names=names, columns=columns)
     return Recorded(files, Proposal(whole, None, candidates, units))
+
+
+def _meant(source: str, one: Proposal, schema: RigSchema) -> dict[str, tuple[str, ...]]:
+    """The only column of a file in addition to its time, where the file's name says what it holds."""
+    time = one.candidates["time_s"][:1]
+    others = tuple(n for n in one.recording.columns if n not in time)
+    if len(others) != 1 or not time or any(names for c, names in one.candidates.items() if c != "time_s"):
+        return {}
+    return {c: others for c in schema.columns if c != "time_s" and source in MEANT.get(c, frozenset())}
 
 
 def view_keys(
@@ -174,12 +183,13 @@ def view_keys(
     if main is None:
         return keys, said
     if len(anew := restarts(main)):
-        said.append(f"{name}: time starts anew {len(anew)} times: {len(anew) + 1} recordings in one file")
+        said.append(f"{name}: {len(anew) + 1} recordings in one file: time starts anew in row {_row(files, anew[0])}")
         if "split" not in stated:
             keys["split"] = RESTARTS
     elif len(found := holes(main, 1.0 / rate_hz if rate_hz else None)):
         longest = 1e3 * float(np.diff(main).max())
-        said.append(f"{name}: {len(found)} holes, the longest {longest:.4g} ms: {len(found) + 1} trials")
+        count = f"{len(found)} hole{'s' * (len(found) > 1)}"
+        said.append(f"{name}: {count}, the longest {longest:.4g} ms: {len(found) + 1} trials")
         if "split" not in stated and "from" not in stated:
             keys["split"] = HOLES
     if files.is_joined:
@@ -194,8 +204,12 @@ def view_keys(
     return keys, said
 
 
+def _row(files: Recorded, sample: int) -> int:
+    return int(next(iter(files.files.values())).recording.rows[sample])
+
+
 def free_part(name: str, time: np.ndarray, position: np.ndarray) -> tuple[dict[str, float], list[str]]:
-    """The beginning of the free motion of a rig that nothing drives, as a key, and a sentence; empty where all is free."""
+    """The beginning of the free motion of a rig that nothing drives, as a key, and a sentence."""
     begin = free_from(time, position)
     if begin is None:
         return {}, []

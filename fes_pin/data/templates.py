@@ -66,7 +66,7 @@ def wheel(inertia_kgm2: float) -> str:
         An inertia that is not above 0.
     """
     _check(inertia=inertia_kgm2)
-    what = f"A balanced wheel of {inertia_kgm2:g} kg m2 about its axis. Position 0: where you say. Positive turns about +y."
+    what = f"A balanced wheel of {inertia_kgm2:g} kg m2 about its axis. Positive turns about +y."
     return arm_urdf("wheel", f"{what}{_WRITTEN}", 1.0, 0.0, inertia_kgm2, inertia_kgm2)
 
 

@@ -17,7 +17,7 @@ LARGER = 0.99
 
 
 def free_from(time: np.ndarray, position: np.ndarray) -> float | None:
-    """Time at which the free motion begins, s; None where the record does not begin with a rest at the place of its end.
+    """Time at which the free motion begins, s; None of a record that does not begin at rest at the place of its end.
 
     Parameters
     ----------
