@@ -14,7 +14,7 @@ from fes_pin.data.table import Table
 
 MOST_S = 0.5
 """Largest offset that is looked for, s: loggers that one trigger starts, or one hand, differ by less."""
-OF_THE_RECORD = 0.2
+OF_THE_RECORD = 0.1
 """The same as a share of the shorter recording: the sources must overlap at every offset."""
 EXPLAINED = 0.5
 """Least share of the effort that the motion explains at the best offset; else the recordings do not show it."""
@@ -46,7 +46,7 @@ def clock_offset(leading: Table, other: Table) -> tuple[float, str]:
                 break
             offset = sign * lag
             share = f"{100.0 * (1.0 - left):.3g} %"
-            return offset, f"{1e3 * offset:.3g} ms, fitted: the motion then explains most of the effort, {share}"
+            return offset, f"fitted, as the motion then explains most of the effort, {share}"
     message = "the recordings do not show by how much the clocks differ: expected a number of seconds in offset_s"
     raise other.error(message, "time_s")
 
@@ -58,14 +58,18 @@ def _best_lag(moves: Table, motion: str, pushes: Table) -> tuple[float, float, f
     dt = float(np.median(np.diff(moves.time)))
     most = min(MOST_S, OF_THE_RECORD * min(float(np.ptp(t.time)) for t in (moves, pushes)))
     reach = math.ceil(most / dt)
-    time = np.arange(moves.time[0], moves.time[-1], dt)
-    known = np.interp(time, moves.time, moves.columns[motion])
-    effort = np.interp(np.arange(-reach, len(time) + reach) * dt + time[0], pushes.time, pushes.columns["effort"])
-    band = _band_hz(known, dt)
-    columns = _columns(low_pass(known[:, None], dt, band)[:, 0], motion, dt)
-    smooth = low_pass(effort[:, None], dt, band)[:, 0]
+    begin = max(moves.time[0], pushes.time[0] + reach * dt)  # where the effort was recorded at every offset
+    count = int((min(moves.time[-1], pushes.time[-1] - reach * dt) - begin) / dt)
+    band = _band_hz(moves.columns[motion], dt)
+    edge = math.ceil(1.0 / (band * dt))  # over which a filter rings
+    if count <= 3 * edge:
+        return 0.0, 1.0, 1.0
+    known = np.interp(begin + np.arange(count) * dt, moves.time, moves.columns[motion])
+    effort = np.interp(begin + np.arange(-reach, count + reach) * dt, pushes.time, pushes.columns["effort"])
+    columns = _columns(low_pass(known[:, None], dt, band)[:, 0], motion, dt)[edge : count - edge]
+    smooth = low_pass(effort[:, None], dt, band)[edge : len(effort) - edge, 0]
     basis = np.linalg.qr(columns / np.maximum(np.abs(columns).max(axis=0), 1e-300))[0]
-    shifted = np.lib.stride_tricks.sliding_window_view(smooth, len(time))  # row k: k - reach samples later
+    shifted = np.lib.stride_tricks.sliding_window_view(smooth, len(columns))  # row k: k - reach samples later
     power = np.sum((shifted - shifted.mean(axis=1, keepdims=True)) ** 2, axis=1)
     left = (np.sum(shifted**2, axis=1) - np.sum((shifted @ basis) ** 2, axis=1)) / np.maximum(power, 1e-300)
     k = int(np.clip(np.argmin(left), 1, len(left) - 2))

@@ -173,6 +173,8 @@ def view_of(table: Mapping[str, Any], sources: Sequence[str], error: KeyFault) -
         if INTEGRATED.get(name) != one_of(source, tuple(INTEGRATED.values()), partial(error, f"derive.{name}")):
             raise error(f"derive.{name}", 'expected position = "velocity"')
     offsets = _table(given, "offset_s", error)
+    if not sources and offsets:
+        raise error("offset_s", "expected it of a trial with sources, whose clocks differ")
     check_known(offsets, sources, lambda key, message: error(f"offset_s.{key}", message))
     checked = {n: v if v == FITTED else seconds.check(v, partial(error, f"offset_s.{n}")) for n, v in offsets.items()}
     return View(ends.get("from"), ends.get("to"), at, split, derive, rate, checked, len(sources) > 1)
@@ -213,7 +215,7 @@ def joined(tables: Mapping[str, Table], offsets: Mapping[str, float | str], held
         own = {n: v for n, v in table.columns.items() if n != "time_s"}
         if isinstance(offset, str):
             offset, words = clock_offset(leading, table)
-            said.append(f"what is added to the times of {name} is {words}")
+            said.append(f"{1e3 * offset:.3g} ms are added to the times of {name}: {words}")
         elif offset:
             said.append(f"{1e3 * offset:.6g} ms are added to the times of {name}")
         clocks[name] = table.time + offset
