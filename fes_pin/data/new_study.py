@@ -266,7 +266,8 @@ class _Making:
         """The column of that name, and the unit that it seems to be in."""
         unit = self._unit_of(name)
         quantities = quantities_of(column, self.wanted.revolute)
-        if name == column or not quantities or quantities == ("pulses",):
+        bare = name.partition(APART)[2] if self.trials[0].is_joined else name
+        if bare == column or not quantities or quantities == ("pulses",):
             return {"name": name}
         if unit:
             if (found := known_unit(unit, quantities)) is not None:

@@ -19,7 +19,7 @@ from fes_pin.data.motion import GROUND_REACTION, coordinates_of, ground_reaction
 from fes_pin.data.numbers import instance
 from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.recorded.columns import Columns
-from fes_pin.data.recorded.parts import RESTARTS, restarts
+from fes_pin.data.recorded.parts import HOLES, RESTARTS, holes, restarts
 from fes_pin.data.recorded.sniff import NEW_STUDY, read_csv_or_hint
 from fes_pin.data.recorded.view import View, joined
 from fes_pin.data.schema import (
@@ -482,6 +482,11 @@ def _checked_columns(
     if len(anew := restarts(table.time)):
         hint = f'split = "{RESTARTS}" in its [[trial]] makes {len(anew) + 1} trials of it'
         raise table.error(f"expected time to increase, it starts anew; {hint}", "time_s", int(anew[0]))
+    if len(gaps := holes(table.time)) and (np.diff(table.time) > 0.0).all():
+        step, found = float(np.median(np.diff(table.time))), float(table.time[gaps[0]] - table.time[gaps[0] - 1])
+        hint = f'split = "{HOLES}" in its [[trial]] makes {len(gaps) + 1} trials of it, and rate bridges short ones'
+        message = f"expected a fixed step of {step:.6g} s within 1 %, found a hole of {found:.6g} s; {hint}"
+        raise table.error(message, "time_s", int(gaps[0]))
     check_time(table)
     columns = {name: table.columns[name] for name in table.names[1:]}
     check_values(columns, schema, table.error, -math.inf)  # a study with its threshold judges widths

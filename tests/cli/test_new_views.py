@@ -1,0 +1,133 @@
+"""What `fes-pin new-study` proposes of recordings that are not one trial each."""
+
+import tomllib
+
+import numpy as np
+import pytest
+from cli.test_own import LENGTH, MASS, fails, run
+
+from fes_pin.data.study import read_study
+from fes_pin.data.table import format_csv
+
+ROD = ("--rod", LENGTH, MASS)
+TIME = np.arange(0.0, 6.0, 0.01)
+
+
+def swing(time, phase=0.0):
+    return 0.5 * np.exp(-0.2 * time) * np.cos(5.0 * time + phase)
+
+
+def write(path, **columns):
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(format_csv(columns))
+    return path
+
+
+def trials(folder):
+    return tomllib.loads((folder / "study.toml").read_text())["trial"]
+
+
+def test_two_recordings_in_one_file(monkeypatch, capsys, tmp_path):
+    twice = write(tmp_path / "a.csv", time_s=np.r_[TIME, TIME], position=np.r_[swing(TIME), swing(TIME, 1.0)])
+    assert run(monkeypatch, "new-study", twice, *ROD) == 0
+    assert "a.csv: 2 recordings in one file: time starts anew in row 602" in capsys.readouterr().out
+    assert trials(tmp_path)[0]["split"] == "restarts"
+    assert len(read_study(tmp_path)) == 2
+
+
+def test_what_is_said_is_not_proposed_again(monkeypatch, capsys, tmp_path):
+    kept = (TIME < 2.0) | (TIME > 2.2)
+    path = write(tmp_path / "a.csv", time_s=TIME[kept], position=swing(TIME[kept]))
+    assert run(monkeypatch, "new-study", path, *ROD) == 0
+    assert "a.csv: 1 hole, the longest 2" in capsys.readouterr().out
+    assert trials(tmp_path)[0]["split"] == "holes"
+    assert run(monkeypatch, "new-study", path, *ROD, "--set", "from=2.5", "--set", "a.csv:to=5", "--force") == 0
+    assert trials(tmp_path)[0] == {"file": "a.csv", "kind": "motion", "from": 2.5, "to": 5.0}
+    (trial,) = read_study(tmp_path)
+    assert (trial.time[0], trial.time[-1]) == (2.5, 5.0)
+    capsys.readouterr()
+    assert "split" in fails(monkeypatch, capsys, "new-study", path, *ROD, "--split", "none", "--force")
+    assert run(monkeypatch, "new-study", path, *ROD, "--resample", "20", "--force") == 0  # which bridges the hole
+    assert "split" not in trials(tmp_path)[0]
+
+
+def test_one_quantity_a_file(monkeypatch, capsys, tmp_path):
+    for number in (1, 2):
+        for word, values in (("pos", swing(TIME, number)), ("tau", np.sin(3.0 * TIME))):
+            rows = zip(TIME, values, strict=True)
+            (tmp_path / f"run_{word}{number}.t").write_text("\n".join(f" {t:.4f}  {v:.5f}" for t, v in rows))
+    files = sorted(tmp_path.glob("*.t"))
+    said = fails(monkeypatch, capsys, "new-study", *files, *ROD)
+    assert "position=pos.column2:UNIT" in said
+    assert "time_s=pos.column1:UNIT" in said
+    units = ("time_s=column1:s", "position=pos.column2:rad", "effort=tau.column2:Nm")
+    asked = [word for one in units for word in ("--column", one)]
+    assert run(monkeypatch, "new-study", *files, *ROD, *asked) == 0
+    assert "run_pos1.t and run_tau1.t are one trial" in capsys.readouterr().out
+    found = read_study(tmp_path)
+    assert [t.name for t in found] == ["run_pos1", "run_pos2"]
+    assert np.allclose(found.trials[1]["position"], swing(TIME, 2), atol=1e-5)
+    assert np.allclose(found.trials[0]["effort"], np.sin(3.0 * TIME), atol=1e-5)
+
+
+@pytest.mark.parametrize("names", [("walk_slow", "walk_fast"), ("left_1", "right_1"), ("a", "b")])
+def test_files_that_are_trials_by_themselves_stay_so(monkeypatch, tmp_path, names):
+    files = [write(tmp_path / f"{n}.csv", time_s=TIME, position=swing(TIME), effort=np.sin(TIME)) for n in names]
+    assert run(monkeypatch, "new-study", *files, *ROD) == 0
+    assert len(read_study(tmp_path)) == 2
+
+
+def test_two_loggers_with_clocks_of_their_own(monkeypatch, capsys, tmp_path):
+    fine = np.arange(0.0, 6.0, 1e-3)
+    speed = sum(np.sin(2.0 * np.pi * f * fine + p) for f, p in ((0.5, 0.3), (1.3, 1.0), (2.1, 2.0)))
+    effort = 0.5 * np.gradient(speed, fine) + 0.3 * speed
+    write(tmp_path / "x_motor.csv", time_s=fine, velocity=speed)
+    write(tmp_path / "x_cell.csv", time_s=fine[::2] + 0.0123, torque_nm=effort[::2])
+    files = sorted(tmp_path.glob("x_*.csv"), reverse=True)
+    assert run(monkeypatch, "new-study", *files, "--wheel", "0.5", "--column", "velocity=motor.velocity:rad/s") == 0
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "x_motor.csv and x_cell.csv are one trial" in printed
+    assert "-12.3 ms are added to the times of cell: fitted" in printed
+    (trial,) = read_study(tmp_path)
+    rows = slice(100, -100)
+    wanted = np.interp(trial.time, fine, effort)
+    assert np.abs(trial["effort"] - wanted)[rows].max() < 0.03 * np.abs(wanted).max()
+    assert set(trial.columns) == {"position", "effort"}
+    given = ("--offset", "cell=-0.0123", "--column", "velocity=motor.velocity:rad/s", "--force")
+    assert run(monkeypatch, "new-study", *files, "--wheel", "0.5", *given) == 0
+    assert trials(tmp_path)[0]["offset_s"] == {"cell": -0.0123}
+
+
+def test_sources_are_said_by_patterns(monkeypatch, capsys, tmp_path):
+    for n in (1, 2):
+        write(tmp_path / f"pos{n}.csv", time_s=TIME, position=swing(TIME, n))
+        write(tmp_path / f"load_cell_{n}.csv", time_s=TIME, effort=np.sin(TIME))
+    files = sorted(tmp_path.glob("*.csv"))
+    both = ("--source", "pos=pos*", "--source", "cell=load*")
+    assert run(monkeypatch, "new-study", *files, *ROD, *both) == 0
+    assert [list(t["sources"]) for t in trials(tmp_path)] == [["pos", "cell"]] * 2
+    capsys.readouterr()
+    assert "--source cell: expected a pattern of one of the files" in fails(
+        monkeypatch, capsys, "new-study", *files, *ROD, "--source", "cell=x*", "--force"
+    )
+    assert "expected as many files of each source" in fails(
+        monkeypatch, capsys, "new-study", *files[:3], *ROD, *both, "--force"
+    )
+
+
+def test_a_rest_and_a_push_by_hand_are_no_free_motion(monkeypatch, capsys, tmp_path):
+    since = TIME - 2.0
+    hand = 0.5 * np.sin(0.5 * np.pi * np.clip((TIME - 1.2) / 0.8, 0.0, 1.0)) ** 2
+    position = np.where(since > 0.0, 0.5 * np.exp(-1.5 * since) * np.cos(6.0 * since), hand)
+    path = write(tmp_path / "a.csv", time_s=TIME, position=position)
+    assert run(monkeypatch, "new-study", path, *ROD) == 0
+    assert "a.csv: rest, a push by hand, free motion: the free part from 2" in capsys.readouterr().out
+    assert abs(trials(tmp_path)[0]["from"] - 2.0) < 0.03
+
+
+def test_a_speed_alone_is_a_rig(monkeypatch, capsys, tmp_path):
+    path = write(tmp_path / "a.csv", time_s=TIME, **{"speed [rpm]": 30.0 * np.sin(TIME), "torque [Nm]": np.cos(TIME)})
+    assert run(monkeypatch, "new-study", path, "--wheel", "0.02") == 0
+    assert trials(tmp_path)[0]["derive"] == {"position": "velocity"}
+    (trial,) = read_study(tmp_path)
+    assert np.allclose(trial["position"], np.pi * (1.0 - np.cos(TIME)), atol=1e-4)
