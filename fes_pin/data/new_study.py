@@ -157,9 +157,11 @@ class _Making:
         return None if text is None else number_set(key, text, any_number("s", False))
 
     def _seconds(self, proposal: Proposal, source: Mapping[str, Any]) -> np.ndarray:
-        """Times of one file, s, shape (n,)."""
+        """Times of one file, s, shape (n,); none of a column that is no numbers, which its reader refuses."""
         if "rate_hz" in source:
             return np.arange(len(proposal.recording)) / float(source["rate_hz"])
+        if source["name"] not in proposal.recording.columns:
+            return np.zeros(0)
         factor = factor_of(source["unit"], "time_s") if "unit" in source else 1.0
         return factor * float(source.get("scale", 1.0)) * proposal.recording.columns[source["name"]]
 

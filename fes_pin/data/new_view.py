@@ -179,9 +179,7 @@ def view_keys(
     """
     keys: dict[str, Any] = {k: v for k, v in stated.items() if v not in ("none", {})}
     name, said = files.path.name, list[str]()
-    main = next(iter(time.values()), None)
-    if main is None:
-        return keys, said
+    main = next(iter(time.values()))
     if len(anew := restarts(main)):
         said.append(f"{name}: {len(anew) + 1} recordings in one file: time starts anew in row {_row(files, anew[0])}")
         if "split" not in stated:

@@ -15,12 +15,14 @@ from fuzz_inputs.oddities import odd_study
 from fuzz_inputs.recordings import coordinates, ground_reaction, instrument
 from fuzz_inputs.spoil import spoilt
 from fuzz_inputs.studies import RIGS, small_study
+from fuzz_inputs.views import with_views
 
 KINDS = ("study", "study", "csv", "toml", "urdf", "model", "trial")
 """Odd studies are the slowest and find most: two of seven. The others are spoilt files: of a study to diagnose, or of a
 model and a trial to predict."""
-READING_KINDS = (*KINDS[2:], "recording", "walk")
-"""Spoilt files alone; of what `fes-pin new-study` reads as well: an instrument's recording, a walk in two `.mot`."""
+READING_KINDS = (*KINDS[2:], "recording", "walk", "view", "files")
+"""Spoilt files alone, and views of recordings; of what `fes-pin new-study` reads as well: an instrument's recording, a
+walk in two `.mot`, two files of one trial."""
 
 
 @dataclass(frozen=True)
@@ -61,13 +63,15 @@ def run_case(number: int, seed: int, work: Path, cache: Path, reading: bool = Fa
     scratch = work / "scratch"
     scratch.mkdir(parents=True)
     told = ""
-    if kind in ("recording", "walk"):
+    if kind in ("recording", "walk", "files"):
         asked = _new_study(kind, work, rng)
     else:
         made = small_study(rng, rig)
         if kind == "study":
             told, made = odd_study(made, rng)
         write_study(made, work / "study")
+        if kind == "view":
+            with_views(work / "study", rng)
         predicts = kind in ("model", "trial")
         asked = _predict(kind, rig, made, work) if predicts else _diagnose(kind, made, work, reading)
     if asked.target is not None:
@@ -79,7 +83,7 @@ def run_case(number: int, seed: int, work: Path, cache: Path, reading: bool = Fa
 def _diagnose(kind: str, made: Study, work: Path, reading: bool) -> Call:
     study, out = work / "study", work / "out"
     urdf = next(iter(sorted(study.glob("*.urdf"))), study / "study.toml")
-    targets = {"study": None, "csv": study / f"trials/{made.trials[-1].name}.csv", "urdf": urdf}
+    targets = {"study": None, "view": None, "csv": study / f"trials/{made.trials[-1].name}.csv", "urdf": urdf}
     given = ["check", str(study)] if reading else ["diagnose", str(study), "--out", str(out)]
     return Call(given, targets.get(kind, study / "study.toml"), out)
 
@@ -98,6 +102,13 @@ def _new_study(kind: str, work: Path, rng: np.random.Generator) -> Call:
         recording, out = work / "a.csv", work / "made"
         recording.write_text(instrument(rng), encoding="utf-8")
         return Call(["new-study", str(recording), "--pendulum", "0.3", "1", "--out", str(out)], recording, out)
+    if kind == "files":
+        files, out = (work / "a_pos.csv", work / "a_tau.csv"), work / "made"
+        for path in files:
+            path.write_text(instrument(rng), encoding="utf-8")
+        given = ["new-study", *map(str, files), "--rod", "0.3", "1", "--source", "pos=*pos", "--source", "tau=*tau"]
+        named = ["--column", "position=pos.Angle", "--column", "effort=tau.Torque", "--offset", "tau=fit"]
+        return Call([*given, *named, "--out", str(out)], files[int(rng.integers(2))], out)
     files, out = (work / "coordinates.mot", work / "forces.mot"), work / "made"
     for path, text in zip(files, (coordinates(rng), ground_reaction(rng)), strict=True):
         path.write_text(text, encoding="utf-8")
