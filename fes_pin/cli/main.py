@@ -11,7 +11,7 @@ from fes_pin.cli.cohort import cohort
 from fes_pin.cli.compare import compare
 from fes_pin.cli.contrast import contrast
 from fes_pin.cli.datasets import datasets
-from fes_pin.cli.group import App
+from fes_pin.cli.group import App, name_files_in_utf8
 from fes_pin.cli.options import (
     Exclude,
     FailOn,
@@ -145,6 +145,7 @@ def effects(library: Libraries = None) -> None:
 
 def main() -> None:
     """Run the command line; see `fes_pin.cli.group`."""
+    name_files_in_utf8()
     app(prog_name="fes-pin")
 
 

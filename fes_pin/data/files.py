@@ -12,7 +12,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from fes_pin.data.as_read import HeldFile, note_bytes, note_read, note_written, refuse_inputs
-from fes_pin.data.errors import InputError
+from fes_pin.data.errors import InputError, as_text
 
 MAX_BYTES = 1 << 30
 SCRATCH = ".fes_pin-"
@@ -196,7 +196,12 @@ def write_bytes(path: str | Path, content: bytes, mode: int = 0o666) -> None:
 
 def write_text(path: str | Path, text: str) -> None:
     """Write text as UTF-8, as `write_bytes`."""
-    write_bytes(path, text.encode("utf-8"))
+    write_bytes(path, as_bytes(text))
+
+
+def as_bytes(content: str | bytes) -> bytes:
+    """A file's bytes, of text in UTF-8."""
+    return as_text(content).encode("utf-8") if isinstance(content, str) else content
 
 
 def check_folder(folder: str | Path) -> None:
@@ -255,8 +260,7 @@ def _write_into(folder: Path, contents: Mapping[str, str | bytes], without: Iter
     with scratch_folder(folder) as scratch:
         staged = {}
         for index, (name, content) in enumerate(contents.items()):
-            whole = content.encode("utf-8") if isinstance(content, str) else content
-            staged[targets[name]] = _stage(scratch / f"new-{index}", whole)
+            staged[targets[name]] = _stage(scratch / f"new-{index}", as_bytes(content))
         _exchange(staged, [*targets.values(), *gone], scratch)
     for target in targets.values():
         note_written(target)

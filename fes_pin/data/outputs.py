@@ -11,7 +11,7 @@ from pathlib import Path
 
 from fes_pin.data.as_read import refuse_inputs, was_read
 from fes_pin.data.errors import InputError
-from fes_pin.data.files import check_folder, own_json, write_bytes, write_files
+from fes_pin.data.files import as_bytes, check_folder, own_json, write_bytes, write_files
 
 RECORD = ".fes_pin.json"
 """In each folder that a command writes into: by name of a file which command wrote it, and its SHA-256."""
@@ -84,7 +84,7 @@ class Outputs:
         if place is not None:
             self.write(place.parent, {place.name: content})
         else:
-            write_bytes(path, content.encode() if isinstance(content, str) else content)
+            write_bytes(path, as_bytes(content))
 
     def _check(self, folder: Path, contents: Mapping[str, str | bytes | None]) -> dict[str, str]:
         """The record of the folder, where all files may be written."""
@@ -112,7 +112,7 @@ class Outputs:
 
     def _note(self, content: str | bytes) -> str:
         """What the record says of a file with this content."""
-        return f"{self.command} {hashlib.sha256(content.encode() if isinstance(content, str) else content).hexdigest()}"
+        return f"{self.command} {hashlib.sha256(as_bytes(content)).hexdigest()}"
 
 
 def check_ending(path: str | Path, endings: Sequence[str]) -> None:
