@@ -17,6 +17,7 @@ from typer.core import TyperCommand, TyperGroup
 
 from fes_pin.data.as_read import one_command
 from fes_pin.data.errors import InputError
+from fes_pin.data.outputs import claims_held
 from fes_pin.settings import while_set
 
 USAGE_ERROR: Any = next(kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "ClickException")
@@ -217,7 +218,7 @@ class Commands(TyperGroup):
         if not standalone_mode:
             return super().main(args, standalone_mode=False, **given)
         _make_streams_whole()
-        with one_command(), redirect_stdout(Held(sys.stdout)) as held:
+        with one_command(), claims_held(), redirect_stdout(Held(sys.stdout)) as held:
             code = self._run(held, args, given)
         raise SystemExit(code)
 

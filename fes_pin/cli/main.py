@@ -101,7 +101,7 @@ def diagnose(
             raise InputError("goes only with a rig; walking has no such tables", column="--tables")
         check_table(table)
     outputs = Outputs("diagnose", force)
-    outputs.check(out, (*answer_names(measured), *([table] if table else [])))  # said before any work
+    outputs.claim(out, (*answer_names(measured), *([table] if table else [])))  # said before any work
     with progress() as tell:
         to_be_said = [catalogue]
 
