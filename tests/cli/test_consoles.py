@@ -151,7 +151,7 @@ def test_every_command_ends_as_documented_on_every_console(here, tmp_path, conso
 
 @pytest.mark.parametrize("console", ["C", "utf-8"])
 def test_names_that_are_no_utf8(here, tmp_path, console):
-    """Bytes of an older computer in names: what can be read is read, what a study cannot name is refused in one line."""
+    """Bytes of an older computer in names: all is read but what a study cannot name."""
     folder = tmp_path / "here"
     shutil.copytree(here, folder)
     for name, odd in ((FOLDER, BYTES), ("Pulse °.csv", BYTES + b".csv"), ("Pendel °.toml", BYTES + b".toml")):

@@ -26,8 +26,8 @@ def found():
 WRITERS = {  # each with an ending that it writes, and all of them
     "write_trial": (lambda one, path, **more: fp.write_trial(one.study.trials[0], path, **more), ".csv"),
     "save_model": (lambda one, path, **more: fp.save_model(nominal_model(one.study), path, **more), ".toml"),
-    "report": (lambda one, path, **more: fp.report(one, path, **more), ".html or .htm"),
-    "save_result": (lambda one, path, **more: fp.save_result(one, path, **more), ".json"),
+    "report": (fp.report, ".html or .htm"),
+    "save_result": (fp.save_result, ".json"),
     "Body.write": (lambda _, path, **more: Body.from_subject(70.0, 1.75).write(path, **more), ".urdf or .xml"),
 }
 
@@ -82,9 +82,9 @@ def test_a_study_replaces_the_one_that_was_written(tmp_path):
 
 ANSWER = {"diagnosis.json": json.dumps({"a": 1, "b": [1, 2]}, indent=1) + "\n", "model.toml": "m", "report.html": "r"}
 COPIES = {
-    "whole": lambda a, b: shutil.copytree(a, b),
+    "whole": shutil.copytree,
     "without the hidden file": lambda a, b: shutil.copytree(a, b, ignore=lambda *_: [RECORD]),
-    "moved": lambda a, b: shutil.move(a, b),
+    "moved": shutil.move,
 }
 
 
