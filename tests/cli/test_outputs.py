@@ -255,7 +255,7 @@ def test_what_is_not_as_this_command_wrote_it_needs_force(stopped, sandbox, monk
     if change == "of nobody":
         (sandbox / "answer").mkdir()
         (sandbox / "answer/model.toml").write_text("notes")
-        says = "fes-pin diagnose did not write it"
+        says = "no note is here that fes-pin diagnose wrote it"
     elif change == "changed":
         assert run(monkeypatch, "diagnose", "study", "--out", "answer") == 0
         (sandbox / "answer/model.toml").write_text((sandbox / "answer/model.toml").read_text() + "# mine\n")
