@@ -15,9 +15,10 @@ from fes_pin.body.joints import JOINT_NAMES, JOINTS, SIDES, angles_array, axis_o
 from fes_pin.body.skeleton import Skeleton, read_segments, skeleton_of_table
 from fes_pin.body.urdf import origin_of, write_urdf
 from fes_pin.data.errors import InputError, errors_of
-from fes_pin.data.files import read_bytes, text_of, write_text
+from fes_pin.data.files import read_bytes, text_of
 from fes_pin.data.named import NamedArray
 from fes_pin.data.numbers import known_word, numbers, positive_number, shortened
+from fes_pin.data.outputs import URDF_ENDINGS, written_by
 from fes_pin.data.study import Study
 from fes_pin.data.urdf import moving_joints
 
@@ -252,15 +253,20 @@ class Body:
         place = data.oMf[self.model.getFrameId(frame)]
         return place.rotation.copy(), place.translation.copy()
 
-    def write(self, path: str | Path) -> None:
+    def write(self, path: str | Path, *, overwrite: bool = False) -> None:
         """Write the URDF to a file, into a folder that is there.
+
+        Parameters
+        ----------
+        overwrite
+            Replace a file that this function did not write, or that was changed since.
 
         Raises
         ------
         InputError
-            It cannot be written, or is a file that was read.
+            It cannot be written, is a file that was read, or is one of others.
         """
-        write_text(path, self.urdf)
+        written_by("Body.write", path, self.urdf, URDF_ENDINGS, overwrite)
 
     def __str__(self) -> str:
         height = "" if self.height_m is None else f", {self.height_m:.2f} m"

@@ -13,7 +13,7 @@ from fes_pin.cli.options import Force, output
 from fes_pin.cli.progress import print_text
 from fes_pin.data.errors import InputError, errors_of
 from fes_pin.data.numbers import between
-from fes_pin.data.outputs import Outputs
+from fes_pin.data.outputs import HTML, Outputs
 
 app = App(help="The walking body: modes, nerves, view.")
 
@@ -205,7 +205,7 @@ def view(
     else:
         scene = show_posture(linear)
     if out is not None:
-        Outputs("body view", force).write_file(out, scene.html(), (".html", ".htm"))
+        Outputs("body view", force).write_file(out, scene.html(), HTML)
         typer.echo(f"wrote {out}")
     if live:
         _serve(scene)

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from fes_pin.cli.group import needs
+from fes_pin.cli.group import complain, needs
 from fes_pin.cli.options import Force, Libraries, Limit, Seed, output
 from fes_pin.cli.progress import print_text, progress
 
@@ -50,5 +50,5 @@ def cohort(
     title, head, rows, notes = made.as_table()
     print_text(table_text(title, head, rows, [one for one in notes if not one.startswith("failed")]))
     for row in made.failed:
-        typer.echo(f"failed: {row['study']}: {row['error']}", err=True)
+        complain(f"failed: {row['study']}: {row['error']}")
     typer.echo(f"page: {out / 'cohort.html'}")

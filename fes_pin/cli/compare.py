@@ -51,7 +51,7 @@ def compare(
     measured = study_of(study, catalogue, trials, exclude)
     outputs = Outputs("compare", force)
     if out is not None:
-        outputs.check(out, (FILE,))  # what cannot be read or written is said before any work
+        outputs.claim(out, (FILE,))  # what cannot be read or written is said before any work
     names = None if models is None else [n.strip() for n in models.split(",") if n.strip()]
     own = {str(path): path for path in model or ()}
     with progress() as tell:

@@ -50,7 +50,7 @@ def contrast(
     before = study_of(study, catalogue, trials, exclude)
     now = None if after is None else study_of(after, catalogue)
     outputs = Outputs("contrast", force)
-    outputs.check(out, ("contrast.json", "report.html"))  # what cannot be read or written is said before any work
+    outputs.claim(out, ("contrast.json", "report.html"))  # what cannot be read or written is said before any work
     wanted = [g.strip() for g in groups.split(",") if g.strip()] if groups is not None else None
     with progress() as tell:
         found = find(

@@ -17,6 +17,7 @@ from typer.core import TyperCommand, TyperGroup
 
 from fes_pin.data.as_read import one_command
 from fes_pin.data.errors import InputError
+from fes_pin.data.outputs import claims_held
 from fes_pin.settings import while_set
 
 USAGE_ERROR: Any = next(kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "ClickException")
@@ -56,7 +57,12 @@ def _noting(what: str, notes: dict[str, str]) -> Callable[[F], F]:
 def remark(text: str) -> None:
     """Say something besides the answer, on standard error; nothing with --quiet."""
     if VOICE.get() >= 0:
-        typer.echo(text, err=True)
+        complain(text)
+
+
+def complain(text: str) -> None:
+    """Say what is wrong, on standard error; `typer.echo` would take UTF-8 for the encoding of an ASCII console."""
+    print(text, file=sys.stderr, flush=True)
 
 
 class Held(io.StringIO):
@@ -70,6 +76,11 @@ class Held(io.StringIO):
         if self.is_silent:
             return len(text)
         return self.stream.write(text) if self.is_released else super().write(text)
+
+    @property
+    def encoding(self) -> str:  # type: ignore[override]
+        """That of the stream, by which tables are drawn in signs that it has."""
+        return self.stream.encoding
 
     def flush(self) -> None:
         if self.is_released:
@@ -207,7 +218,7 @@ class Commands(TyperGroup):
         if not standalone_mode:
             return super().main(args, standalone_mode=False, **given)
         _make_streams_whole()
-        with one_command(), redirect_stdout(Held(sys.stdout)) as held:
+        with one_command(), claims_held(), redirect_stdout(Held(sys.stdout)) as held:
             code = self._run(held, args, given)
         raise SystemExit(code)
 
@@ -238,18 +249,29 @@ def _give_up(stream: TextIO) -> int:
     return 1
 
 
+def name_files_in_utf8() -> None:
+    """Start again where Python takes names of files for ASCII (LC_ALL=C PYTHONUTF8=0), as a study names them in UTF-8.
+
+    What is printed is in the encoding that the streams had.
+    """
+    if sys.getfilesystemencoding() in ("ascii", "us-ascii"):
+        console = getattr(sys.stdout or sys.stderr, "encoding", None) or "ascii"
+        known = {**os.environ, "PYTHONIOENCODING": os.environ.get("PYTHONIOENCODING") or console}
+        os.execve(sys.executable, [sys.executable, "-X", "utf8", *sys.orig_argv[1:]], known)
+
+
 def _make_streams_whole() -> None:
-    """Let what is printed to a stream that is closed go nowhere, and what a stream has no sign for become "?"."""
+    """Let what is printed to a closed stream go nowhere, and signs that a stream lacks become escapes, as `\\u65e5`."""
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         stream = getattr(sys, name)
         if stream is None:
             setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115 - for good
-        elif mode == "w" and hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors="replace")
+        elif hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")
 
 
 def _refuse(line: str) -> int:
-    typer.echo(line, err=True)
+    complain(line)
     return 2
 
 

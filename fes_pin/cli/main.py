@@ -11,7 +11,7 @@ from fes_pin.cli.cohort import cohort
 from fes_pin.cli.compare import compare
 from fes_pin.cli.contrast import contrast
 from fes_pin.cli.datasets import datasets
-from fes_pin.cli.group import App
+from fes_pin.cli.group import App, name_files_in_utf8
 from fes_pin.cli.options import (
     Exclude,
     FailOn,
@@ -101,7 +101,7 @@ def diagnose(
             raise InputError("goes only with a rig; walking has no such tables", column="--tables")
         check_table(table)
     outputs = Outputs("diagnose", force)
-    outputs.check(out, (*answer_names(measured), *([table] if table else [])))  # said before any work
+    outputs.claim(out, (*answer_names(measured), *([table] if table else [])))  # said before any work
     with progress() as tell:
         to_be_said = [catalogue]
 
@@ -145,6 +145,7 @@ def effects(library: Libraries = None) -> None:
 
 def main() -> None:
     """Run the command line; see `fes_pin.cli.group`."""
+    name_files_in_utf8()
     app(prog_name="fes-pin")
 
 

@@ -10,7 +10,7 @@ import typer
 from fes_pin.cli.group import python_names
 from fes_pin.cli.options import Force, Libraries, output
 from fes_pin.cli.progress import catalogue_with, say_whose_code
-from fes_pin.data.outputs import Outputs
+from fes_pin.data.outputs import URDF_ENDINGS, Outputs
 
 if TYPE_CHECKING:
     from fes_pin.data.trial import Trial
@@ -30,7 +30,7 @@ def urdf(
 
     catalogue = catalogue_with(library)
     text, left_out, changed = extended_urdf(load_model(model, library=catalogue), believed)
-    Outputs("urdf", force).write_file(out, text, (".urdf", ".xml"))
+    Outputs("urdf", force).write_file(out, text, URDF_ENDINGS)
     say_whose_code(catalogue)
     typer.echo(f"wrote {out}")
     if changed:

@@ -156,7 +156,7 @@ def new_study(
     else:
         made = make(wanted, lambda known, columns: guess_start(schema.owner, known, believed, columns))
     outputs = Outputs("new-study", force)
-    outputs.check(folder, made.contents)
+    outputs.claim(folder, made.contents)
     study, warnings = _tried(made, wanted, catalogue)
     left_out = {r: t.kind for t in study.trials for r in t.remarks if r.startswith(LEFT_OUT)}
     for kind in left_out.values():

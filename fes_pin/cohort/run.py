@@ -154,7 +154,7 @@ def run_cohort(
     store = Store(out, outputs)
     every = [Work(n, str(f), seed, limit, library, command) for n, f in found.items()]
     todo: list[Task] = [(work, key) for work in every if not store.has(work, key := work.key())]
-    outputs.check(out, ("cohort.html", *(name + suffix for name in HEADS for suffix in SUFFIXES)))
+    outputs.claim(out, ("cohort.html", *(name + suffix for name in HEADS for suffix in SUFFIXES)))
     for work, _ in todo:
         outputs.check(store.place(work.name), (*OF_ALL, *OF_WALKS, STATE))
     tell, began = progress or (lambda _share, _words: None), time.monotonic()

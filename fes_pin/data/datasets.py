@@ -158,7 +158,7 @@ def _fetched(name: str, target: Path, unverified: bool, outputs: Outputs) -> Fil
     dataset = _known(name)
     if dataset.by_hand or name not in CONVERTERS:
         raise InputError(f"{dataset.by_hand}; it is at {dataset.origin} ({dataset.licence})", column=name)
-    outputs.check(target, ("study.toml", *dataset.converted))
+    outputs.claim(target, ("study.toml", *dataset.converted))
     with tempfile.TemporaryDirectory(prefix="fes-pin-") as scratch:
         _retrieve(dataset, Path(scratch))
         made = CONVERTERS[name](Path(scratch), dataset.upstream)

@@ -4,10 +4,16 @@ A library that comes with an extra of the package, and is not installed, raises 
 """
 
 import importlib
+import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+
+
+def as_text(words: str) -> str:
+    """Words as UTF-8 can hold them: each byte of a file's name that is none of UTF-8 in digits, as `\\xff`."""
+    return re.sub("[\ud800-\udfff]", lambda one: f"\\x{ord(one[0]) & 0xFF:02x}", words)
 
 
 class InputError(ValueError):
@@ -35,7 +41,7 @@ class InputError(ValueError):
         if self.column is not None:
             column = _short(str(self.column))
             place.append(f"column {column}" if self.row is not None else column)
-        line = f"{', '.join(place)}: {self.message}" if place else self.message
+        line = as_text(f"{', '.join(place)}: {self.message}" if place else self.message)
         return line if line.isprintable() else "".join(each if each.isprintable() else " " for each in line)
 
 

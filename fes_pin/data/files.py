@@ -1,6 +1,5 @@
 """Files of a study: read as text, kept inside its folder, written whole or not at all."""
 
-import fcntl
 import json
 import os
 import shutil
@@ -12,7 +11,12 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from fes_pin.data.as_read import HeldFile, note_bytes, note_read, note_written, refuse_inputs
-from fes_pin.data.errors import InputError
+from fes_pin.data.errors import InputError, as_text
+
+try:
+    import fcntl
+except ImportError:  # Windows, for which Pinocchio has no wheels either
+    raise ImportError("fes_pin runs on Linux and macOS, and in WSL on Windows") from None
 
 MAX_BYTES = 1 << 30
 SCRATCH = ".fes_pin-"
@@ -196,7 +200,12 @@ def write_bytes(path: str | Path, content: bytes, mode: int = 0o666) -> None:
 
 def write_text(path: str | Path, text: str) -> None:
     """Write text as UTF-8, as `write_bytes`."""
-    write_bytes(path, text.encode("utf-8"))
+    write_bytes(path, as_bytes(text))
+
+
+def as_bytes(content: str | bytes) -> bytes:
+    """A file's bytes, of text in UTF-8."""
+    return as_text(content).encode("utf-8") if isinstance(content, str) else content
 
 
 def check_folder(folder: str | Path) -> None:
@@ -239,7 +248,7 @@ def write_files(folder: str | Path, contents: Mapping[str, str | bytes], without
     """
     folder = as_path(folder, "folder")
     with _input_errors(folder):
-        made = _make_folder(folder)
+        made = make_folder(folder)
         try:
             _write_into(folder, contents, without)
         except BaseException:
@@ -255,8 +264,7 @@ def _write_into(folder: Path, contents: Mapping[str, str | bytes], without: Iter
     with scratch_folder(folder) as scratch:
         staged = {}
         for index, (name, content) in enumerate(contents.items()):
-            whole = content.encode("utf-8") if isinstance(content, str) else content
-            staged[targets[name]] = _stage(scratch / f"new-{index}", whole)
+            staged[targets[name]] = _stage(scratch / f"new-{index}", as_bytes(content))
         _exchange(staged, [*targets.values(), *gone], scratch)
     for target in targets.values():
         note_written(target)
@@ -322,8 +330,32 @@ def _locked_folder(folder: Path) -> tuple[Path, int | None]:
         os.close(lock)
 
 
-def _lock(path: Path) -> int:
-    handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
+@contextmanager
+def locked(path: Path) -> Iterator[None]:
+    """Hold the lock of a file, which is made for it and goes again.
+
+    Raises
+    ------
+    BlockingIOError
+        Another one holds it.
+    OSError
+        The disk knows no locks, or the file cannot be made.
+    """
+    while True:
+        lock = _lock(path, os.O_CREAT)
+        with suppress(FileNotFoundError):
+            if os.path.samestat(os.fstat(lock), os.stat(path)):
+                break
+        os.close(lock)  # it went meanwhile
+    try:
+        yield
+    finally:
+        path.unlink(missing_ok=True)
+        os.close(lock)
+
+
+def _lock(path: Path, further: int = 0) -> int:
+    handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | further, 0o666)
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BaseException:
@@ -354,7 +386,7 @@ def _target(folder: Path, name: str) -> Path:
     return target
 
 
-def _make_folder(folder: Path) -> Path | None:
+def make_folder(folder: Path) -> Path | None:
     """Make a folder; the topmost one that had to be made, to remove it again."""
     new = list(takewhile(lambda one: not one.exists(), (folder, *folder.parents)))
     if new:

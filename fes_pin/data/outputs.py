@@ -1,20 +1,43 @@
-"""What a command writes: never over what was read, and only over what the same command wrote and nobody has changed."""
+"""What a command writes: never over what was read, and only over what it wrote itself and nobody has changed.
 
-import fcntl
+Which that is, is noted in each folder by the SHA-256 of its files, and once more at the end of an answer in JSON: a
+copy without the hidden file is known by that. Functions of Python that write do the same under their own names.
+"""
+
 import hashlib
 import json
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
+from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
 
 from fes_pin.data.as_read import refuse_inputs, was_read
 from fes_pin.data.errors import InputError
-from fes_pin.data.files import check_folder, own_json, write_bytes, write_files
+from fes_pin.data.files import (
+    SCRATCH,
+    as_bytes,
+    as_path,
+    check_folder,
+    fcntl,
+    locked,
+    make_folder,
+    own_json,
+    write_bytes,
+    write_files,
+)
+from fes_pin.settings import while_set
 
 RECORD = ".fes_pin.json"
 """In each folder that a command writes into: by name of a file which command wrote it, and its SHA-256."""
+WRITTEN = "written"
+"""Last key of an answer in JSON: the same of the files that were written with it, and of the text before the key."""
+HTML, URDF_ENDINGS = (".html", ".htm"), (".urdf", ".xml")
+"""How the names of pages and of rigs end."""
+BUSY = f"{SCRATCH}busy"
+"""How the files are named that a command locks while it works for a folder, or for one file."""
+_CLAIMED: ContextVar[tuple[ExitStack, set[Path]] | None] = ContextVar("claimed", default=None)
 
 
 @dataclass(frozen=True)
@@ -27,7 +50,7 @@ class Outputs:
     Parameters
     ----------
     command
-        Its name.
+        Its name; of a function of Python with "fp." before it.
     force
         Whether files of others are written over.
     """
@@ -46,9 +69,39 @@ class Outputs:
         self._check(Path(folder), names if isinstance(names, Mapping) else dict.fromkeys(names))
 
     def check_file(self, path: str | Path) -> None:
-        """Raise where `write_file` would, as `check`."""
+        """Raise where `write_file` would, as `check`; no other command writes that file until this one ends."""
         if (place := _place(path)) is not None:
             self.check(place.parent, (place.name,))
+            self._claim(place.parent, f"{BUSY}-{hashlib.sha256(os.fsencode(place.name)).hexdigest()[:16]}", place)
+
+    def claim(self, folder: str | Path, names: Iterable[str]) -> None:
+        """As `check`; and no other command that claims the folder runs until this one ends.
+
+        Raises
+        ------
+        InputError
+            As `check`, and where another command is at it.
+        """
+        self.check(folder, names)
+        self._claim(Path(folder), BUSY, Path(folder))
+
+    def _claim(self, folder: Path, lock: str, what: Path) -> None:
+        """Hold the lock of a folder until the command ends; a folder that is made for it goes again if it stays empty.
+
+        The lock ends with its process. On a disk that knows no locks nothing is held.
+        """
+        if (claimed := _CLAIMED.get()) is None or (place := folder.resolve() / lock) in claimed[1]:
+            return
+        stack, places = claimed
+        with suppress(OSError):
+            made = make_folder(folder)
+            if made is not None:
+                stack.callback(_remove_empty, folder.absolute(), made.absolute())
+            try:
+                stack.enter_context(locked(place))
+                places.add(place)
+            except BlockingIOError:
+                raise InputError("another fes-pin writes here now; expected another place", file=what) from None
 
     def write(self, folder: str | Path, contents: Mapping[str, str | bytes], without: Iterable[str] = ()) -> None:
         """Write files into a folder, all or none, and note there that this command wrote them.
@@ -64,6 +117,7 @@ class Outputs:
             As `check` and `write_files`.
         """
         folder = Path(folder)
+        contents = self._signed(contents)
         with _alone(folder):
             record = self._check(folder, contents)
             gone = [n for n in without if self._wrote(folder, n, record) and not was_read(folder / n)]
@@ -84,12 +138,12 @@ class Outputs:
         if place is not None:
             self.write(place.parent, {place.name: content})
         else:
-            write_bytes(path, content.encode() if isinstance(content, str) else content)
+            write_bytes(path, as_bytes(content))
 
     def _check(self, folder: Path, contents: Mapping[str, str | bytes | None]) -> dict[str, str]:
         """The record of the folder, where all files may be written."""
         check_folder(folder)
-        record = {n: note for n, note in own_json(folder / RECORD).items() if isinstance(note, str)}
+        record = _record(folder)
         refuse_inputs(folder / name for name in contents)
         for name, content in contents.items():
             place = folder / name
@@ -100,19 +154,28 @@ class Outputs:
             if not os.path.lexists(place) or self.force or is_same or self._wrote(folder, name, record):
                 continue
             by = record.get(name, "").rpartition(" ")[0]
-            why = f"fes-pin {by} wrote it" if by else f"fes-pin {self.command} did not write it"
+            why = f"{_called(by)} wrote it" if by else f"no note is here that {_called(self.command)} wrote it"
             why = f"it was changed since {why}" if by == self.command else why
-            expected = "expected another place, or force=True to write over it"
-            raise InputError(f"is there already, and {why}; {expected}", file=place)
+            allowed = "overwrite=True" if self.command.startswith("fp.") else "force=True"
+            raise InputError(f"is there already, and {why}; expected another place, or {allowed}", file=place)
         return record
 
     def _wrote(self, folder: Path, name: str, record: Mapping[str, str]) -> bool:
         """True of a file that is as this command wrote it."""
         return (folder / name).is_file() and record.get(name) == self._note((folder / name).read_bytes())
 
+    def _signed(self, contents: Mapping[str, str | bytes]) -> dict[str, str | bytes]:
+        """Contents of which each answer in JSON ends with notes of itself and the others."""
+        signed = dict(contents)
+        for name, text in contents.items():
+            if name.endswith(".json") and isinstance(text, str) and text.startswith("{\n") and text.endswith("\n}\n"):
+                notes = json.dumps({n: self._note(content) for n, content in contents.items()})
+                signed[name] = f'{text[:-3]},\n "{WRITTEN}": {notes}\n}}\n'
+        return signed
+
     def _note(self, content: str | bytes) -> str:
         """What the record says of a file with this content."""
-        return f"{self.command} {hashlib.sha256(content.encode() if isinstance(content, str) else content).hexdigest()}"
+        return f"{self.command} {hashlib.sha256(as_bytes(content)).hexdigest()}"
 
 
 def check_ending(path: str | Path, endings: Sequence[str]) -> None:
@@ -130,6 +193,65 @@ def check_ending(path: str | Path, endings: Sequence[str]) -> None:
     """
     if endings and (found := Path(path).suffix) and found.lower() not in endings:
         raise InputError(f"expected a name that ends in {' or '.join(endings)}, found {found}", file=path)
+
+
+def written_by(name: str, path: str | Path, content: str, endings: Sequence[str], overwrite: bool) -> None:
+    """Write the file of a function of Python, as `Outputs.write_file`.
+
+    Parameters
+    ----------
+    name
+        Of the function.
+    overwrite
+        Whether a file is replaced that the function did not write, or that was changed since.
+
+    Raises
+    ------
+    InputError
+        As `Outputs.write_file`.
+    """
+    Outputs(f"fp.{name}", overwrite).write_file(as_path(path), content, endings)
+
+
+@contextmanager
+def claims_held() -> Iterator[None]:
+    """What is claimed inside is held until its end."""
+    with ExitStack() as stack, while_set(_CLAIMED, (stack, set[Path]())):
+        yield
+
+
+def _called(command: str) -> str:
+    return command if command.startswith("fp.") else f"fes-pin {command}"
+
+
+def _record(folder: Path) -> dict[str, str]:
+    """By name of a file who wrote it and its SHA-256, as the folder says; else as its answers in JSON do."""
+    found = own_json(folder / RECORD)
+    for path in sorted(folder.glob("*.json")) if folder.is_dir() else ():
+        if path.name not in found:
+            found = {**_signature(path), **found}
+    return {n: note for n, note in found.items() if isinstance(note, str)}
+
+
+def _signature(path: Path) -> dict[str, str]:
+    """The notes at the end of an answer that nobody has changed; its own becomes that of the whole file."""
+    whole = path.read_bytes() if path.is_file() else b""
+    text, mark, _ = whole.rpartition(f',\n "{WRITTEN}": '.encode())
+    notes = own_json(path).get(WRITTEN) if mark else None
+    if not isinstance(notes, dict):
+        return {}
+    by, _, known = str(notes.get(path.name)).rpartition(" ")
+    if known != hashlib.sha256(text + b"\n}\n").hexdigest():
+        return {}
+    return {**notes, path.name: f"{by} {hashlib.sha256(whole).hexdigest()}"}
+
+
+def _remove_empty(folder: Path, made: Path) -> None:
+    """Remove a folder that was made, with its parents up to the topmost that was, where they are empty."""
+    with suppress(OSError):
+        while folder.is_relative_to(made):
+            folder.rmdir()
+            folder = folder.parent
 
 
 def _place(path: str | Path) -> Path | None:

@@ -20,6 +20,7 @@ from fes_pin.data.checks import check_values
 from fes_pin.data.counts import hunts
 from fes_pin.data.errors import InputError
 from fes_pin.data.imposed import imposed_motion
+from fes_pin.data.rests import MATTERS, rest_share
 from fes_pin.data.schema import IMPOSED, RigSchema
 from fes_pin.data.stuck import RUN
 from fes_pin.data.study import Study
@@ -101,7 +102,19 @@ def implausible(study: Study | ToPredict) -> list[str]:
     warnings += _each("holds whole numbers only: are they an encoder's counts?", [m for m in moving if _is_counted(*m)])
     for trial, name in moving:
         warnings += dropouts(trial, name) or _held(trial, name)
-    return [*warnings, *_rates(study.trials)]
+    return [*warnings, *_rates(study.trials), *_rests(study)]
+
+
+def _rests(study: Study | ToPredict) -> Iterable[str]:
+    """How long the trials of a study stand still, where that is most of the time."""
+    if isinstance(study, ToPredict):
+        return
+    read = study.schema.outputs
+    trials = [(t, [n for n in (read.get(t.kind),) if n in t], _stimuli(study, t)) for t in study.trials]
+    share = rest_share([one for one in trials if one[1]])
+    if share > MATTERS:
+        little = "what moves is known from the others alone"
+        yield f"these trials rest for {share:.0%} of the time: neither reading nor input changes, and {little}"
 
 
 def _check_counts(study: Study | ToPredict, moving: Sequence[tuple[Trial, str]]) -> None:

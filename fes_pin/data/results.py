@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any, ClassVar, Self
 
 from fes_pin.data.errors import InputError
-from fes_pin.data.files import read_json, write_text
+from fes_pin.data.files import read_json
+from fes_pin.data.outputs import WRITTEN, written_by
 from fes_pin.data.provenance import Provenance
 from fes_pin.data.read_only import ReadOnly, as_dicts
 from fes_pin.data.show import DataFrame, by_columns, frame, table_html, table_text
@@ -427,7 +428,7 @@ class SavedResult(Saveable):
         return f"<pre>{html.escape(self.text)}</pre>"
 
 
-def save_result(result: Saveable, path: str | Path) -> None:
+def save_result(result: Saveable, path: str | Path, *, overwrite: bool = False) -> None:
     """Write a result as JSON, whole or not at all; `load_result` reads it.
 
     Parameters
@@ -436,18 +437,20 @@ def save_result(result: Saveable, path: str | Path) -> None:
         What `diagnose`, `contrast`, `compare`, `fit` or a cohort gave. Numbers are written to the digits that are
         printed.
     path
-        Of the file; `fes-pin diagnose`, `contrast` and `compare` write the same as `diagnosis.json` and so on.
+        Of the file, `.json`; `fes-pin diagnose`, `contrast` and `compare` write the same as `diagnosis.json` and so on.
+    overwrite
+        Replace a file that this function did not write, or that was changed since.
 
     Raises
     ------
     InputError
-        It is no such result, or the file cannot be written, or was read.
+        It is no such result, or the file cannot be written, was read, or is one of others.
     """
     if not isinstance(result, Saveable):
         kind = type(result).__name__
         message = f"expected a result of diagnose, contrast, compare, fit or a cohort, found {kind}"
         raise InputError(message, column="result")
-    write_text(path, result.to_json())
+    written_by("save_result", path, result.to_json(), (".json",), overwrite)
 
 
 def load_result(path: str | Path) -> SavedResult:
@@ -460,7 +463,7 @@ def load_result(path: str | Path) -> SavedResult:
     """
     found = read_json(path)
     found = found if isinstance(found, dict) else {}
-    kind, lines, table = (found.pop(n, None) for n in (RESULT, TEXT, TABLE))
+    kind, lines, table, _ = (found.pop(n, None) for n in (RESULT, TEXT, TABLE, WRITTEN))
     whole = isinstance(kind, str) and isinstance(lines, list) and isinstance(table, dict)
     if not whole or not all(isinstance(column, list) for column in table.values()):
         raise InputError(f"expected a result that fes-pin saved, with {RESULT}, {TEXT} and {TABLE}", file=path)

@@ -18,8 +18,9 @@ from fes_pin.data.as_read import AsRead, digest_of, hashing
 from fes_pin.data.checks import check_constants, check_same_inputs, checked_label, checked_labels, checked_mapping
 from fes_pin.data.direction import with_kinds
 from fes_pin.data.errors import InputError, fault_at
-from fes_pin.data.files import as_path, hold, what_is_at, write_files
+from fes_pin.data.files import as_path, hold, what_is_at
 from fes_pin.data.numbers import instance
+from fes_pin.data.outputs import Outputs
 from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.recorded.columns import Columns
 from fes_pin.data.recorded.view import View, view_of
@@ -454,7 +455,7 @@ class _Reader(StudyTables):
         return self.error(f"rig.{key}" if place is None else f"trial[{self._places[place]}].{key}", message)
 
 
-def write_study(study: Study, folder: str | Path) -> None:
+def write_study(study: Study, folder: str | Path, *, overwrite: bool = False) -> None:
     """Write a study as a folder that `read_study` reads: all of its files, or none.
 
     A body's recordings are written at their own rates where its trials are as they were read, else on the times of its
@@ -465,14 +466,15 @@ def write_study(study: Study, folder: str | Path) -> None:
     study
         To write; the files it names are copied.
     folder
-        Made if it is missing. Files of the same names in it are replaced, others stay.
+        Made if it is missing. Files of the same names that this function wrote are replaced, others stay.
+    overwrite
+        Replace files of the same names that this function did not write, or that were changed since.
 
     Raises
     ------
     InputError
-        If the folder cannot be written, a file in it was read and would be replaced (see `read_files`), or what would
-        be written could not be read: samples that were not measured, an
-        input that some trials lack.
+        If the folder cannot be written, a file in it was read or is one of others and would be replaced, or what would
+        be written could not be read: samples that were not measured, an input that some trials lack.
     """
     schema = instance(study, Study, "study").schema
     check_same_inputs([(t.kind, t.columns) for t in study.trials], schema, study.constants, _fault_of(study.trials))
@@ -495,7 +497,7 @@ def write_study(study: Study, folder: str | Path) -> None:
     head = {"name": study.name, "rig": study.rig, **({HORIZON: study.horizon_s} if study.horizon_s else {})}
     document = {"study": head, "rig": rig, "start": dict(study.start)}
     contents["study.toml"] = tomli_w.dumps({**document, "trial": tables})
-    write_files(folder, contents)
+    Outputs("fp.write_study", overwrite).write(as_path(folder, "folder"), contents)
 
 
 def _trial_files(schema: RigSchema, trial: Trial, file: str) -> dict[str, str | bytes]:

@@ -14,9 +14,10 @@ import numpy as np
 from fes_pin.data.as_read import AsRead, digest_of, hashing
 from fes_pin.data.checks import check_columns, check_values, checked_label, checked_labels, checked_mapping
 from fes_pin.data.errors import InputError, fault_at
-from fes_pin.data.files import as_path, write_text
+from fes_pin.data.files import as_path
 from fes_pin.data.motion import GROUND_REACTION, coordinates_of, ground_reaction_of, on_common_time, read_motion
 from fes_pin.data.numbers import instance
+from fes_pin.data.outputs import written_by
 from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.recorded.columns import Columns
 from fes_pin.data.recorded.parts import HOLES, RESTARTS, holes, restarts
@@ -544,15 +545,22 @@ def walk_recordings(trial: Trial) -> tuple[tuple[np.ndarray, Mapping[str, np.nda
     return (trial.time, moves), (trial.time, {name: trial[name] for name in GROUND_REACTION})
 
 
-def write_trial(trial: Trial, path: str | Path) -> None:
+def write_trial(trial: Trial, path: str | Path, *, overwrite: bool = False) -> None:
     """Write a trial's time and columns as CSV, whole or not at all; reading gives the same numbers.
+
+    Parameters
+    ----------
+    overwrite
+        Replace a file that this function did not write, or that was changed since.
 
     Raises
     ------
     InputError
-        If the file cannot be written, was read, or could not be read again: a trial with samples that nobody measured.
+        If the file cannot be written, was read, is one of others, or could not be read again: a trial with samples
+        that nobody measured.
     """
-    write_text(path, trial_csv(replace(instance(trial, Trial, "trial"), as_read=None)))  # which checks it by itself
+    text = trial_csv(replace(instance(trial, Trial, "trial"), as_read=None))  # which checks it by itself
+    written_by("write_trial", path, text, (".csv",), overwrite)
 
 
 def trial_csv(trial: Trial) -> str:

@@ -7,8 +7,8 @@ from typing import Any
 import tomli_w
 
 from fes_pin.data.errors import InputError
-from fes_pin.data.files import write_text
 from fes_pin.data.numbers import instance
+from fes_pin.data.outputs import written_by
 from fes_pin.data.schema import NumberKey, one_of
 from fes_pin.data.toml import Document, read_toml
 from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
@@ -49,18 +49,23 @@ def model_toml(model: Model, further: Mapping[str, Mapping[str, Any]] | None = N
     return tomli_w.dumps({**tables, NEEDS: foreign} if foreign else tables)
 
 
-def save_model(model: Model, path: str | Path) -> None:
+def save_model(model: Model, path: str | Path, *, overwrite: bool = False) -> None:
     """Write `model.toml`, completely or not at all.
+
+    Parameters
+    ----------
+    overwrite
+        Replace a file that this function did not write, or that was changed since.
 
     Raises
     ------
     InputError
         If it is no `Model`: the body of a diagnosis of walking is saved as URDF, by its `write`. If the file cannot be
-        written, or was read and not written by this process.
+        written, was read and not written by this process, or is one of others.
     """
     how = ": its write() saves it as URDF, which Body.from_urdf reads" if hasattr(model, "urdf") else ""
     instance(model, Model, "model", how)
-    write_text(path, model_toml(model))
+    written_by("save_model", path, model_toml(model), (".toml",), overwrite)
 
 
 def load_model(path: str | Path, *, library: Source | Sequence[Source] | None = None) -> Model:

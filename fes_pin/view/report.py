@@ -6,8 +6,8 @@ from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
-from fes_pin.data.files import write_text
 from fes_pin.data.numbers import instance
+from fes_pin.data.outputs import HTML, written_by
 from fes_pin.data.results import Result
 from fes_pin.identify.error_measures import E_WORDS
 from fes_pin.infer.result import ABSENT, ON, Cause, Change, Named, ParameterEstimate
@@ -26,15 +26,23 @@ RIVALS = 7
 """Rivals shown of each cause."""
 
 
-def report(result: Result, path: str | Path) -> None:
+def report(result: Result, path: str | Path, *, overwrite: bool = False) -> None:
     """Write the report of a result of `diagnose` or `contrast`, whole or not at all.
+
+    Parameters
+    ----------
+    path
+        Of the page, `.html`.
+    overwrite
+        Replace a file that this function did not write, or that was changed since.
 
     Raises
     ------
     InputError
-        It is no such result; or the file cannot be written, or was read.
+        It is no such result; or the file cannot be written, was read, or is one of others.
     """
-    write_text(path, report_html(instance(result, Result, "diagnosis")))
+    page = report_html(instance(result, Result, "diagnosis"))
+    written_by("report", path, page, HTML, overwrite)
 
 
 def answer_files(result: Result) -> dict[str, str | bytes]:

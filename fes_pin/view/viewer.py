@@ -27,9 +27,9 @@ from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.linearize import ground_normal
 from fes_pin.body.modes import Mode
 from fes_pin.data.errors import InputError
-from fes_pin.data.files import write_text
 from fes_pin.data.named import NamedArray
 from fes_pin.data.numbers import instance
+from fes_pin.data.outputs import HTML, written_by
 from fes_pin.view.arrows import Arrow, draw_arrow
 
 FRAMES_A_SECOND = 30
@@ -151,15 +151,15 @@ class BodyScene:
         """The page."""
         import umsgpack  # noqa: PLC0415
 
-        script = (Path(import_meshcat().__file__).parent / "viewer/dist/main.min.js").read_text()
+        script = (Path(import_meshcat().__file__).parent / "viewer/dist/main.min.js").read_text("utf-8")
         texts = (base64.b64encode(umsgpack.packb(one.lower())).decode() for one in self.commands())
         packed = ",\n".join(f'"{text}"' for text in texts)
         page = Template(resources.files("fes_pin.view").joinpath("viewer.html").read_text(encoding="utf-8"))
         return page.substitute(script=script, commands=packed, caption=html.escape(self.caption))
 
-    def write(self, path: str | Path) -> Path:
-        """Write the page to a file, into a folder that is there; raises as `write_text`."""
-        write_text(path, self.html())
+    def write(self, path: str | Path, *, overwrite: bool = False) -> Path:
+        """Write the page to a file, into a folder that is there; raises as `fp.report`, with the same `overwrite`."""
+        written_by("BodyScene.write", path, self.html(), HTML, overwrite)
         return Path(path)
 
 

@@ -76,7 +76,7 @@ def sandbox(tmp_path, monkeypatch):
     (tmp_path / "own.py").write_text(LIBRARY)
     time = np.arange(100) * 0.01
     (tmp_path / "pulses.csv").write_text("time_s,pulse_width_us\n" + "".join(f"{t:.2f},300\n" for t in time))
-    Body.from_subject(70.0, 1.75).write(tmp_path / "body.svg")
+    (tmp_path / "body.svg").write_text(Body.from_subject(70.0, 1.75).urdf)
     names = [f"q_{name}" for name in (*REQUIRED, *OPTIONAL)]
     (tmp_path / "walk.csv").write_text(
         ",".join(["time_s", *names]) + "\n" + "".join(f"{t}{',0' * len(names)}\n" for t in (0, 0.01, 0.02))
@@ -255,7 +255,7 @@ def test_what_is_not_as_this_command_wrote_it_needs_force(stopped, sandbox, monk
     if change == "of nobody":
         (sandbox / "answer").mkdir()
         (sandbox / "answer/model.toml").write_text("notes")
-        says = "fes-pin diagnose did not write it"
+        says = "no note is here that fes-pin diagnose wrote it"
     elif change == "changed":
         assert run(monkeypatch, "diagnose", "study", "--out", "answer") == 0
         (sandbox / "answer/model.toml").write_text((sandbox / "answer/model.toml").read_text() + "# mine\n")
@@ -407,7 +407,7 @@ def test_an_output_without_a_name_is_refused(sandbox, monkeypatch, capsys, words
 
 
 def test_python_writes_over_nothing_that_was_read(tmp_path, diagnosis):
-    """Writing functions replace files as those of pandas do, but none that this process read and did not write."""
+    """No function writes over what this process read and did not write."""
     folder = shutil.copytree(DEMO, tmp_path / "study")
     study = fp.read_study(folder)
     recording = next(folder.rglob("*.csv"))
