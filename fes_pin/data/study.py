@@ -96,6 +96,7 @@ class Study(ReadOnly):
                 instance(getattr(self, key), kind, key)
         schema = self._schema()
         given = {n: checked_mapping(getattr(self, n), fault_at("Study.{}"), n) for n in ("constants", "start", "files")}
+        given["start"] |= schema.left_out(given["files"], {*given["start"], *given["constants"]})
         twice = set(schema.start) & set(given["constants"])
         if odd := sorted(twice & set(given["start"])):
             raise fault_at("start.{}")(odd[0], "is also among the constants; expected it in one of them")
@@ -363,7 +364,7 @@ class _Reader(StudyTables):
 
     def study(self) -> Study:
         constants, files = self.rig_table()
-        start = self.start_table(constants)
+        start = self.start_table(constants, files)
         own, tables = self.columns_table(files), self._trial_tables()
         each = enumerate(zip(tables, self._trial_names(tables), strict=True))
         trials = with_kinds([self._trial(f"trial[{i}]", table, name, own) for i, (table, name) in each], self.schema)

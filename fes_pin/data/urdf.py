@@ -38,6 +38,7 @@ JOINT_NUMBERS: Mapping[str, NumbersOf] = {
     "axis": {"xyz": (3, None)},
     "limit": {"lower": (1, 0.0), "upper": (1, 0.0), "effort": (1, None), "velocity": (1, None)},
 }
+DYNAMICS_NUMBERS: Mapping[str, NumbersOf] = {"dynamics": {"damping": (1, math.nan), "friction": (1, math.nan)}}
 MIMIC_NUMBERS: Mapping[str, NumbersOf] = {"mimic": {"multiplier": (1, 1.0), "offset": (1, 0.0)}}
 """Elements that bear on the motion, how many numbers each of their attributes holds, and what it is where it is absent;
 None where it must be there."""
@@ -101,6 +102,26 @@ def check_one_joint(path: str | Path) -> tuple[str, str]:
         if joint.find("mimic") is not None and urdf.moved_mass(joint.get("name", "")) > 0:
             raise urdf.error("expected no mass that moves along with another joint (<mimic>)", joint.get("name", ""))
     return name, kind
+
+
+def stated_of_joint(path: str | Path) -> dict[str, float]:
+    """What a URDF states of its one moving joint, of `damping`, dry `friction` and the actuator's limit of `effort`.
+
+    URDF needs a limit where a joint has ends, also of one without an actuator: a limit of 0 is no limit, and what is
+    written for "any", 1e6, is above whatever acts.
+
+    Returns
+    -------
+    dict
+        In N m s/rad or N s/m, and N m or N; only what is stated.
+
+    Raises
+    ------
+    InputError
+        As `check_one_joint`; a damping or friction below 0.
+    """
+    name, _ = check_one_joint(path)
+    return _Urdf(path).stated(name)
 
 
 def mechanics(path: str | Path) -> str:
@@ -257,6 +278,17 @@ class _Urdf:
         if not is_possible(principal):
             raise self.error(f"expected an inertia that is positive, found a principal one of {principal[0]:g}", name)
         return value
+
+    def stated(self, name: str) -> dict[str, float]:
+        """Return what is stated of a joint; see `stated_of_joint`."""
+        joint = next(j for j in self.joints if j.get("name") == name)
+        found = self._read(joint, DYNAMICS_NUMBERS, name).get("dynamics", {})
+        out = {key: value for key, (value,) in found.items() if not math.isnan(value)}
+        for key, value in out.items():
+            if value < 0.0:
+                raise self.error(f"expected {key} of <dynamics> of at least 0, found {value:g}", name)
+        (most,) = self._read(joint, JOINT_NUMBERS, name).get("limit", {}).get("effort", (0.0,))
+        return {**out, **({"effort": most} if most > 0.0 else {})}
 
     def impossible(self) -> list[InputError]:
         """Return the errors of `impossible_inertias`."""

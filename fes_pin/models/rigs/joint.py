@@ -12,7 +12,7 @@ from fes_pin.data.errors import InputError
 from fes_pin.data.schema import IMPOSED, START_S, RigSchema, any_number, not_negative, positive
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
-from fes_pin.data.urdf import check_one_joint
+from fes_pin.data.urdf import check_one_joint, stated_of_joint
 from fes_pin.models.maths import cos, sin, sqrt, where
 from fes_pin.models.parameters import ROTARY, SLIDING, parameter
 from fes_pin.models.rigs.base import IMPOSED_STOPPING, RUN_OUT, Rig, first_rate, imposed_now, undone
@@ -25,6 +25,12 @@ WEIGHTLESS = 1e-6
 
 def _check_urdf(files: Mapping[str, Path]) -> None:
     check_one_joint(files["urdf"])
+
+
+def _stated(files: Mapping[str, Path]) -> dict[str, float]:
+    """Return the start value that a URDF states: of the damping."""
+    stated = stated_of_joint(files["urdf"]) if "urdf" in files else {}
+    return {"damping": stated["damping"]} if "damping" in stated else {}
 
 
 @dataclass(frozen=True)
@@ -74,6 +80,7 @@ class Joint(Rig):
         optional=("velocity",),
         imposed=("position", "velocity"),
         check_files=_check_urdf,
+        stated=_stated,
     )
 
     @classmethod
