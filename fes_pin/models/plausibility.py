@@ -14,6 +14,7 @@ from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.data.urdf import impossible_inertias, stated_of_joint
 from fes_pin.infer.levels import SEEN_DEVIATIONS
+from fes_pin.models.effects.coulomb_friction import STATED
 from fes_pin.models.goals import check_no_goal
 from fes_pin.models.model import Model
 from fes_pin.models.rigs.base import RUN_OUT
@@ -122,6 +123,9 @@ def _of_urdf(study: Study, model: Model) -> list[str]:
     said = [f"the URDF, row {e.row}, link {e.column}: {e.message}" for e in impossible_inertias(study.urdf)]
     if stated.get("damping", 0.0) > 0.0 and study.start.get("damping") == stated["damping"]:
         said.append(f"damping starts at the URDF's {stated['damping']:.4g} {unit}")
+    if STATED in model.rig.constants:
+        known = f"dry friction of {model.rig.constants[STATED]:.4g} {model.rig.units()['effort']} is known of the URDF"
+        said.append(f"{known}: coulomb_friction is what there is beyond it, below 0 what it is too much")
     if (most := stated.get("effort")) is not None:
         said += _beyond(study, most, model.rig.units()["effort"])
     return said

@@ -11,7 +11,7 @@ from fes_pin.data.files import read_bytes
 from fes_pin.data.numbers import in_full
 from fes_pin.data.urdf import MOMENTS, check_inertias, check_one_joint, inertia_matrix, is_possible, lacking, links_beyond
 from fes_pin.data.urdf_text import Tag, XmlText
-from fes_pin.models.effects import CoulombFriction
+from fes_pin.models.effects.coulomb_friction import STATED, CoulombFriction
 from fes_pin.models.model import Model
 from fes_pin.models.rigs import Joint
 from fes_pin.models.rigs.rigid import gravity_coefficients, joint_inertia, load_urdf
@@ -55,7 +55,8 @@ def extended_urdf(model: Model, urdf: str | Path) -> tuple[bytes, tuple[str, ...
     text = _Numbers(read_bytes(urdf), name, links_beyond(urdf, name))
     changed = _scale(text, rig, joint_inertia(body), urdf)
     friction = next((e for e in model.effects if isinstance(e, CoulombFriction)), None)
-    text.set_dynamics(rig.damping, 0.0 if friction is None else friction.torque_nm)
+    beyond = 0.0 if friction is None else friction.torque_nm
+    text.set_dynamics(rig.damping, max(rig.constants.get(STATED, 0.0) + beyond, 0.0))
     left_out = tuple(e.name for e in model.effects if e is not friction)
     return text.changed(), left_out, changed
 

@@ -239,4 +239,4 @@ def test_a_urdf_with_an_inertia_that_no_body_has_is_refused(tmp_path, monkeypatc
     urdf.write_text(re.sub(r'izz="[^"]*"', 'izz="0.9"', urdf.read_text()))
     capsys.readouterr()
     said = fails(monkeypatch, capsys, "new-study", tmp_path / "0.csv", "--urdf", urdf)
-    assert "rod.urdf, row 7, column arm: no body has the principal moments" in said
+    assert "rod.urdf, row 6, column arm: no body has the principal moments" in said

@@ -13,6 +13,7 @@ from fes_pin.data.schema import IMPOSED, START_S, RigSchema, any_number, not_neg
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.data.urdf import check_one_joint, stated_of_joint
+from fes_pin.models.effects.coulomb_friction import STATED, CoulombFriction, FrictionBeyond
 from fes_pin.models.maths import cos, sin, sqrt, where
 from fes_pin.models.parameters import ROTARY, SLIDING, parameter
 from fes_pin.models.rigs.base import IMPOSED_STOPPING, RUN_OUT, Rig, first_rate, imposed_now, undone
@@ -44,6 +45,9 @@ class Joint(Rig):
     between samples. Each trial has its own initial position and velocity. `idle` is where no effort is needed to rest:
     A cos(q) + B sin(q) = 0; hanging, or standing if that is nearer to where an effort holds the joint; 0 for a
     prismatic joint.
+
+    Dry friction that the URDF states is a constant too, `friction`, and acts as `coulomb_friction` of that torque does.
+    That cause is then what there is beyond it, or below 0 what it is too much; its forms are those of both together.
 
     The bearing of a revolute joint carries the pull along the arm, in units of the URDF's weight at rest W (that of the
     simple pendulum with the same A, B and M; 1 for a prismatic joint, and where the joint feels no gravity):
@@ -141,11 +145,15 @@ class Joint(Rig):
     def outputs(self, kind: str) -> tuple[str, ...]:
         return ("effort",) if kind == IMPOSED else ("position", "velocity")
 
+    @property
+    def predictor_step_s(self) -> float:
+        return CoulombFriction.predictor_step_s if STATED in self.constants else math.inf
+
     def constant_names(self, kind: str) -> tuple[str, ...]:
-        return (*self.needed, "idle")
+        return (*self.needed, "idle", *((STATED,) if STATED in self.constants else ()))
 
     def trial_constants(self, trial: Trial) -> dict[str, float]:
-        known = {name: float(self.constants[name]) for name in self.needed}
+        known = {name: float(self.constants[name]) for name in (*self.needed, STATED) if name in self.constants}
         return {**known, "idle": self._idle(trial)}
 
     def _idle(self, trial: Trial) -> float:
@@ -215,7 +223,7 @@ class Joint(Rig):
         s.q, s.v, s.sensed = s.x.q, s.x.v, s.through("play", s.x.q)
         gravity, s.bearing_load = self._gravity(s, s.v)
         effort = s.through("effort", getattr(s.u, "effort", 0.0))
-        s.torque = s.through("friction", s.through("torque", effort - gravity - self.damping * s.v))
+        s.torque = self._rubbed(s, s.through("torque", effort - gravity - self.damping * s.v))
         s.driving = s.through("driving", s.torque / s.inertia)
         s.acceleration = s.through("acceleration", s.driving)
         return {"q": s.v, "v": s.acceleration}
@@ -226,9 +234,16 @@ class Joint(Rig):
         s.q = s.through("play", s.q)
         s.stopping = IMPOSED_STOPPING * s.inertia
         gravity, s.bearing_load = self._gravity(s, s.v)
-        s.torque = s.through("friction", s.through("torque", -gravity - self.damping * s.v))
+        s.torque = self._rubbed(s, s.through("torque", -gravity - self.damping * s.v))
         s.sensed = undone(s, "effort", s.inertia * bend - s.torque)
         return {}
+
+    def _rubbed(self, s: Signals, torque: Any) -> Any:
+        """Return the torque after dry friction: what is stated acts by itself where no cause holds it already."""
+        if STATED in self.constants and not any(isinstance(e, CoulombFriction) for e in s.effects):
+            stated = FrictionBeyond(torque_nm=0.0)
+            torque = stated.apply(torque, s.of(stated))
+        return s.through("friction", torque)
 
     def _gravity(self, s: Signals, v: Any) -> tuple[Any, Any]:
         """Torque of gravity, and the load of the bearing, at the position and a velocity."""
@@ -271,6 +286,8 @@ def joint_model(urdf: Path, constants: Mapping[str, Any], start: Mapping[str, An
     known = {n: constants[n] for n in Joint.parameters() if n in constants}
     read = {"inertia": joint_inertia(body), "gravity_cos": cosine, "gravity_sin": sine}
     read["revolute"] = float(joint_is_revolute(body))
+    if (friction := stated_of_joint(urdf).get(STATED, 0.0)) > 0.0:
+        read[STATED] = friction
     fitted = tuple(n for n in Joint.parameters() if n in start)
     if not driven and "gravity_scale" in fitted:  # free motion shows only ratios: the URDF's inertia holds
         fitted = tuple(n for n in fitted if n != "inertia_scale")
