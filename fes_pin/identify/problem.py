@@ -12,8 +12,8 @@ from fes_pin.infer import problem as infer
 from fes_pin.infer.keys import Key
 from fes_pin.infer.noise import NoiseModel
 from fes_pin.infer.problem import Linearized, Unknowns
-from fes_pin.models.free_run import FreeRun
 from fes_pin.models.effects.coulomb_friction import STATED
+from fes_pin.models.free_run import FreeRun
 from fes_pin.models.model import Model
 from fes_pin.models.parameters import ParameterInfo
 from fes_pin.models.predictions import PredictedTrial

@@ -9,7 +9,15 @@ import pinocchio as pin
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import read_bytes
 from fes_pin.data.numbers import in_full
-from fes_pin.data.urdf import MOMENTS, check_inertias, check_one_joint, inertia_matrix, is_possible, lacking, links_beyond
+from fes_pin.data.urdf import (
+    MOMENTS,
+    check_inertias,
+    check_one_joint,
+    inertia_matrix,
+    is_possible,
+    lacking,
+    links_beyond,
+)
 from fes_pin.data.urdf_text import Tag, XmlText
 from fes_pin.models.effects.coulomb_friction import STATED, CoulombFriction
 from fes_pin.models.model import Model

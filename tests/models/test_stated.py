@@ -85,7 +85,6 @@ def test_what_no_joint_has_is_refused(tmp_path, said):
     assert caught.value.column == "pivot" and caught.value.row == 4
 
 
-
 def test_moments_that_no_body_has_are_warned_of_in_a_study(tmp_path):
     """The contract has studies that state them read."""
     path = rig(tmp_path, '<dynamics damping="0.07"/>', iyy="0.05")

@@ -223,7 +223,7 @@ class CoulombFriction(Effect):
 
 
 @dataclass(frozen=True)
-class FrictionBeyond(CoulombFriction):
+class FrictionBeyond(CoulombFriction):  # noqa: D101 - the docstring of dry friction, with another first line
     __doc__ = (CoulombFriction.__doc__ or "").replace("at the joint.", BEYOND, 1).replace("T = torque", SUM)
 
     torque_nm: float = parameter(0.01, unit="{effort}", null=0.0, lower=-1e6, upper=1e6, scale=0.01)
