@@ -111,7 +111,7 @@ class RigSchema(ReadOnly):
     only
         Conditions that one kind of trial alone states, with that kind.
     stated
-        Values of `start` that files, by their keys, state: they stand for those that a study leaves out.
+        Returns values of `start` that files, by their keys, state: they are taken where a study leaves them out.
     recordings
         Keys of a `[[trial]]` that name its files.
     check_files

@@ -92,7 +92,7 @@ class StudyTables:
         return constants, files
 
     def start_table(self, constants: Mapping[str, float], files: Mapping[str, Path]) -> dict[str, float]:
-        """Start values of what the nominal model fits, by key; those that are left out as the rig's files state them."""
+        """Start values of what the nominal model fits, by key; some that are left out as the rig's files state them."""
         table = self.document.table("start")
         known = dict(self.schema.start)
         for key in set(known) & set(constants):

@@ -45,7 +45,7 @@ class Tag:
         return (one for one in self.children if one.name == name)
 
     def get(self, key: str, default: str = "") -> str:
-        """Return the value of an attribute, or what stands for one that is missing."""
+        """Return the value of an attribute, or a default for one that is missing."""
         return self.attributes.get(key, default)
 
 

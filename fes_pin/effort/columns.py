@@ -83,7 +83,7 @@ class Sizes:
 class Links:
     """Inertia and gravity of one joint: inertia a + cosine cos(q) + sine sin(q); see `models.rigs.joint`.
 
-    `friction` is the dry friction that its URDF states.
+    `friction` is the dry friction that its URDF states, `undetermined` names the causes that nothing else determines.
     """
 
     inertia: float
@@ -91,12 +91,13 @@ class Links:
     sine: float
     turns: bool
     friction: float = 0.0
+    undetermined: tuple[str, ...] = ()
 
     @classmethod
     def of_rig(cls, rig: Joint) -> Links:
         """Return the links of a joint as its URDF has them."""
         inertia, cosine, sine, turns = (float(rig.constants[n]) for n in rig.needed)
-        return cls(inertia, cosine, sine, bool(turns), float(rig.constants.get(STATED, 0.0)))
+        return cls(inertia, cosine, sine, bool(turns), float(rig.constants.get(STATED, 0.0)), rig.undetermined())
 
     def gravity(self, q: np.ndarray, tilt: float = 0.0) -> np.ndarray:
         """Return the torque of gravity at positions, shape (n,), the base tilted."""
@@ -307,7 +308,7 @@ def library(sizes: Sizes, fastest: float) -> dict[str, CauseOfEffort]:
     ]
     if sizes.links.turns and (sizes.links.cosine or sizes.links.sine):
         causes.append(CauseOfEffort("base_tilt", None, None, {"tilt_rad": (-1.0, 1.0, 0.02)}))
-    return {one.name: one for one in causes}
+    return {one.name: one for one in causes if one.name not in sizes.links.undetermined}
 
 
 def _torques(s: Sizes) -> list[CauseOfEffort]:
