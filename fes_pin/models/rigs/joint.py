@@ -146,13 +146,13 @@ class Joint(Rig):
         return ("effort",) if kind == IMPOSED else ("position", "velocity")
 
     def undetermined(self) -> tuple[str, ...]:
-        """Return a gain of the effort where every torque but the stated friction is in proportion to a fitted parameter.
+        """Return a gain of the effort where every torque but a stated friction is in proportion to a fitted parameter.
 
         Friction that is stated too small by a factor would look like a gain of that factor, and an inertia, a weight
         and a damping that are wrong by it too.
         """
         weighs = self.constants["gravity_cos"] or self.constants["gravity_sin"]
-        scaled = {"inertia_scale", "damping", *(("gravity_scale",) if weighs else ())}
+        scaled = {"inertia_scale", "damping"} | ({"gravity_scale"} if weighs else set())
         return ("effort_gain",) if STATED in self.constants and scaled <= {*self.fitted_parameters()} else ()
 
     @property
