@@ -20,6 +20,7 @@ from fes_pin.data.errors import InputError
 from fes_pin.data.files import check_folder, read_bytes
 from fes_pin.data.outputs import Outputs
 from fes_pin.data.schema import RigSchema, known_rigs, one_of
+from fes_pin.data.urdf import check_inertias
 
 if TYPE_CHECKING:
     from fes_pin.data.new_study import NewStudy
@@ -227,6 +228,7 @@ def _schema(rig: str | None, catalogue: Catalogue, urdf: Path | None, of_rigs: S
         raise InputError(f"expected {wanted} for rig {schema.name}", column="--urdf")
     if urdf is not None and schema.check_files is not None:
         schema.check_files({"urdf": urdf})
+        check_inertias(urdf)
     return schema
 
 

@@ -110,8 +110,8 @@ def _rests(study: Study | ToPredict) -> Iterable[str]:
     if isinstance(study, ToPredict):
         return
     read = study.schema.outputs
-    trials = [(t, [n for n in (read.get(t.kind),) if n in t], _stimuli(study, t)) for t in study.trials]
-    share = rest_share([one for one in trials if one[1]])
+    measured = [t for t in study.trials if read.get(t.kind) in t]
+    share = rest_share([(t, (read[t.kind],), _stimuli(study, t)) for t in measured])
     if share > MATTERS:
         little = "what moves is known from the others alone"
         yield f"these trials rest for {share:.0%} of the time: neither reading nor input changes, and {little}"

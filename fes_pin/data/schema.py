@@ -112,6 +112,8 @@ class RigSchema(ReadOnly):
         By kind of trial the conditions that it must state, each with what is expected, in words.
     only
         Conditions that one kind of trial alone states, with that kind.
+    stated
+        Returns values of `start` that files, by their keys, state: they are taken where a study leaves them out.
     recordings
         Keys of a `[[trial]]` that name its files.
     check_files
@@ -139,6 +141,7 @@ class RigSchema(ReadOnly):
     only: Mapping[str, str] = field(default_factory=dict)
     recordings: tuple[str, ...] = ("file",)
     check_files: Callable[[Mapping[str, Any]], object] | None = None
+    stated: Callable[[Mapping[str, Any]], Mapping[str, float]] | None = None
     name: str = ""
     owner: Any = None
 
@@ -188,6 +191,25 @@ class RigSchema(ReadOnly):
             expected = f"{'one of ' if len(self.outputs) > 1 else ''}{', '.join(self.outputs)}"
             raise error("kind", f"expected {expected} for rig {self.name}, found {found}")
         return kind
+
+    def left_out(self, files: Mapping[str, Any], known: Collection[str]) -> dict[str, float]:
+        """Start values that a study does not give and its files state, by key.
+
+        Parameters
+        ----------
+        files
+            By key.
+        known
+            Keys of `start` that are given, or known.
+
+        Raises
+        ------
+        InputError
+            If a file cannot be read.
+        """
+        missing = [key for key, number in self.start.items() if number.required and key not in known]
+        stated = self.stated(files) if missing and files and self.stated is not None else {}
+        return {key: stated[key] for key in missing if key in stated}
 
     @property
     def known_constants(self) -> dict[str, NumberKey]:

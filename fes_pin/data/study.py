@@ -108,6 +108,7 @@ class Study(ReadOnly):
                 instance(getattr(self, key), kind, key)
         schema = self._schema()
         given = {n: checked_mapping(getattr(self, n), fault_at("Study.{}"), n) for n in ("constants", "start", "files")}
+        given["start"] |= schema.left_out(given["files"], {*given["start"], *given["constants"]})
         twice = set(schema.start) & set(given["constants"])
         if odd := sorted(twice & set(given["start"])):
             raise fault_at("start.{}")(odd[0], "is also among the constants; expected it in one of them")
@@ -375,7 +376,7 @@ class _Reader(StudyTables):
 
     def study(self) -> Study:
         constants, files = self.rig_table()
-        start = self.start_table(constants)
+        start = self.start_table(constants, files)
         written, tables = self.recordings_tables(files), self._trial_tables()
         views = [self._view(f"trial[{i}]", table, written) for i, table in enumerate(tables)]
         names = self._trial_names(tables, views)

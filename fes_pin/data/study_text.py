@@ -91,15 +91,17 @@ class StudyTables:
         check_files(self.schema, files)
         return constants, files
 
-    def start_table(self, constants: Mapping[str, float]) -> dict[str, float]:
-        """Start values of what the nominal model fits, by key."""
+    def start_table(self, constants: Mapping[str, float], files: Mapping[str, Path]) -> dict[str, float]:
+        """Start values of what the nominal model fits, by key; some that are left out as the rig's files state them."""
         table = self.document.table("start")
         known = dict(self.schema.start)
         for key in set(known) & set(constants):
             if key in table:
                 raise self.error(f"start.{key}", "is also in [rig]; expected it in one of them")
             del known[key]
-        return self.document.numbers("start", table, known)
+        stated = self.schema.left_out(files, {*table, *constants})
+        known = {key: number for key, number in known.items() if key not in stated}
+        return {**self.document.numbers("start", table, known), **stated}
 
     def columns_table(self, files: Mapping[str, Path]) -> Columns | None:
         """How the recordings are written, where the study says so."""

@@ -1,7 +1,9 @@
-"""URDF files checked before anything else reads them: safe XML, a tree of links, positive masses."""
+"""URDF files checked before anything else reads them: safe XML, a tree of links, positive masses of what moves."""
 
 import math
+import re
 from collections.abc import Iterable, Mapping
+from decimal import Decimal, InvalidOperation
 from pathlib import Path
 from xml.etree.ElementTree import Element, ParseError, SubElement, tostring
 
@@ -19,6 +21,11 @@ SMALLEST, LARGEST = 1e-9, 1e6
 """Round figures far outside any rig, in SI units: masses and lengths of directions lie between, all else below."""
 MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 """Of an inertia, as URDF names them: the upper triangle of its matrix, row by row."""
+ROUNDED = 5e-3
+"""Largest error by which a printed moment is taken to be rounded, as a share of the largest: half a unit of the second
+digit of 0.10. A moment of one digit, 0.1, is meant so and not rounded."""
+SAME = 1e-9
+"""Share of the largest principal moment that is rounding of double precision."""
 NumbersOf = Mapping[str, tuple[int, float | None]]
 PLACE: NumbersOf = {"xyz": (3, 0.0), "rpy": (3, 0.0)}
 LINK_NUMBERS: Mapping[str, NumbersOf] = {
@@ -31,6 +38,7 @@ JOINT_NUMBERS: Mapping[str, NumbersOf] = {
     "axis": {"xyz": (3, None)},
     "limit": {"lower": (1, 0.0), "upper": (1, 0.0), "effort": (1, None), "velocity": (1, None)},
 }
+DYNAMICS_NUMBERS: Mapping[str, NumbersOf] = {"dynamics": {"damping": (1, math.nan), "friction": (1, math.nan)}}
 MIMIC_NUMBERS: Mapping[str, NumbersOf] = {"mimic": {"multiplier": (1, 1.0), "offset": (1, 0.0)}}
 """Elements that bear on the motion, how many numbers each of their attributes holds, and what it is where it is absent;
 None where it must be there."""
@@ -96,6 +104,26 @@ def check_one_joint(path: str | Path) -> tuple[str, str]:
     return name, kind
 
 
+def stated_of_joint(path: str | Path) -> dict[str, float]:
+    """What a URDF states of its one moving joint, of `damping`, dry `friction` and the actuator's limit of `effort`.
+
+    URDF needs a limit where a joint has ends, also of one without an actuator: a limit of 0 is no limit, and what is
+    written for "any", 1e6, is above whatever acts.
+
+    Returns
+    -------
+    dict
+        In N m s/rad or N s/m, and N m or N; only what is stated.
+
+    Raises
+    ------
+    InputError
+        As `check_one_joint`; a damping or friction below 0.
+    """
+    name, _ = check_one_joint(path)
+    return _Urdf(path).stated(name)
+
+
 def mechanics(path: str | Path) -> str:
     """URDF text of a file's links and joints alone, every number checked, so that a parser accepts it.
 
@@ -128,9 +156,59 @@ def inertia_matrix(moments: Iterable[float]) -> np.ndarray:
     return np.asarray(upper + np.triu(upper, 1).T)
 
 
+def lacking(principal: np.ndarray) -> float:
+    """Return by how much the largest of three principal moments exceeds the sum of the others, but for rounding.
+
+    No body has such moments: each is the mean square distance from an axis. 0 for moments that a body can have.
+    """
+    low, middle, high = np.sort(principal)
+    return max(float(high - middle - low) - SAME * float(abs(high)), 0.0)
+
+
 def is_possible(principal: np.ndarray) -> bool:
-    """Return whether a body can have these principal moments, in ascending order, but for rounding."""
-    return bool(principal[0] >= -1e-9 * abs(principal).max())
+    """Return whether a moment is negative in none of the principal directions, in ascending order, but for rounding."""
+    return bool(principal[0] >= -SAME * abs(principal).max())
+
+
+def impossible_inertias(path: str | Path) -> list[InputError]:
+    """Inertias of links that move which no body has: a principal moment is above the sum of the two others.
+
+    Moments are rounded to the digits that are printed, so that a thin plate may seem to lack a little. What such
+    rounding explains is possible; see `ROUNDED`. Links that do not move are not judged, as nothing depends on them.
+
+    Returns
+    -------
+    list of InputError
+        One a link, with its row, to be raised or said.
+
+    Raises
+    ------
+    InputError
+        As `moving_joints`.
+    """
+    return _Urdf(path).impossible()
+
+
+def check_inertias(path: str | Path) -> None:
+    """Refuse a URDF by the first of its `impossible_inertias`.
+
+    Raises
+    ------
+    InputError
+        There is one; or as `moving_joints`.
+    """
+    for error in impossible_inertias(path):
+        raise error
+
+
+def _digits(text: str) -> float:
+    """Half a unit of the last digit of a printed number; 0 of one that is exactly 0."""
+    try:
+        number = Decimal(text.strip())
+    except InvalidOperation:
+        return 0.0
+    exponent = number.as_tuple().exponent
+    return 0.5 * 10.0**exponent if number and isinstance(exponent, int) else 0.0
 
 
 class _Urdf:
@@ -147,15 +225,18 @@ class _Urdf:
         self.joints = list(self._named("joint").values())
         if not self.links:
             raise InputError("expected at least one <link>", file=path)
-        self.masses = {name: self._mass(name, link) for name, link in self.links.items()}
         self.ends: dict[str, list[str]] = {}  # parent and child of each joint
         self.parent: dict[str, str] = {}
         for joint in self.joints:
             self._check_joint(joint)
         self._check_tree()
+        moving = [self.beyond(joint.get("name", "")) for joint in self.joints if joint.get("type") in MOVING]
+        moved = {link for links in moving for link in links}
+        self.masses = {name: self._mass(name, link) if name in moved else 0.0 for name, link in self.links.items()}
 
     def error(self, message: str, name: str) -> InputError:
-        row = next((i for i, line in enumerate(self.lines, 1) if f'name="{name}"' in line), None)
+        named = re.compile(rf"""name\s*=\s*["']{re.escape(name)}["']""")
+        row = next((i for i, line in enumerate(self.lines, 1) if named.search(line)), None)
         return InputError(message, file=self.path, row=row, column=name)
 
     def _parse(self, content: bytes) -> Element:
@@ -198,6 +279,34 @@ class _Urdf:
             raise self.error(f"expected an inertia that is positive, found a principal one of {principal[0]:g}", name)
         return value
 
+    def stated(self, name: str) -> dict[str, float]:
+        """Return what is stated of a joint; see `stated_of_joint`."""
+        joint = next(j for j in self.joints if j.get("name") == name)
+        found = self._read(joint, DYNAMICS_NUMBERS, name).get("dynamics", {})
+        out = {key: value for key, (value,) in found.items() if not math.isnan(value)}
+        for key, value in out.items():
+            if value < 0.0:
+                raise self.error(f"expected {key} of <dynamics> of at least 0, found {value:g}", name)
+        (most,) = self._read(joint, JOINT_NUMBERS, name).get("limit", {}).get("effort", (0.0,))
+        return {**out, **({"effort": most} if most > 0.0 else {})}
+
+    def impossible(self) -> list[InputError]:
+        """Return the errors of `impossible_inertias`."""
+        out = []
+        for name in (n for n, mass in self.masses.items() if mass):
+            element = next(self.links[name].iterfind("inertial/inertia"))
+            matrix = inertia_matrix(float(element.get(key, "0")) for key in MOMENTS)
+            principal, directions = np.linalg.eigh(matrix)
+            most = ROUNDED * float(principal[2])
+            rounded = inertia_matrix(min(_digits(element.get(key, "0")), most) for key in MOMENTS)
+            # first order: trace - 2 v' I v with v the axis of the largest moment
+            slopes = np.abs(np.eye(3) - 2.0 * np.outer(directions[:, 2], directions[:, 2]))
+            if lacking(principal) > float(np.sum(slopes * rounded)):
+                found = ", ".join(f"{one:.4g}" for one in principal)
+                message = f"no body has the principal moments {found} kg m2: the largest is above the sum of the others"
+                out.append(self.error(message, name))
+        return out
+
     def _check_joint(self, joint: Element) -> None:
         name, kind = joint.get("name", ""), joint.get("type")
         if kind not in (*MOVING, "fixed"):
@@ -239,7 +348,7 @@ class _Urdf:
         robot = Element("robot", name=self.root.get("name") or "robot")
         for name, link in self.links.items():
             one = SubElement(robot, "link", name=name)
-            if (inertial := link.find("inertial")) is not None:
+            if (inertial := link.find("inertial")) is not None and self.masses[name]:
                 self._write(SubElement(one, "inertial"), inertial, LINK_NUMBERS, name)
         for joint in self.joints:
             name = joint.get("name", "")

@@ -17,6 +17,7 @@ from fes_pin.effort.columns import Links
 from fes_pin.effort.motion import Band, Motion, Record, band_of
 from fes_pin.effort.problem import HELD_ROWS, Rows
 from fes_pin.effort.search import has_efforts
+from fes_pin.models.effects.coulomb_friction import STATED
 from fes_pin.models.model import Model
 from fes_pin.models.outside import origin
 from fes_pin.models.rigs.base import Rig
@@ -176,4 +177,5 @@ def _without_friction(model: Model) -> Model:
     """Return a model without damping, dry friction and drag."""
     rubs = (e.signal == "friction" or e.name == DRAG for e in model.effects)
     kept = tuple(e for e, rubbing in zip(model.effects, rubs, strict=True) if not rubbing)
-    return Model(model.with_parameters({"damping": 0.0}).rig, kept)
+    rig = model.with_parameters({"damping": 0.0}).rig
+    return Model(replace(rig, constants={n: x for n, x in rig.constants.items() if n != STATED}), kept)

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fes_pin.effort.motion import Motion, noise_of_speed
+from fes_pin.models.effects.coulomb_friction import STATED
 from fes_pin.models.rigs.joint import Joint
 
 Values = Mapping[str, float]
@@ -80,18 +81,23 @@ class Sizes:
 
 @dataclass(frozen=True)
 class Links:
-    """Inertia and gravity of one joint: inertia a + cosine cos(q) + sine sin(q); see `models.rigs.joint`."""
+    """Inertia and gravity of one joint: inertia a + cosine cos(q) + sine sin(q); see `models.rigs.joint`.
+
+    `friction` is the dry friction that its URDF states, `undetermined` names the causes that nothing else determines.
+    """
 
     inertia: float
     cosine: float
     sine: float
     turns: bool
+    friction: float = 0.0
+    undetermined: tuple[str, ...] = ()
 
     @classmethod
     def of_rig(cls, rig: Joint) -> Links:
         """Return the links of a joint as its URDF has them."""
         inertia, cosine, sine, turns = (float(rig.constants[n]) for n in rig.needed)
-        return cls(inertia, cosine, sine, bool(turns))
+        return cls(inertia, cosine, sine, bool(turns), float(rig.constants.get(STATED, 0.0)), rig.undetermined())
 
     def gravity(self, q: np.ndarray, tilt: float = 0.0) -> np.ndarray:
         """Return the torque of gravity at positions, shape (n,), the base tilted."""
@@ -112,6 +118,17 @@ def nominal_columns(track: Motion, links: Links, tilt: float = 0.0) -> Sequence[
     """Return the columns of the nominal model at the rows of a trial, in the order of `NOMINAL`."""
     gravity = track.low(links.gravity(track.q, tilt)) if links.cosine or links.sine else np.zeros(len(track.rows))
     return links.inertia * track.moved(2), track.moved(1), gravity
+
+
+def stated_friction(track: Motion, sizes: Sizes) -> Sequence[np.ndarray]:
+    """Return dry friction in the form that a fit starts from."""
+    return coulomb_friction(track, _friction(sizes), sizes)
+
+
+def _friction(s: Sizes) -> Values:
+    """Return the shapes of dry friction where a fit starts."""
+    creep = SLOWLY * s.usual
+    return {"creep_speed": creep, "stiction": 0.0, "stribeck_speed": STRIBECK * s.usual, "presliding": 0.0}
 
 
 def coulomb_friction(track: Motion, x: Values, sizes: Sizes) -> Sequence[np.ndarray]:
@@ -291,7 +308,7 @@ def library(sizes: Sizes, fastest: float) -> dict[str, CauseOfEffort]:
     ]
     if sizes.links.turns and (sizes.links.cosine or sizes.links.sine):
         causes.append(CauseOfEffort("base_tilt", None, None, {"tilt_rad": (-1.0, 1.0, 0.02)}))
-    return {one.name: one for one in causes}
+    return {one.name: one for one in causes if one.name not in sizes.links.undetermined}
 
 
 def _torques(s: Sizes) -> list[CauseOfEffort]:
@@ -300,7 +317,6 @@ def _torques(s: Sizes) -> list[CauseOfEffort]:
     stops = [
         {"side": side, "angle_rad": s.quantiles[q]} for side, qs in zip((1.0, -1.0), STOPS, strict=True) for q in qs
     ]
-    friction = {"creep_speed": creep, "stiction": 0.0, "stribeck_speed": STRIBECK * s.usual, "presliding": 0.0}
     softer = {"creep_speed": (creep, 0.1 * creep, 20.0 * creep)}
     sticks = {"stiction": (0.2, 0.0, 3.0), "stribeck_speed": (STRIBECK * s.usual, 0.5 * creep, s.usual)}
     builds_up = {"presliding": (PRESLIDING * reach, 0.0, 0.1 * reach)}
@@ -313,8 +329,8 @@ def _torques(s: Sizes) -> list[CauseOfEffort]:
             "coulomb_friction",
             coulomb_friction,
             None,
-            {"torque_nm": POSITIVE},
-            [friction],
+            {"torque_nm": (-s.links.friction, math.inf, 0.0) if s.links.friction else POSITIVE},
+            [_friction(s)],
             {},
             [softer, sticks, builds_up],
         ),

@@ -22,6 +22,7 @@ from fes_pin.infer.projection import Projection
 from fes_pin.infer.scatter import excess_scatter, least_apart, with_honest_intervals
 from fes_pin.infer.search import BEAM, FITTED
 from fes_pin.models.effects import effect_named
+from fes_pin.models.effects.coulomb_friction import STATED
 from fes_pin.models.rigs.joint import Joint
 from fes_pin.models.stage import Effect
 
@@ -45,12 +46,13 @@ def fit_of(
 
 
 def _is_off_bounds(fitted: EffortFit) -> bool:
-    return not any("." in n and fitted.values[n] != 0.0 for n in fitted.at_bound)
+    nothing = 0.0, -fitted.values.get(STATED, 0.0)  # of a friction that is stated
+    return not any("." in n and fitted.values[n] not in nothing for n in fitted.at_bound)
 
 
 def effect_of(values: Values, cause: CauseOfEffort) -> Effect:
     """Return a cause with its values as the catalogue has it, without its forms, which differ between estimators."""
-    kind, forms = effect_named(cause.name), {n for one in cause.forms for n in one}
+    kind, forms = effect_named(cause.name).on(values), {n for one in cause.forms for n in one}
     known = {n: v for n, v in own(values, cause.name).items() if n not in forms}
     own_values: dict[str, Any] = {n: x.nearest(known[n]) for n, x in kind.parameters().items() if n in known}
     return kind(**own_values)

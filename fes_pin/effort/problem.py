@@ -20,10 +20,12 @@ from fes_pin.effort.columns import (
     frame_vibration,
     library,
     nominal_columns,
+    stated_friction,
 )
 from fes_pin.effort.motion import Band, Motion, Record
 from fes_pin.infer.optimum import Optimum
 from fes_pin.infer.problem import Linearized, Problem, Unknowns
+from fes_pin.models.effects.coulomb_friction import STATED
 
 FREEDOM = 6.0
 """Degrees of freedom of Student's t of a residual, by whose weights sets are compared: a distant row counts little
@@ -36,6 +38,8 @@ STEP = 1e-4
 """Step of a numerical derivative, as a share of the value or of the size at which a cause is tried."""
 KEPT_VIEWS, KEPT_COLUMNS = 24, 500
 """Corrections of the reading, and columns, that are kept: those of two steps through all places of the library."""
+RUBS = "coulomb_friction"
+"""The cause that is beyond the dry friction that is stated."""
 SWINGS = "frame_vibration"
 """The cause that changes what an inertia takes of the effort."""
 HOLD = "hold_rows"
@@ -107,6 +111,8 @@ class Rows:
             many = self._once((key, name, *shapes.items()), make, tracks)
             for one, made in zip(out, many, strict=True):
                 one.update(zip((f"{name}.{n}" for n in cause.amplitudes), made, strict=True))
+        for one in out if RUBS in names else ():  # what is stated has the form of what is beyond it
+            one.update({STATED: one[f"{RUBS}.torque_nm"]} if STATED in one else {})
         return out
 
     def _nominal_columns(
@@ -116,6 +122,10 @@ class Rows:
         tilt = values.get("base_tilt.tilt_rad", 0.0) if "base_tilt" in names else 0.0
         many = self._once((key, "", tilt), lambda t: nominal_columns(t, self.links, tilt), tracks)
         out = [dict(zip(NOMINAL, one, strict=True)) for one in many]
+        if self.links.friction:
+            many = self._once((key, STATED), lambda t: stated_friction(t, self.sizes), tracks)
+            for one, (column,) in zip(out, many, strict=True):
+                one[STATED] = column
         if SWINGS in names:
             swinging = own(values, SWINGS)
             place = (key, SWINGS, *swinging.items())

@@ -23,6 +23,7 @@ from fes_pin.infer.problem import normal_equations
 from fes_pin.infer.scatter import as_wide_as_estimates_differ, as_wide_as_trials_differ, with_honest_intervals
 from fes_pin.infer.search import FITTED, Policy, Search
 from fes_pin.models.effects import effect_named
+from fes_pin.models.effects.coulomb_friction import STATED
 from fes_pin.models.model import Model
 from fes_pin.models.rigs.base import Rig
 from fes_pin.models.rigs.joint import Joint
@@ -194,6 +195,7 @@ def searched(rig: Joint, trials: Sequence[Trial], seed: int = 0) -> FoundByEffor
     records = [Record.of(t) for t in trials]
     links = Links.of_rig(rig)
     values = {n: float(getattr(rig, n)) for n in rig.parameters()}
+    values |= {STATED: links.friction} if links.friction else {}
     fitted = [n for n in rig.fitted_parameters() if n != "gravity_scale" or links.cosine or links.sine]
     band = band_of(records)
 

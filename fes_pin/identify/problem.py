@@ -12,6 +12,7 @@ from fes_pin.infer import problem as infer
 from fes_pin.infer.keys import Key
 from fes_pin.infer.noise import NoiseModel
 from fes_pin.infer.problem import Linearized, Unknowns
+from fes_pin.models.effects.coulomb_friction import STATED
 from fes_pin.models.free_run import FreeRun
 from fes_pin.models.model import Model
 from fes_pin.models.parameters import ParameterInfo
@@ -126,7 +127,7 @@ def measured_columns(model: Model, trials: Sequence[Trial]) -> dict[str, np.ndar
     """Return every measured output, imposed motion and effort, all trials end to end, by column name.
 
     `time` since each trial began, s, or since the trial did of which it is a part; `reading` the first output of each
-    that passes a sensor.
+    that passes a sensor; `friction` the dry friction that is stated of a rig, one value, where there is one.
     """
     out: dict[str, list[np.ndarray]] = {"time": [t.since_origin for t in trials]}
     rig = model.rig
@@ -136,6 +137,8 @@ def measured_columns(model: Model, trials: Sequence[Trial]) -> dict[str, np.ndar
                 out.setdefault(name, []).append(trial[name])
         if rig.output(trial.kind) in trial.columns and "reading" in rig.signals(trial.kind):
             out.setdefault("reading", []).append(trial[rig.output(trial.kind)])
+    if STATED in rig.constants:
+        out[STATED] = [np.array([rig.constants[STATED]])]
     return {n: np.concatenate(v) for n, v in out.items()}
 
 

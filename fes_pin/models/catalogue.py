@@ -46,8 +46,11 @@ class Catalogue:
         return by_name(self.effects, name)
 
     def effects_for(self, rig: Rig | type[Rig]) -> tuple[type[Effect], ...]:
-        """The effects that a rig can have."""
-        return tuple(e for e in self.effects if rig.takes(e))
+        """The effects that a rig can have; of a rig with its constants those that it determines, in their variants."""
+        if not isinstance(rig, Rig):
+            return tuple(e for e in self.effects if rig.takes(e))
+        unknown = rig.undetermined()
+        return tuple(e.on(rig.constants) for e in self.effects if rig.takes(e) and e.name not in unknown)
 
     def schemas(self) -> dict[str, RigSchema]:
         """What a study of each rig must and may hold, by the rig's name; see `read_study`."""

@@ -10,6 +10,7 @@ from fes_pin.data.errors import InputError, fault_at
 from fes_pin.data.numbers import instance
 from fes_pin.data.schema import check_known
 from fes_pin.data.study import Study
+from fes_pin.data.urdf import stated_of_joint
 from fes_pin.models.model import Model
 from fes_pin.models.rigs.base import Rig
 from fes_pin.models.rigs.joint import WEIGHTLESS
@@ -60,7 +61,8 @@ def guess_start(
     """Return start values of a rig's fitted parameters where none are given: only their size matters.
 
     The weight of a joint that turns is fitted where its effort was recorded, as its inertia is: both are those of the
-    URDF. That of a slide is a constant, which its effort may have as an offset.
+    URDF. That of a slide is a constant, which its effort may have as an offset. Damping that the URDF states above 0 is
+    its start value.
 
     Parameters
     ----------
@@ -80,7 +82,7 @@ def guess_start(
     out = {name: float(getattr(rig, name)) for name in rig.parameters() if name in needed}
     if urdf is not None and out.get("damping") == 0.0:
         body = load_urdf(urdf)
-        out["damping"] = joint_inertia(body) / RUN_OUT_S
+        out["damping"] = stated_of_joint(urdf).get("damping") or joint_inertia(body) / RUN_OUT_S
         if "effort" in columns and _swings(body):
             out["gravity_scale"] = 1.0
     if {"foot_mass_kg", "com_distance_m"} <= set(known) and "inertia_kgm2" in out:

@@ -12,10 +12,13 @@ from fes_pin.data.plausibility import ToPredict, implausible, trials_named
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
+from fes_pin.data.urdf import impossible_inertias, stated_of_joint
 from fes_pin.infer.levels import SEEN_DEVIATIONS
+from fes_pin.models.effects.coulomb_friction import STATED
 from fes_pin.models.goals import check_no_goal
 from fes_pin.models.model import Model
 from fes_pin.models.rigs.base import RUN_OUT
+from fes_pin.models.rigs.joint import Joint
 
 Simulation = Callable[[Model, Trial], Trial]
 """Simulates a trial: `models.simulate.simulated_trial`, which this module cannot import."""
@@ -36,6 +39,12 @@ ASKEW = 0.5
 """Angle in rad from hanging above which dry friction hardly holds a pendulum: half of its weight acts there."""
 STICKS = 2.0
 """Static friction in sliding friction, at most (a round figure)."""
+CALIBRATED = 0.01
+"""Share of an actuator's limit within which an effort is no more than it: what a torque sensor is calibrated to."""
+PEAK = 6.0
+"""Deviations of the noise of an effort that no sample of a recording exceeds by chance: one in 1e9."""
+SPIKE = 3
+"""Samples beyond a limit that show an effort there: one or two are a spike."""
 
 TURNED = -0.7
 """Correlation of reading and simulation at which the model would explain half of the variance with the sign changed."""
@@ -52,6 +61,7 @@ def odd_numbers(study: Study | ToPredict, model: Model, simulated: Simulation) -
     """
     check_no_goal(study, model.rig)
     odd = [*implausible(study), *_steps(study, model), *_range(study, model)]
+    odd += _of_urdf(study, model) if isinstance(study, Study) and isinstance(model.rig, Joint) else []
     return [*odd, *_swings(study, model), *_turned(study, model, simulated), *_at_rest(study, model)]
 
 
@@ -103,6 +113,37 @@ def _turned(study: Study | ToPredict, model: Model, simulated: Simulation) -> It
             found.setdefault(name, []).append(trial.name)
     for name, names in found.items():
         yield f"{name} falls where it should rise in {trials_named(names)}: is its sign turned round (scale = -1)?"
+
+
+def _of_urdf(study: Study, model: Model) -> list[str]:
+    """Return what is taken from the URDF of a joint's study, and what of it contradicts the study, one line each."""
+    if study.urdf is None:
+        return []
+    unit, stated = model.parameter_info()["damping"].unit, stated_of_joint(study.urdf)
+    said = [f"the URDF, row {e.row}, link {e.column}: {e.message}" for e in impossible_inertias(study.urdf)]
+    if stated.get("damping", 0.0) > 0.0 and study.start.get("damping") == stated["damping"]:
+        said.append(f"damping starts at the URDF's {stated['damping']:.4g} {unit}")
+    if STATED in model.rig.constants:
+        known = f"dry friction of {model.rig.constants[STATED]:.4g} {model.rig.units()['effort']} is known of the URDF"
+        said.append(f"{known}: coulomb_friction is what there is beyond it, below 0 what it is too much")
+    if (most := stated.get("effort")) is not None:
+        said += _beyond(study, most, model.rig.units()["effort"])
+    return said
+
+
+def _beyond(study: Study, most: float, unit: str) -> Iterable[str]:
+    """Yield a warning for efforts beyond the limit of an actuator, by more than their noise and longer than a spike."""
+    found = dict[str, float]()
+    for trial in study.trials:
+        if "effort" not in trial or len(trial) < SPIKE:
+            continue
+        size = np.abs(trial["effort"])
+        noise = 1.4826 * float(np.median(np.abs(np.diff(trial["effort"], 2)))) / math.sqrt(6.0)
+        if np.sum(size > most * (1.0 + CALIBRATED) + PEAK * noise) >= SPIKE:
+            found[trial.name] = float(size.max())
+    if found:
+        said = f"the effort goes to {max(found.values()):.4g} {unit} in {trials_named([*found])}"
+        yield f"{said}, and the URDF's limit is {most:.4g}: is its unit another, or that limit a placeholder?"
 
 
 def _range(study: Study | ToPredict, model: Model) -> Iterable[str]:

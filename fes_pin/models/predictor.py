@@ -124,7 +124,8 @@ class Predictor(OnTrials):
         priors: Sequence[Mapping[str, float]],
         correlation_s: float = 0.0,
     ) -> None:
-        super().__init__(model, trials, columns, min([max_step(model), *(e.predictor_step_s for e in model.effects)]))
+        steps = [max_step(model), model.rig.predictor_step_s, *(e.predictor_step_s for e in model.effects)]
+        super().__init__(model, trials, columns, min(steps))
         self.processes, self.priors, self.correlation_s = processes, priors, correlation_s
         self._blocks = [_Prediction(self, lanes) for lanes in self.side_by_side()]
 

@@ -85,6 +85,8 @@ class Effect:
     of_record
         True if its amplitude is a zero or a scale of an instrument. Where that differs between trials, it is a fault of
         the record.
+    may_end
+        Names of amplitudes whose bound is a possible size: there, what is stated of a rig is not there at all.
     each_trial
         True if its amplitudes are unknowns of each trial, estimated from that trial alone. The fields then hold their
         nulls, with which a trial that was not measured is predicted. All other parameters are common to all trials.
@@ -112,6 +114,7 @@ class Effect:
     remembers: ClassVar[bool] = False
     scales: ClassVar[bool] = False
     of_record: ClassVar[bool] = False
+    may_end: ClassVar[tuple[str, ...]] = ()
 
     each_trial: bool = dataclasses.field(default=False, kw_only=True)
 
@@ -167,6 +170,11 @@ class Effect:
             Range and speed of the reading in the trial; 0 for a rig that begins at rest.
         """
         return {}
+
+    @classmethod
+    def on(cls, constants: Mapping[str, float]) -> "type[Effect]":
+        """Return the variant of the effect for a rig with these constants: by default itself."""
+        return cls
 
     @classmethod
     def parameters(cls) -> dict[str, ParameterInfo]:
@@ -288,10 +296,14 @@ Kind = TypeVar("Kind")
 
 
 def classes_in(folder: Iterable[str], package: str, kind: type[Kind]) -> Iterator[type[Kind]]:
-    """Yield the classes of a kind that the files of a package define; `folder` is its `__path__`."""
+    """Yield the classes of a kind that the files of a package define; `folder` is its `__path__`.
+
+    A class without a name of its own is a variant of another one.
+    """
     for file in iter_modules(folder, f"{package}."):
         for one in vars(import_module(file.name)).values():
-            if isinstance(one, type) and issubclass(one, kind) and one.__module__ == file.name:
+            its = isinstance(one, type) and issubclass(one, kind) and one.__module__ == file.name
+            if its and "name" in vars(one):
                 yield one
 
 

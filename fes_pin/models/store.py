@@ -100,7 +100,7 @@ def load_model(path: str | Path, *, library: Source | Sequence[Source] | None = 
     listed = document.table("effects")
     for name in listed:
         try:
-            model = model + _effect(document, catalogue, name, listed)
+            model = model + _effect(document, catalogue, name, listed, model.rig)
         except InputError as problem:
             if problem.file is not None:
                 raise
@@ -122,10 +122,10 @@ def _missing(document: Document, name: object, otherwise: str) -> str:
     return f"{name} is of {where}; expected library='{'PATH/' if where.endswith('.py') else ''}{where}'"
 
 
-def _effect(document: Document, catalogue: Catalogue, name: str, listed: dict[str, Any]) -> Effect:
+def _effect(document: Document, catalogue: Catalogue, name: str, listed: dict[str, Any], rig: Rig) -> Effect:
     key = f"effects.{name}"
     try:
-        kind = catalogue.effect(name)
+        kind = catalogue.effect(name).on(rig.constants)
     except InputError as problem:
         raise document.error(key, _missing(document, name, problem.message)) from None
     each_trial = document.table(key, listed).pop(EACH_TRIAL, False)

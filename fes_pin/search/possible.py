@@ -30,7 +30,7 @@ def are_possible(effects: Sequence[Effect], at_bound: Collection[str], measured:
         info, smallest = effect.parameters(), effect.smallest(measured)
         for n in (*effect.amplitudes(), *effect.shapes()):
             size = getattr(effect, n)
-            is_stuck = f"{effect.name}.{n}" in at_bound and size not in (info[n].null, 0.0)
+            is_stuck = f"{effect.name}.{n}" in at_bound and size not in (info[n].null, 0.0) and n not in effect.may_end
             is_void = effect.scales and n in effect.amplitudes() and abs(1.0 + size) < SMALL_SHARE
             if is_stuck or is_void or 0.0 < abs(size) < smallest.get(n, 0.0):
                 return False
@@ -41,4 +41,6 @@ def is_certain(fitted: Fit, effect: Effect) -> bool:
     """Return whether a size of a cause is twice its deviation from its null; True of one of each trial's own."""
     names = {n: f"{effect.name}.{n}" for n in effect.amplitudes() if f"{effect.name}.{n}" in fitted.free}
     away = (abs(getattr(effect, n) - effect.nulls()[n]) / max(fitted.std(path), 1e-300) for n, path in names.items())
-    return not names or any(ratio > CONFIDENCE_95 for ratio in away)
+    ended = {n: p for n, p in names.items() if p in fitted.at_bound and n in effect.may_end}
+    reached = (abs(getattr(effect, n)) > fitted.reach(p) for n, p in ended.items())
+    return not names or any(reached) or any(ratio > CONFIDENCE_95 for ratio in away)

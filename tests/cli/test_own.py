@@ -230,3 +230,13 @@ def test_wrong_words_are_one_line_and_write_nothing(monkeypatch, capsys, recordi
     words = [recordings / "m0.csv" if w == "FILE" else w for w in words]
     assert said in fails(monkeypatch, capsys, "new-study", *words)
     assert sorted(recordings.iterdir()) == before
+
+
+def test_a_urdf_with_an_inertia_that_no_body_has_is_refused(tmp_path, monkeypatch, capsys):
+    (tmp_path / "0.csv").write_bytes(german(0).encode("cp1252"))
+    urdf = tmp_path / "rod.urdf"
+    assert run(monkeypatch, "new-study", "--rod", LENGTH, MASS, "--out", tmp_path) == 0
+    urdf.write_text(re.sub(r'izz="[^"]*"', 'izz="0.9"', urdf.read_text()))
+    capsys.readouterr()
+    said = fails(monkeypatch, capsys, "new-study", tmp_path / "0.csv", "--urdf", urdf)
+    assert "rod.urdf, row 6, column arm: no body has the principal moments" in said

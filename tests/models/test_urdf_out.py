@@ -40,7 +40,7 @@ def test_pinocchio_reads_the_fitted_inertia_gravity_damping_and_friction(tmp_pat
     text, left_out, changed = extended_urdf(model + SensorOffset(), path)
     assert left_out == ("sensor_offset",)
     assert bool(changed) == (scale < 0.5)
-    out.write_text(text)
+    out.write_bytes(text)
     before, after = (pin.buildModelFromUrdf(str(p)) for p in (path, out))
     one, two = before.createData(), after.createData()
     for angle in (0.0, 0.7, 2.5):
@@ -54,7 +54,7 @@ def test_pinocchio_reads_the_fitted_inertia_gravity_damping_and_friction(tmp_pat
 def test_a_slide(tmp_path):
     path, out = tmp_path / "a.urdf", tmp_path / "b.urdf"
     path.write_text(slide(2.0))
-    out.write_text(extended_urdf(fitted(path, inertia_scale=1.5, damping=3.0), path)[0])
+    out.write_bytes(extended_urdf(fitted(path, inertia_scale=1.5, damping=3.0), path)[0])
     after = pin.buildModelFromUrdf(str(out))
     assert pin.crba(after, after.createData(), np.zeros(1))[0, 0] == pytest.approx(3.0)
     assert after.damping[0] == 3.0

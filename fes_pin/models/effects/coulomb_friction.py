@@ -29,6 +29,10 @@ STANDING = 1e-6
 """Speed below which friction does not build up, rad/s or m/s: it keeps derivatives finite."""
 UNLOADED = 1e-3
 """Load below which its sign no longer shows, in units of the weight at rest: it keeps derivatives finite."""
+BEYOND, SUM = "at the joint beyond the friction that its URDF states.", "T = (friction + torque)"
+"""The sentence and the equation of dry friction that adds to what is known of it; or takes from it, below 0."""
+STATED = "friction"
+"""Constant of a rig: the dry friction that is known of it, of a joint by its URDF, N m or N."""
 
 
 def _by_load(exponent: float) -> str:
@@ -147,10 +151,19 @@ class CoulombFriction(Effect):
         limits |= {"stretch": (0.0, MOST_STRETCH * free)} if free > 0.0 else {}
         return {**limits, "presliding": (0.0, 0.5 * way)} if way > 0.0 else limits
 
+    @classmethod
+    def on(cls, constants: Mapping[str, float]) -> type[Effect]:
+        """Return what is beyond the friction that a joint's URDF states, where it states one."""
+        return FrictionBeyond if STATED in constants else cls
+
+    def _torque(self, s: Signals) -> Scalar:
+        """Return all dry friction: what the rig states, and what is beyond it."""
+        return self.torque_nm + getattr(s.c, STATED) if hasattr(s.c, STATED) else self.torque_nm
+
     def apply(self, value: Scalar, s: Signals) -> Scalar:
         ratio = s.v / self.stribeck_speed
         loaded = power(s.bearing_load, self.load_exponent, UNLOADED)
-        most = self.torque_nm * loaded * (1.0 + self.stiction * exp(-ratio * ratio))
+        most = self._torque(s) * loaded * (1.0 + self.stiction * exp(-ratio * ratio))
         both_ways = self._acting(most, value, s)[0]
         most = most * (1.0 + self.asymmetry * both_ways / _length(both_ways))
         return value - most * self._acting(most, value, s)[0]
@@ -174,7 +187,7 @@ class CoulombFriction(Effect):
 
     def _way(self, s: Signals) -> Scalar:
         """Way over which the contact stretches, at least the shortest that integration steps resolve."""
-        shortest = self.torque_nm * s.step / _stopping(s)
+        shortest = self._torque(s) * s.step / _stopping(s)
         return sqrt(self.stretch * self.stretch + shortest * shortest)
 
     def _creeping(self, most: Scalar, s: Signals) -> Scalar:
@@ -184,7 +197,7 @@ class CoulombFriction(Effect):
         return sqrt(self.creep_speed * self.creep_speed + 0.25 * most * self._way(s) / s.inertia)
 
     def rate(self, s: Signals) -> ByName:
-        return {"share": self._acting(self.torque_nm, 0.0, s)[1]} if hasattr(s.own, "share") else {}
+        return {"share": self._acting(self._torque(s), 0.0, s)[1]} if hasattr(s.own, "share") else {}
 
     def _acting(self, most: Scalar, value: Scalar, s: Signals) -> tuple[Scalar, Scalar]:
         """Share that acts, and the rate of its state."""
@@ -207,6 +220,19 @@ class CoulombFriction(Effect):
             return slope * s.std(s.v)
         way = self._way(s)
         return s.std(s.q - s.own.anchor + way * slope * s.v) / way
+
+
+@dataclass(frozen=True)
+class FrictionBeyond(CoulombFriction):  # noqa: D101 - the docstring of dry friction, with another first line
+    __doc__ = (CoulombFriction.__doc__ or "").replace("at the joint.", BEYOND, 1).replace("T = torque", SUM)
+
+    torque_nm: float = parameter(0.01, unit="{effort}", null=0.0, lower=-1e6, upper=1e6, scale=0.01)
+
+    may_end = ("torque_nm",)
+
+    def limits(self, measured: Measured) -> Bounds:
+        """Return the same bounds, with no more taken away than is stated."""
+        return {**super().limits(measured), "torque_nm": (-float(measured[STATED][0]), np.inf)}
 
 
 def _stopping(s: Signals) -> Scalar:

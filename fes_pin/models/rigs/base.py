@@ -263,6 +263,15 @@ class Rig(ReadOnly):
         moved = derived_trial(trial, columns={**trial.columns, name: trial[name] + further})
         return same_motion(moved, trial, further)
 
+    def undetermined(self) -> tuple[str, ...]:
+        """Return the names of causes that nothing but a belief about another cause determines."""
+        return ()
+
+    @property
+    def predictor_step_s(self) -> float:
+        """Longest integration step of a one-step predictor that resolves what the nominal model holds, s."""
+        return math.inf
+
     def constant_names(self, kind: str) -> tuple[str, ...]:
         """Names of the constants of rig and trial that the equations read."""
         raise NotImplementedError

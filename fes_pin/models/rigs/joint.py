@@ -12,7 +12,8 @@ from fes_pin.data.errors import InputError
 from fes_pin.data.schema import IMPOSED, START_S, RigSchema, any_number, not_negative, positive
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
-from fes_pin.data.urdf import check_one_joint
+from fes_pin.data.urdf import check_one_joint, stated_of_joint
+from fes_pin.models.effects.coulomb_friction import STATED, CoulombFriction, FrictionBeyond
 from fes_pin.models.maths import cos, sin, sqrt, where
 from fes_pin.models.parameters import ROTARY, SLIDING, parameter
 from fes_pin.models.rigs.base import IMPOSED_STOPPING, RUN_OUT, Rig, first_rate, imposed_now, undone
@@ -27,6 +28,12 @@ def _check_urdf(files: Mapping[str, Path]) -> None:
     check_one_joint(files["urdf"])
 
 
+def _stated(files: Mapping[str, Path]) -> dict[str, float]:
+    """Return the start value that a URDF states: of the damping."""
+    stated = stated_of_joint(files["urdf"]) if "urdf" in files else {}
+    return {"damping": stated["damping"]} if "damping" in stated else {}
+
+
 @dataclass(frozen=True)
 class Joint(Rig):
     """One joint with viscous damping, moved by a commanded effort or by nothing.
@@ -38,6 +45,9 @@ class Joint(Rig):
     between samples. Each trial has its own initial position and velocity. `idle` is where no effort is needed to rest:
     A cos(q) + B sin(q) = 0; hanging, or standing if that is nearer to where an effort holds the joint; 0 for a
     prismatic joint.
+
+    Dry friction that the URDF states is a constant too, `friction`, and acts as `coulomb_friction` of that torque does.
+    That cause is then what there is beyond it, or below 0 what it is too much; its forms are those of both together.
 
     The bearing of a revolute joint carries the pull along the arm, in units of the URDF's weight at rest W (that of the
     simple pendulum with the same A, B and M; 1 for a prismatic joint, and where the joint feels no gravity):
@@ -74,6 +84,7 @@ class Joint(Rig):
         optional=("velocity",),
         imposed=("position", "velocity"),
         check_files=_check_urdf,
+        stated=_stated,
     )
 
     @classmethod
@@ -134,11 +145,25 @@ class Joint(Rig):
     def outputs(self, kind: str) -> tuple[str, ...]:
         return ("effort",) if kind == IMPOSED else ("position", "velocity")
 
+    def undetermined(self) -> tuple[str, ...]:
+        """Return a gain of the effort where every torque but a stated friction is in proportion to a fitted parameter.
+
+        Friction that is stated too small by a factor would look like a gain of that factor, and an inertia, a weight
+        and a damping that are wrong by it too.
+        """
+        weighs = self.constants["gravity_cos"] or self.constants["gravity_sin"]
+        scaled = {"inertia_scale", "damping"} | ({"gravity_scale"} if weighs else set())
+        return ("effort_gain",) if STATED in self.constants and scaled <= {*self.fitted_parameters()} else ()
+
+    @property
+    def predictor_step_s(self) -> float:
+        return CoulombFriction.predictor_step_s if STATED in self.constants else math.inf
+
     def constant_names(self, kind: str) -> tuple[str, ...]:
-        return (*self.needed, "idle")
+        return (*self.needed, "idle", *((STATED,) if STATED in self.constants else ()))
 
     def trial_constants(self, trial: Trial) -> dict[str, float]:
-        known = {name: float(self.constants[name]) for name in self.needed}
+        known = {name: float(self.constants[name]) for name in (*self.needed, STATED) if name in self.constants}
         return {**known, "idle": self._idle(trial)}
 
     def _idle(self, trial: Trial) -> float:
@@ -208,7 +233,7 @@ class Joint(Rig):
         s.q, s.v, s.sensed = s.x.q, s.x.v, s.through("play", s.x.q)
         gravity, s.bearing_load = self._gravity(s, s.v)
         effort = s.through("effort", getattr(s.u, "effort", 0.0))
-        s.torque = s.through("friction", s.through("torque", effort - gravity - self.damping * s.v))
+        s.torque = self._rubbed(s, s.through("torque", effort - gravity - self.damping * s.v))
         s.driving = s.through("driving", s.torque / s.inertia)
         s.acceleration = s.through("acceleration", s.driving)
         return {"q": s.v, "v": s.acceleration}
@@ -219,9 +244,16 @@ class Joint(Rig):
         s.q = s.through("play", s.q)
         s.stopping = IMPOSED_STOPPING * s.inertia
         gravity, s.bearing_load = self._gravity(s, s.v)
-        s.torque = s.through("friction", s.through("torque", -gravity - self.damping * s.v))
+        s.torque = self._rubbed(s, s.through("torque", -gravity - self.damping * s.v))
         s.sensed = undone(s, "effort", s.inertia * bend - s.torque)
         return {}
+
+    def _rubbed(self, s: Signals, torque: Any) -> Any:
+        """Return the torque after dry friction: what is stated acts by itself where no cause holds it already."""
+        if STATED in self.constants and not any(isinstance(e, CoulombFriction) for e in s.effects):
+            stated = FrictionBeyond(torque_nm=0.0)
+            torque = stated.apply(torque, s.of(stated))
+        return s.through("friction", torque)
 
     def _gravity(self, s: Signals, v: Any) -> tuple[Any, Any]:
         """Torque of gravity, and the load of the bearing, at the position and a velocity."""
@@ -264,6 +296,8 @@ def joint_model(urdf: Path, constants: Mapping[str, Any], start: Mapping[str, An
     known = {n: constants[n] for n in Joint.parameters() if n in constants}
     read = {"inertia": joint_inertia(body), "gravity_cos": cosine, "gravity_sin": sine}
     read["revolute"] = float(joint_is_revolute(body))
+    if (friction := stated_of_joint(urdf).get(STATED, 0.0)) > 0.0:
+        read[STATED] = friction
     fitted = tuple(n for n in Joint.parameters() if n in start)
     if not driven and "gravity_scale" in fitted:  # free motion shows only ratios: the URDF's inertia holds
         fitted = tuple(n for n in fitted if n != "inertia_scale")
