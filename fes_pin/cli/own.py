@@ -30,7 +30,11 @@ if TYPE_CHECKING:
 
 @needs(
     **dict.fromkeys(
-        ("urdf", "rig", "name", "column", "setting", "role", "group", "resample", "fill", "library"), "files"
+        (
+            *("urdf", "rig", "name", "column", "setting", "role", "group", "resample", "fill", "library"),
+            *("names", "header_row", "first_row", "transposed"),
+        ),
+        "files",
     ),
     upright="pendulum rod",
 )
@@ -73,6 +77,12 @@ def new_study(
         float | None, typer.Option(min=0.0, help="Hz: interpolate times that are not equally spaced.")
     ] = None,
     fill: Annotated[bool, typer.Option("--fill", help="Fill in short gaps of missing samples.")] = False,
+    names: Annotated[str | None, typer.Option(help="Of the columns of text files: t,angle,torque.")] = None,
+    header_row: Annotated[int | None, typer.Option(min=0, help="Line of the names; 0 for none.")] = None,
+    first_row: Annotated[int | None, typer.Option(min=1, help="Line of the first numbers.")] = None,
+    transposed: Annotated[
+        bool, typer.Option("--transposed", help="Each line of the files holds one quantity.")
+    ] = False,
     force: Annotated[
         bool, typer.Option("--force", help="Write over a study.toml that is there, and a URDF that was changed.")
     ] = False,
@@ -101,7 +111,8 @@ def new_study(
         typer.echo(f"wrote {(out or Path()) / template.name}")
         return
     catalogue, columns, settings = catalogue_with(library), pairs("--column", column), pairs("--set", setting)
-    schema = _schema(rig, catalogue, believed, (columns, resample, fill))
+    form = _form(names, header_row, first_row, transposed)
+    schema = _schema(rig, catalogue, believed, (columns, resample, fill, form))
     if resample == 0.0:
         raise InputError("expected a rate above 0 Hz", column="--resample")
     folder = _folder(files, out, force)
@@ -117,7 +128,9 @@ def new_study(
         labels={"role": pairs("--role", role), "group": pairs("--group", group)},
         resample_hz=resample,
         fill=fill,
+        form=form,
         ask=_ask if sys.stdin.isatty() and sys.stdout.isatty() else None,
+        say=_say,
     )
     if schema.owner is None:
         made = new_body_study(wanted)
@@ -133,7 +146,7 @@ def new_study(
     outputs.write(folder, made.contents)
     for own, theirs, unit in made.taken:
         typer.echo(f"{own:16s} is {theirs}{f', in {unit}' if unit else ''}")
-    print_text("\n".join([*left_out, *odd_lines(study, warnings)]))
+    print_text("\n".join([*made.said, *left_out, *odd_lines(study, warnings)]))
     place = shlex.quote(str(folder))
     typer.echo(f"wrote {folder / 'study.toml'}: look at it, then run")
     typer.echo(f"  fes-pin check {place}\n  fes-pin diagnose {place} --out answer")
@@ -190,13 +203,34 @@ def _schema(rig: str | None, catalogue: Catalogue, urdf: Path | None, of_rigs: S
     rigs = known_rigs(catalogue.schemas())
     schema = rigs[one_of(rig or "joint", tuple(rigs), partial(InputError, column="--rig"))]
     if schema.owner is None and (urdf is not None or catalogue.origins() or any(of_rigs)):
-        raise InputError("expected no URDF, --column, --resample, --fill or --library for walking", column="--rig")
+        expected = "expected no URDF, --column, --resample, --fill, form of text files or --library for walking"
+        raise InputError(expected, column="--rig")
     if schema.owner is not None and ("urdf" in schema.files) != (urdf is not None):
         wanted = "--urdf FILE, or --pendulum LENGTH MASS, --rod or --slide" if urdf is None else "no URDF"
         raise InputError(f"expected {wanted} for rig {schema.name}", column="--urdf")
     if urdf is not None and schema.check_files is not None:
         schema.check_files({"urdf": urdf})
     return schema
+
+
+def _form(
+    names: str | None, header_row: int | None, first_row: int | None, transposed: bool
+) -> dict[str, str | int | bool | tuple[str, ...]]:
+    """What was said of how text files are written, by the keys of [columns.file]."""
+    given = {
+        "names": None if names is None else tuple(name.strip() for name in names.split(",")),
+        "header_row": header_row,
+        "first_row": first_row,
+        "transposed": transposed or None,
+    }
+    if header_row is not None and first_row is not None and first_row <= header_row:
+        raise InputError(f"expected a line below the header in line {header_row}", column="--first-row")
+    return {key: value for key, value in given.items() if value is not None}
+
+
+def _say(text: str) -> None:
+    release_output()
+    print_text(text)
 
 
 def _ask(question: str) -> str:

@@ -13,14 +13,14 @@ from typing import Any
 import numpy as np
 
 from fes_pin.data.as_read import HeldFile
-from fes_pin.data.errors import InputError, fault_at
+from fes_pin.data.errors import InputError, fault_at, listed
 from fes_pin.data.files import inside, read_bytes
 from fes_pin.data.recorded.columns import INTERPOLATE
 from fes_pin.data.recorded.sniff import Proposal, propose
 from fes_pin.data.recorded.text import TextForm
 from fes_pin.data.schema import NumberKey, check_known, one_of, unknown
 from fes_pin.data.study_text import HEADER, columns_text, form_in_words, source_from_option, source_in_words, toml_table
-from fes_pin.data.units import known_unit, own_unit, quantities_of
+from fes_pin.data.units import known_unit, own_unit, quantities_of, stated_unit
 from fes_pin.data.wanted import Wanted, labels_of, number_set, of_files
 
 
@@ -36,11 +36,14 @@ class NewStudy:
         The rig's column, the file's name of it and its unit, as a person wants to see them.
     origins
         Where each recording, and the URDF, lies, by its path below the study's folder.
+    said
+        What is odd about the recordings, and how they are taken, a sentence each.
     """
 
     contents: Mapping[str, str | bytes]
     taken: tuple[tuple[str, str, str], ...]
     origins: Mapping[str, Path]
+    said: tuple[str, ...] = ()
 
 
 Guess = Callable[[Mapping[str, float], Collection[str]], Mapping[str, float]]
@@ -61,7 +64,12 @@ def new_study(wanted: Wanted, guess: Guess) -> NewStudy:
     InputError
         A recording that cannot be read; what the files do not say and no option does, all of it in one line.
     """
-    return _Making(wanted).made(guess)
+    while True:
+        making = _Making(wanted)
+        made = making.made(guess)
+        if made is not None:
+            return made
+        wanted = making.answered()
 
 
 def with_kind(made: NewStudy, kind: str) -> NewStudy:
@@ -75,22 +83,27 @@ class _Making:
 
     def __init__(self, wanted: Wanted) -> None:
         self.wanted, self.schema = wanted, wanted.schema
-        self.missing: list[str] = []
+        self.missing: dict[str, str] = {}
+        """What nobody has said, as options, and what is asked for it, by `column NAME` or `set KEY`."""
         self.own = of_files(wanted.files, "--set", wanted.settings)
-        self.proposals = [propose(path, self.schema, wanted.revolute) for path in wanted.files]
+        chosen = tuple(wanted.columns.values())
+        self.proposals = [propose(p, self.schema, wanted.revolute, wanted.form, chosen) for p in wanted.files]
         self.form = self._one_form()
         self.names = tuple(dict.fromkeys(n for p in self.proposals for n in p.recording.names))
         check_known(wanted.columns, self.schema.columns, fault_at("--column"))
 
-    def made(self, guess: Guess) -> NewStudy:
+    def made(self, guess: Guess) -> NewStudy | None:
+        """The study; None where something is missing and a person can be asked."""
         kinds = [self._kind(p) for p in self.proposals]
         sources = self._sources(set(kinds))
         rig, passive = self._numbers(self.schema.constants), self._numbers(self.schema.passive)
         trials = [self._trial(p, kind) for p, kind in zip(self.proposals, kinds, strict=True)]
         known, start = self._start(guess, {**rig, **passive}, sources)
         self._check_settings(sorted(set(kinds)))
+        if self.missing and self.wanted.ask is not None:
+            return None
         if self.missing:
-            raise InputError("the files do not say everything; please add " + ", ".join(dict.fromkeys(self.missing)))
+            raise self._incomplete()
         contents: dict[str, str | bytes] = {}
         files = self._urdf(contents)
         places = [placed(path, self.wanted.folder, contents, "trials/") for path in self.wanted.files]
@@ -100,7 +113,7 @@ class _Making:
             *toml_table("rig", {**files, **rig, **known}, "known before the trials, never fitted", self._units()),
             *toml_table("rig.passive", passive, "known as well", self._units()),
             *toml_table("start", start, "start values of what the nominal model fits", self._units()),
-            *columns_text(sources, self.names, self.form, options),
+            *columns_text(sources, self.names, self.form, options, not any(p.recording.said for p in self.proposals)),
         ]
         named = [{} if self._is_open(*one) else {"kind": one[1]} for one in zip(self.proposals, kinds, strict=True)]
         for path, place, kind, conditions in zip(self.wanted.files, places, named, trials, strict=True):
@@ -112,7 +125,67 @@ class _Making:
         origins = dict(zip(places, self.wanted.files, strict=True))
         if self.wanted.urdf is not None:
             origins[files["urdf"]] = self.wanted.urdf
-        return NewStudy(contents, taken, origins)
+        return NewStudy(contents, taken, origins, self.said(sources))
+
+    def said(self, sources: Mapping[str, Mapping[str, Any]]) -> tuple[str, ...]:
+        """What is odd about all files, and how they are taken; a sentence of several files once."""
+        by_sentence: dict[str, list[str]] = {}
+        for proposal in self.proposals:
+            sentences = [*proposal.said]
+            if "rate_hz" in sources.get("time_s", {}) and "time_s" not in self.wanted.columns:
+                sentences.append(f"no column of times: {proposal.rate_hz:g} Hz is what the header says")
+            for sentence in sentences:
+                by_sentence.setdefault(sentence, []).append(proposal.recording.path.name)
+        return tuple(f"{listed(names)}: {sentence}" for sentence, names in by_sentence.items())
+
+    def _incomplete(self) -> InputError:
+        odd = "".join(f"{sentence}; " for sentence in self.said({}))
+        return InputError(f"{odd}the files do not say everything; please add {', '.join(self.missing.values())}")
+
+    def answered(self) -> Wanted:
+        """What is wanted, with what a person answers: all that is odd is said once, then each thing asked for.
+
+        Raises
+        ------
+        InputError
+            A needed answer is empty; then all that is missing is in one line.
+        """
+        wanted = self.wanted
+        if wanted.say is not None:
+            wanted.say("\n".join([*self.said({}), "what the files do not say:", *self.missing.values()]))
+        columns, settings = dict(wanted.columns), dict(wanted.settings)
+        for key, what in self.missing.items():
+            table, _, name = key.partition(" ")
+            answer = self._answer(table, name, what)
+            if table == "column":
+                columns[name] = answer.removeprefix(f"{name}=")
+            else:
+                settings[name] = answer.rpartition("=")[2].strip()
+        return replace(wanted, columns=columns, settings=settings)
+
+    def _answer(self, table: str, name: str, what: str) -> str:
+        """A person's answer that is understood; one that is not is asked for again, with the reason."""
+        ask, why = self.wanted.ask, ""
+        if ask is None:
+            raise self._incomplete()
+        question = what.removeprefix("--column ").removeprefix("--set ")
+        while True:
+            answer = ask(f"{why}{question}").strip()
+            if not answer and "or nothing:" not in what:
+                raise self._incomplete()
+            try:
+                if table == "column":
+                    self._stated(name, answer.removeprefix(f"{name}="))
+                else:
+                    self._understood(name, answer.rpartition("=")[2].strip())
+                return answer
+            except InputError as error:
+                why = f"{error.message}; "
+
+    def _understood(self, key: str, text: str) -> None:
+        last = key.rpartition(":")[2].removeprefix("rig.")
+        tables = (self.schema.constants, self.schema.passive, self.schema.start, self.schema.conditions)
+        number_set(last, text, next(table[last] for table in tables if last in table))
 
     def _one_form(self) -> TextForm | None:
         forms = {p.form: p for p in self.proposals}
@@ -158,24 +231,35 @@ class _Making:
         if (option := self.wanted.columns.get(column)) is not None:
             return self._stated(column, option)
         candidates = self._candidates(column)
+        rates = {p.rate_hz for p in self.proposals}
+        if column == "time_s" and not candidates and len(rates) == 1 and None not in rates:
+            return {"rate_hz": next(iter(rates))}
         if len(candidates) != 1:
             if not is_needed and len(candidates) < 2:
                 return None
-            could = f"{' or '.join(candidates)}" if candidates else f"one of {', '.join(self.names)}"
+            could = listed(candidates, " or ") if candidates else f"one of {listed(self._with_units())}"
             what = f"--column {column}=NAME:UNIT ({could}"
             return self._asked(column, f"{what}; or nothing: --column {column}=)" if not is_needed else f"{what})")
         return self._with_unit(column, candidates[0])
 
+    def _with_units(self) -> list[str]:
+        """All columns of the files, each with the unit that they state in brackets behind it."""
+        units = {name: self._unit_of(name) for name in self.names}
+        return [f"{name} ({unit})" if unit and unit not in name else name for name, unit in units.items()]
+
     def _with_unit(self, column: str, name: str) -> dict[str, Any] | None:
         """The column of that name, and the unit that it seems to be in."""
-        unit = self._unit_of(name)
+        _, unit = stated_unit(name, self._unit_of(name))
+        unit = unit or self._unit_of(name)
         quantities = quantities_of(column, self.wanted.revolute)
-        if name == column or not quantities or quantities == ("pulses",):
+        if (name == column and not unit) or not quantities or quantities == ("pulses",):
             return {"name": name}
         if unit:
             if (found := known_unit(unit, quantities)) is not None:
                 return {"name": name, "unit": found[1]}
-            return self._asked(column, f"--column {column}={name},scale=NUMBER ({own_unit(column)} for each {unit})")
+            own = own_unit(column, self.wanted.revolute)
+            nothing = "" if column in self.schema.outputs.values() else f"; or nothing: --column {column}="
+            return self._asked(column, f"--column {column}={name},scale=NUMBER ({own} for each {unit}{nothing})")
         units = own_unit(column, self.wanted.revolute)
         return self._asked(column, f"--column {column}={name}:UNIT ({self._range(name)}: {units}, or which unit?)")
 
@@ -185,20 +269,29 @@ class _Making:
         return f"{low:.4g} to {high:.4g}"
 
     def _asked(self, column: str, what: str) -> dict[str, Any] | None:
-        if self.wanted.ask is None:
-            self.missing.append(what)
-            return None
-        answer = self.wanted.ask(what.removeprefix("--column ")).strip().removeprefix(f"{column}=")
-        return self._stated(column, answer)
+        self.missing[f"column {column}"] = what
+        return None
 
     def _stated(self, column: str, words: str) -> dict[str, Any] | None:
         """A column as the user states it, in the unit of the file where the user names none."""
-        source = source_from_option(column, words, self.names) if words else None
+        try:
+            source = source_from_option(column, words, self.names) if words else None
+        except InputError as error:
+            odd = "".join(f"; {sentence}" for sentence in self.said({}))
+            raise InputError(f"{error.message}{odd}", column=error.column) from None
         if source is None or source.keys() & {"unit", "rate_hz", "edge"}:
             return source
-        stated = known_unit(self._unit_of(source["name"]), quantities_of(column, self.wanted.revolute))
-        if stated is None or stated[1] == own_unit(column, self.wanted.revolute):
+        quantities = quantities_of(column, self.wanted.revolute)
+        quantity, unit = stated_unit(source["name"], self._unit_of(source["name"]))
+        stated = known_unit(unit, quantities)
+        if stated is not None and stated[1] == own_unit(column, self.wanted.revolute):
             return source
+        if stated is None:
+            if "scale" in source or not (quantity or unit) or column == "stim" or not quantities:
+                return source
+            what = f"a {quantity} in {unit}" if quantity else unit
+            message = f"the file says {what}: expected NAME:UNIT, or NAME,scale=NUMBER ({own_unit(column)} for each)"
+            raise InputError(f"{message}, found {words!r}", column=f"--column {column}")
         if abs(source.get("scale", 1.0)) != 1.0:
             message = f"a scale, and the file says {stated[1]}: expected NAME:UNIT,scale=NUMBER, found {words!r}"
             raise InputError(message, column=f"--column {column}")
@@ -212,10 +305,9 @@ class _Making:
         """A number that somebody gave, by its key in the study; empty, and it is missing, if nobody has."""
         text = (self.own.get((path, key)) if path else None) or self.wanted.settings.get(key)
         place = f"{path.name}:" if path and len(self.proposals) > 1 else ""
-        if text is None and self.wanted.ask is not None:
-            text = self.wanted.ask(f"{place}{key}{f' in {number.unit}' if number.unit else ''}").strip()
         if not text:
-            self.missing.append(f"--set {place}{key}=NUMBER{f' ({number.unit})' if number.unit else ''}")
+            what = f"--set {place}{key}=NUMBER{f' ({number.unit})' if number.unit else ''}"
+            self.missing[f"set {path}:{key}" if place else f"set {key}"] = what
             return {}
         return {key.removeprefix("rig."): number_set(key, text, number)}
 

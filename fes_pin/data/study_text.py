@@ -12,7 +12,7 @@ from typing import Any
 
 from fes_pin.data.as_read import HeldFile
 from fes_pin.data.checks import check_constants, checked_label
-from fes_pin.data.errors import InputError, KeyFault
+from fes_pin.data.errors import InputError, KeyFault, listed
 from fes_pin.data.files import hold, read_json
 from fes_pin.data.numbers import in_full, number_in
 from fes_pin.data.recorded.columns import SOURCE_KEYS, Columns, columns_of
@@ -129,7 +129,11 @@ def toml_table(
 
 
 def toml_value(value: Any) -> str:
-    """A string or a number as TOML."""
+    """A string, a number, a truth or a list of them as TOML."""
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(toml_value, value))}]"
+    if isinstance(value, bool):
+        return str(value).lower()
     return quoted(value) if isinstance(value, str) else repr(value) if isinstance(value, int) else in_full(value)
 
 
@@ -144,19 +148,33 @@ def inline_table(source: Mapping[str, Any]) -> str:
 
 
 def columns_text(
-    sources: Mapping[str, Mapping[str, Any]], names: Sequence[str], form: TextForm | None, options: Mapping[str, Any]
+    sources: Mapping[str, Mapping[str, Any]],
+    names: Sequence[str],
+    form: TextForm | None,
+    options: Mapping[str, Any],
+    is_plain: bool = True,
 ) -> list[str]:
-    """Lines of [columns], and of [columns.file] with the options that are set; none where all is as by default."""
+    """Lines of [columns], and of [columns.file] with the options that are set.
+
+    Parameters
+    ----------
+    is_plain
+        Whether none are written where all is as by default: nothing in the files is read in a way of its own.
+    """
     used = {source["name"] for source in sources.values() if "name" in source}
     ignored = [name for name in names if name not in used]
-    plain = all(source == {"name": column} for column, source in sources.items()) and tuple(names[:1]) == ("time_s",)
+    as_named = all(source == {"name": column} for column, source in sources.items())
+    plain = is_plain and as_named and tuple(names[:1]) == ("time_s",)
     if plain and form == TextForm() and not ignored and not any(options.values()):
         return []
     out = ["", "[columns]  # the rig's columns, as the recordings call them, and their units there"]
     out += [f"{column} = {inline_table(source)}" for column, source in sources.items()]
     out += [f"ignored = [{', '.join(map(quoted, ignored))}]"] if ignored else []
     about: dict[str, Any] = {k: v for k, v in options.items() if v is not None}
-    about |= {k: v for k, v in asdict(form or TextForm()).items() if v != getattr(TextForm(), k)}
+    form = form or TextForm()
+    about |= {k: v for k, v in asdict(form).items() if v != getattr(TextForm(), k)}
+    if form.first_row != form.header_row + 1:
+        about["first_row"] = form.first_row
     return out + toml_table("columns.file", about, "how the recordings are written")
 
 
@@ -177,7 +195,7 @@ def source_from_option(column: str, option: str, names: Sequence[str]) -> dict[s
     name, colon, unit = first.rpartition(":") if first not in names else (first, "", "")
     out: dict[str, Any] = {"name": name if colon else first} | ({"unit": unit} if unit and colon else {})
     if out["name"] not in names:
-        raise error(f"expected a column of the files, one of {', '.join(names)}; found {out['name']!r}")
+        raise error(f"expected a column of the files, one of {listed(names)}; found {out['name']!r}")
     for pair in more:
         key, equals, value = pair.partition("=")
         if not equals or key not in SOURCE_KEYS:

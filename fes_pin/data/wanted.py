@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from functools import cached_property, partial
 from glob import escape
 from pathlib import Path
+from typing import Any
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import number_in
@@ -41,8 +42,12 @@ class Wanted:
         Of trials: by "role" and "group" what was said of files, by `FILE`.
     resample_hz, fill
         See `[columns.file]`.
+    form
+        What was said of how text files are written, by the keys of `[columns.file]`.
     ask
         None where nobody can be asked.
+    say
+        Prints something before a person is asked; None where nothing is printed.
     """
 
     files: tuple[Path, ...]
@@ -56,7 +61,9 @@ class Wanted:
     labels: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     resample_hz: float | None = None
     fill: bool = False
+    form: Mapping[str, Any] = field(default_factory=dict)
     ask: Ask | None = None
+    say: Callable[[str], None] | None = None
 
     @cached_property
     def revolute(self) -> bool | None:
