@@ -156,11 +156,11 @@ def are_units(cells: Sequence[str], names: Sequence[str] = ()) -> bool:
         return True
     if len(names) != len(cells) or any(len(unit) > LONGEST for _, unit in stated):
         return False
-    return 2 * len(known) >= len(stated) or any(_agree(names[k], unit) for k, unit in known)
+    return 2 * len(known) >= len(stated) or any(is_unit_of(unit, names[k]) for k, unit in known)
 
 
-def _agree(name: str, unit: str) -> bool:
-    """True of a name with a word for what this unit measures."""
+def is_unit_of(unit: str, name: str) -> bool:
+    """True of a unit that measures what a word of a name is for: `ms` of `Time`."""
     columns = (column for column, words in MEANT.items() if words & words_of(name))
     return any(known_unit(unit, quantities_of(column)) for column in columns)
 

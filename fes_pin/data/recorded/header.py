@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from fes_pin.data.recorded.text import TextForm, cells_of
-from fes_pin.data.units import UNITS, are_units, bare_unit, known_unit, split_header
+from fes_pin.data.units import UNITS, are_units, bare_unit, is_unit_of, known_unit, split_header
 
 NUMBER = re.compile(r"^[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$")
 _SAMPLING = r"(?:(?:data|sampl\w*|acquisition|analog|scan|frame|camera|recording)\s+)"
@@ -55,7 +55,8 @@ def header_of(lines: Sequence[str], form: TextForm, numbers: Sequence[Sequence[s
     columns = len(numbers[0])
     keyed = _keyed(lines, form, columns)
     rate = next((rate for _, kind, cells in keyed if (rate := _rate(kind, cells)) is not None), None)
-    found = _from_keys(keyed, numbers, rate) or _from_rows(lines, form, columns, {row for row, *_ in keyed})
+    of_rates = {row for row, kind, cells in keyed if _rate(kind, cells) is not None}
+    found = _from_keys(keyed, numbers, rate) or _from_rows(lines, form, columns, of_rates)
     names = found.names or (cells_in(lines[found.row - 1], form) if found.row else ())
     rate = rate or _rate_of_frames(lines, form, names)
     return Header(found.row, found.names, found.units, rate, found.said)
@@ -80,7 +81,7 @@ def _from_rows(lines: Sequence[str], form: TextForm, columns: int, keyed: set[in
         return _named(lines, form, higher, above, {k: cell.strip("[](){} ") for k, cell in enumerate(below)})
     if above and are_units(above, below) and not are_units(below):
         return _named(lines, form, place, below, {k: cell.strip("[](){} ") for k, cell in enumerate(above)})
-    mixed = [k for k, cell in enumerate(below) if above and _is_unit(cell) and above[k] and not _is_unit(above[k])]
+    mixed = [k for k, cell in enumerate(below) if above and is_unit_of(bare_unit(cell), above[k])]
     if mixed and len(mixed) < len(below):  # a unit below the name of the time, names below the numbers of channels
         names = [above[k] if k in mixed else cell for k, cell in enumerate(below)]
         return _named(lines, form, place, names, {k: bare_unit(below[k]) for k in mixed})
@@ -135,11 +136,14 @@ def ways(line: str, form: TextForm, others: bool) -> Iterator[list[str]]:
         quoted = re.findall(r"'([^']*)'|\"([^\"]*)\"", inner)
         if quoted or "," in inner:
             yield [one or other for one, other in quoted] if quoted else [n.strip() for n in inner.split(",")]
-    yield list(cells_in(line, form))
+    if form.delimiter != " ":
+        yield list(cells_in(line, form))
     if others:
         for separator in (",", ";", "\t"):
             if separator != form.delimiter and separator in text:
                 yield [n.strip(" \"'") for n in text.rstrip(f"{separator} ").split(separator)]
+    if form.delimiter == " ":
+        yield list(cells_in(line, form))
 
 
 def _too_few(lines: Sequence[str], form: TextForm, columns: int, keyed: set[int]) -> tuple[str, ...]:

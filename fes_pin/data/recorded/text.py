@@ -268,6 +268,8 @@ def _is_regular(body: list[str], form: TextForm, count: int) -> bool:
     delimiter = None if form.delimiter == " " else form.delimiter
     cells = {len(line.split(delimiter)) for line in body}
     most = count if form.strict or delimiter is None else count + 1  # a delimiter at the end begins no cell
+    if most > count and cells == {most} and not all(line.rstrip(" \r").endswith(form.delimiter) for line in body):
+        return False
     return len(cells) == 1 and cells <= {count, most} and not any(sign in line for line in body for sign in odd)
 
 
