@@ -20,7 +20,7 @@ from fes_pin.data.recorded.sniff import Proposal, propose
 from fes_pin.data.recorded.text import TextForm
 from fes_pin.data.schema import NumberKey, check_known, one_of, unknown
 from fes_pin.data.study_text import HEADER, columns_text, form_in_words, source_from_option, source_in_words, toml_table
-from fes_pin.data.units import known_unit, own_unit, quantities_of, stated_unit
+from fes_pin.data.units import factor_of, known_unit, own_unit, quantities_of, stated_unit
 from fes_pin.data.wanted import Wanted, labels_of, number_set, of_files
 
 
@@ -225,7 +225,10 @@ class _Making:
         return {column: source for column, source in sources.items() if source is not None}
 
     def _candidates(self, column: str) -> tuple[str, ...]:
-        return tuple(dict.fromkeys(n for p in self.proposals for n in p.candidates[column]))
+        """Columns of the files that could be this one, without those that a person named for another."""
+        named = [words for other, words in self.wanted.columns.items() if other != column]
+        found = dict.fromkeys(n for p in self.proposals for n in p.candidates[column])
+        return tuple(n for n in found if not any(w == n or w.startswith((f"{n}:", f"{n},")) for w in named))
 
     def _source(self, column: str, is_needed: bool) -> dict[str, Any] | None:
         if (option := self.wanted.columns.get(column)) is not None:
@@ -240,25 +243,26 @@ class _Making:
             could = listed(candidates, " or ") if candidates else f"one of {listed(self._with_units())}"
             what = f"--column {column}=NAME:UNIT ({could}"
             return self._asked(column, f"{what}; or nothing: --column {column}=)" if not is_needed else f"{what})")
-        return self._with_unit(column, candidates[0])
+        return self._with_unit(column, candidates[0], is_needed)
 
     def _with_units(self) -> list[str]:
         """All columns of the files, each with the unit that they state in brackets behind it."""
         units = {name: self._unit_of(name) for name in self.names}
         return [f"{name} ({unit})" if unit and unit not in name else name for name, unit in units.items()]
 
-    def _with_unit(self, column: str, name: str) -> dict[str, Any] | None:
+    def _with_unit(self, column: str, name: str, is_needed: bool) -> dict[str, Any] | None:
         """The column of that name, and the unit that it seems to be in."""
         _, unit = stated_unit(name, self._unit_of(name))
         unit = unit or self._unit_of(name)
         quantities = quantities_of(column, self.wanted.revolute)
-        if (name == column and not unit) or not quantities or quantities == ("pulses",):
+        is_own = name == column and unit in ("", stated_unit(name)[1])
+        if is_own or not quantities or quantities == ("pulses",):
             return {"name": name}
         if unit:
             if (found := known_unit(unit, quantities)) is not None:
                 return {"name": name, "unit": found[1]}
             own = own_unit(column, self.wanted.revolute)
-            nothing = "" if column in self.schema.outputs.values() else f"; or nothing: --column {column}="
+            nothing = "" if is_needed else f"; or nothing: --column {column}="
             return self._asked(column, f"--column {column}={name},scale=NUMBER ({own} for each {unit}{nothing})")
         units = own_unit(column, self.wanted.revolute)
         return self._asked(column, f"--column {column}={name}:UNIT ({self._range(name)}: {units}, or which unit?)")
@@ -279,6 +283,8 @@ class _Making:
         except InputError as error:
             odd = "".join(f"; {sentence}" for sentence in self.said({}))
             raise InputError(f"{error.message}{odd}", column=error.column) from None
+        if source is not None and "unit" in source:
+            factor_of(source["unit"], column, self.wanted.revolute, partial(InputError, column=f"--column {column}"))
         if source is None or source.keys() & {"unit", "rate_hz", "edge"}:
             return source
         quantities = quantities_of(column, self.wanted.revolute)

@@ -112,7 +112,7 @@ def stated_unit(name: str, unit: str = "") -> tuple[str, str]:
         return known
     if not unit and CURRENTS & words_of(bare):
         return "current", "A"
-    return "", unit
+    return "", unit if unit != in_name else ""  # what stands in brackets in a name need be no unit: `Angle [left]`
 
 
 def may_be(column: str, name: str, unit: str = "", revolute: bool | None = None) -> bool:
