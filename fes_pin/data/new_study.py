@@ -269,8 +269,9 @@ class _Making:
 
     def _range(self, name: str) -> str:
         values = [p.recording.columns[name] for p in self.proposals if name in p.recording.columns]
-        low, high = (f(np.concatenate(values)) for f in (np.nanmin, np.nanmax))
-        return f"{low:.4g} to {high:.4g}"
+        there = np.concatenate(values)
+        there = there[np.isfinite(there)]
+        return f"{there.min():.4g} to {there.max():.4g}" if len(there) else "no number"
 
     def _asked(self, column: str, what: str) -> dict[str, Any] | None:
         self.missing[f"column {column}"] = what

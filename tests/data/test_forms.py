@@ -51,7 +51,7 @@ START = {
 }
 
 LISTS = {
-    "python": lambda names: repr(names),
+    "python": repr,
     "comment": lambda names: f"# {names!r}",
     "numpy": lambda names: "[" + " ".join(map(repr, names)) + "]",
     "bare": lambda names: f"[{', '.join(names)}]",
@@ -104,7 +104,7 @@ def test_names_that_a_person_states_are_written_into_the_study(tmp_path):
     assert 'names = ["time_s", "position", "other", "effort"]' in text and said == ()
     assert np.allclose(study.trials[0]["position"], values[:, 1], atol=1e-5)
     (tmp_path / "study.toml").write_text(text.replace('"other", ', "", 1))
-    with pytest.raises(InputError, match="found 4"):
+    with pytest.raises(InputError, match="expected names of 4 columns, found 3"):
         read_study(tmp_path)
 
 
@@ -297,6 +297,17 @@ def test_seconds_since_1970_count_from_the_first_row(tmp_path, name, unit, facto
     assert np.allclose(study.trials[0].time, time, atol=1e-6)
     assert f"{name} is taken as {unit} since 1970" in study.trials[0].remarks[0]
     assert "2026-02-02 16:00:00.500" in study.trials[0].remarks[0]
+
+
+@pytest.mark.parametrize("rows", [1, 2])
+def test_a_sample_that_is_no_number_is_no_header(tmp_path, rows):
+    bad = ["0.5,error"] * rows
+    path = written(tmp_path / "a.csv", "time_s,position", *bad, values=drawn(0, 2)[1])
+    with pytest.raises(InputError, match="--column position="):
+        study_of(tmp_path, path)
+    assert sniff(path)[0].first_row == 2
+    keyed = written(tmp_path / "b.csv", "time_s,position", "Interval,0.01", values=drawn(0, 2)[1])
+    assert sniff(keyed)[0].first_row == 3 and read_recording(keyed, sniff(keyed)[0]).names == ("time_s", "position")
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -81,7 +81,7 @@ def test_a_current_is_no_effort_without_a_scale(tmp_path, name):
         study_of(tmp_path, path)
     assert f"--column effort={name},scale=NUMBER (N m for each " in str(caught.value)
     assert "or nothing: --column effort=" in str(caught.value)
-    with pytest.raises(InputError, match="a current in m?A: expected NAME:UNIT, or NAME,scale="):
+    with pytest.raises(InputError, match=r"a current in m?A: expected NAME:UNIT, or NAME,scale="):
         study_of(tmp_path, path, columns={"effort": name})
     study, _ = study_of(tmp_path, path, columns={"effort": f"{name},scale=0.1"})
     assert np.allclose(study.trials[0]["effort"], 0.1 * ANGLE, atol=1e-5)

@@ -119,8 +119,6 @@ class Columns:
                     message = f"missing; [columns] takes {column} from it, and this file has {listed(recording.names)}"
                     raise recording.error(message, source.name)
                 continue
-            if not source.is_stated and (why := _unsaid(column, source.name, recording.units.get(source.name, ""))):
-                raise recording.error(why, column if column == source.name else source.name)
             taken[column] = source
         declared = {*self.ignored, *(s.name for s in self.sources.values())}
         for name in recording.names:
@@ -130,6 +128,10 @@ class Columns:
                 expected = f"this rig reads {', '.join(known)}"
                 raise recording.error(f"expected it in [columns], or there among `ignored`; {expected}", name)
             taken[name] = ColumnSource(name)
+        for column, source in taken.items():
+            unit = recording.units.get(source.name, "")
+            if not source.is_stated and unit and (why := _unsaid(column, source.name, unit)):
+                raise recording.error(why, source.name)
         return {c: taken[c] for c in ("time_s", *(n for n in taken if n != "time_s")) if c in taken}
 
     def _time(self, recording: Table, source: ColumnSource | None) -> tuple[np.ndarray, float]:

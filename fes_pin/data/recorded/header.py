@@ -168,7 +168,7 @@ def _keyed(lines: Sequence[str], form: TextForm, columns: int) -> list[tuple[int
         text = line.strip().removeprefix(form.comment).strip()
         in_two = [c.strip(" \"'") for c in re.split(r"[=:]|,|;|\t", text, maxsplit=1)]
         for cells in (list(cells_in(line, form)), in_two):
-            key, unit = split_header(cells[0].rstrip("=: "))
+            key, unit = split_header((cells or [""])[0].rstrip("=: "))
             kind = _kind_of(key) if len(cells) > 1 else ""
             if kind and (cells is not in_two) >= (kind in ("names", "units")):
                 out.append((place, kind, [unit, *cells[1:]]))
@@ -179,6 +179,11 @@ def _keyed(lines: Sequence[str], form: TextForm, columns: int) -> list[tuple[int
                     out.append((place, kind, [split_header(name)[1], value]))
         before = (place, other)
     return out
+
+
+def is_keyed(cells: Sequence[str]) -> bool:
+    """True of a line that begins with a key: `Interval,0.5`."""
+    return bool(cells) and bool(_kind_of(split_header(cells[0].rstrip("=: "))[0]))
 
 
 def _kind_of(key: str) -> str:

@@ -4,6 +4,7 @@ The form is proposed to a person, or named by an error, and never used unseen. C
 numbers.
 """
 
+import operator
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -15,7 +16,7 @@ from fes_pin.data.errors import InputError
 from fes_pin.data.files import as_path, read_bytes, read_text
 from fes_pin.data.recorded.clock import clock_seconds
 from fes_pin.data.recorded.formats import by_length, check_suffix, is_text, read_recording
-from fes_pin.data.recorded.header import Header, cells_in, header_of, ways
+from fes_pin.data.recorded.header import Header, cells_in, header_of, is_keyed, ways
 from fes_pin.data.recorded.text import DECIMALS, DELIMITERS, MISSING, TextForm, cells_of, read_text_recording
 from fes_pin.data.schema import MEANT, RigSchema, without_unit
 from fes_pin.data.table import Table
@@ -64,7 +65,7 @@ def sniffed(path: Path, stated: Mapping[str, Any] = MappingProxyType({})) -> tup
         raise InputError("expected rows of numbers, found none", file=path)
     comment = next((c for line in lines for c in COMMENTS if line.lstrip().startswith(c)), "")
     form = replace(form, comment=comment)
-    first = int(stated.get("first_row", _first_of(rows) + 1)) - 1
+    first = int(stated.get("first_row", _first_of(lines, rows, form) + 1)) - 1
     above = lines[:first]
     turned = None if "transposed" in stated else _transposed(above, rows, form)
     numbers = [cells_of(lines[place], form) for place, _ in reversed(rows[-2:])]
@@ -75,13 +76,17 @@ def sniffed(path: Path, stated: Mapping[str, Any] = MappingProxyType({})) -> tup
     return replace(form, **stated), header
 
 
-def _first_of(rows: list[tuple[int, list[bool]]]) -> int:
-    """Place of the first of the rows that has numbers wherever most rows have: `Interval,0.5` above them has not."""
+def _first_of(lines: list[str], rows: list[tuple[int, list[bool]]], form: TextForm) -> int:
+    """Place of the first row of numbers: `Interval,0.5` is none above rows that are all numbers.
+
+    What is no number below a row of names is a sample that is wrong.
+    """
     usual = [2 * sum(kinds[k] for _, kinds in rows) > len(rows) for k in range(len(rows[0][1]))]
-    for place, kinds in reversed(rows):
-        if all(is_number >= of_most for is_number, of_most in zip(kinds, usual, strict=True)):
-            return place
-    return rows[-1][0]
+    like = [place for place, kinds in rows if all(map(operator.ge, kinds, usual))]
+    top, first = rows[-1][0], min(like, default=rows[-1][0])
+    odd = [cells_of(line, form) for line in lines[top:first] if line.strip()]
+    above = header_of(lines[:top], form, [[""] * len(usual)]) if odd and not any(map(is_keyed, odd)) else Header()
+    return top if above.row else first
 
 
 def _transposed(above: Sequence[str], rows: list[tuple[int, list[bool]]], form: TextForm) -> Header | None:

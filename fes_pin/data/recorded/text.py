@@ -175,7 +175,9 @@ def table_of_lines(
     if len(body) < MIN_ROWS:
         row = int(rows[-1]) if len(rows) else form.first_row - 1
         message = f"expected at least {MIN_ROWS} rows of numbers, found {len(body)}"
-        raise InputError(message, file=path, row=row, column=names[0])
+        raise InputError(message, file=path, row=row, column=names[0] if names else None)
+    if form.names:
+        _check_count(path, body, rows, form)
     places = [names.index(n) for n in chosen]
     clocks: dict[str, str] = {}
     values = _fast(body, form, places, len(names))
@@ -207,6 +209,14 @@ def units_between(lines: list[str], names: tuple[str, ...], form: TextForm) -> d
     return {}
 
 
+def _check_count(path: Path, body: list[str], rows: np.ndarray, form: TextForm) -> None:
+    """Require as many names that are stated as the first row has cells; one more where a delimiter ends it."""
+    cells, ends = len(cells_of(body[0], form)), body[0].rstrip(" \r").endswith(form.delimiter)
+    if len(form.names) not in (cells, cells + ends):
+        message = f"expected names of {cells} columns, found {len(form.names)}"
+        raise InputError(message, file=path, row=int(rows[0]))
+
+
 def names_of(path: Path, lines: list[str], form: TextForm) -> tuple[str, ...]:
     """Names of the columns of a text file's lines, as its form says.
 
@@ -221,9 +231,9 @@ def names_of(path: Path, lines: list[str], form: TextForm) -> tuple[str, ...]:
         first = next((line for line in lines[form.first_row - 1 :] if line.strip()), "")
         return without_twins([""] * len(cells_of(first, form)))
     line = lines[form.header_row - 1] if form.header_row <= len(lines) else ""
-    if not line.strip():
-        raise InputError("expected a header row of column names, found nothing", file=path, row=form.header_row)
     names = cells_of(line.removeprefix(form.comment), form)
+    if not names or not line.strip():
+        raise InputError("expected a header row of column names, found nothing", file=path, row=form.header_row)
     if not form.strict:
         return without_twins(names)
     names = [name.strip('"') for name in names]
