@@ -149,6 +149,22 @@ def test_a_transposed_table_becomes_a_study_and_its_faults_are_one_line(tmp_path
 
 
 @pytest.mark.parametrize("seed", SEEDS)
+def test_a_wide_table_without_names_is_doubted_and_read_where_a_person_says_so(tmp_path, seed):
+    _, values = drawn(seed, 2 + seed, rows=60)
+    path = written(tmp_path / "a.csv", values=values.T)
+    assert sniffed(path)[1].said[0].startswith(f"{2 + seed} rows of 60 columns without names: is the table transposed?")
+    form, header = sniffed(path, {"transposed": True})
+    read = read_recording(path, form)
+    assert read.names == tuple(f"column{k}" for k in range(1, 3 + seed)) and header.said == ()
+    assert np.allclose(np.column_stack(list(read.columns.values())), values, atol=1e-5)
+    own = tuple("abcdef"[: 2 + seed])
+    study, _ = study_of(
+        tmp_path, path, form={"transposed": True, "names": own}, columns={"time_s": "a:s", "position": "b:rad"}
+    )
+    assert np.allclose(study.trials[0]["position"], values[:, 1], atol=1e-5)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
 def test_a_table_of_many_named_columns_and_few_rows_is_not_transposed(tmp_path, seed):
     names = [f"c{k}" for k in range(50)]
     values = np.random.default_rng(seed).normal(size=(3 + seed, 50))

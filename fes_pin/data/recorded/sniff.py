@@ -25,6 +25,8 @@ from fes_pin.data.units import bare_unit, known_unit, may_be, quantities_of, spl
 LOOKED_AT = 400
 """Lines that are looked at; no preamble of an instrument is nearly as long."""
 NEW_STUDY = "`fes-pin new-study` writes a [columns] table that reads it as it is"
+WIDE = 10
+"""Columns for each row, at least, of a table that looks transposed; the one with the fewest rows that is read has 3."""
 COMMENTS = ("#", "%", "//")
 _NUMBER = {
     ".": re.compile(r"^[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$"),
@@ -65,12 +67,16 @@ def sniffed(path: Path, stated: Mapping[str, Any] = MappingProxyType({})) -> tup
         raise InputError("expected rows of numbers, found none", file=path)
     comment = next((c for line in lines for c in COMMENTS if line.lstrip().startswith(c)), "")
     form = replace(form, comment=comment)
-    first = int(stated.get("first_row", _first_of(lines, rows, form) + 1)) - 1
+    found = max(_first_of(lines, rows, form), int(stated.get("header_row", 0)))
+    first = int(stated.get("first_row", found + 1)) - 1
     above = lines[:first]
     turned = None if "transposed" in stated else _transposed(above, rows, form)
     numbers = [cells_of(lines[place], form) for place, _ in reversed(rows[-2:])]
     header = turned or (Header() if stated.get("transposed") else header_of(above, form, numbers))
-    if {"names", "header_row"} & set(stated):
+    if not turned and not header.row and not header.said and len(numbers[0]) >= WIDE * len(rows):
+        odd = f"{len(rows)} rows of {len(numbers[0])} columns without names: is the table transposed?"
+        header = replace(header, said=(f"{odd} --transposed says so",))
+    if {"names", "header_row", "transposed"} & set(stated):
         header = Header(int(stated.get("header_row", header.row)), rate_hz=header.rate_hz)
     form = replace(form, header_row=header.row, names=header.names, transposed=turned is not None, first_row=first + 1)
     return replace(form, **stated), header

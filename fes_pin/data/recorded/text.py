@@ -22,6 +22,7 @@ DELIMITERS = (";", "\t", ",", " ")
 """Semicolon, tab, comma, and any white space."""
 DECIMALS = (".", ",")
 ENCODINGS = ("utf-8", "utf-16", "cp1252")
+_NUMBER = re.compile(r"^[+-]?[\d.,]+([eE][+-]?\d+)?$")
 MISSING = frozenset({"", "nan", "na", "n/a", "-", "--", "null", "none", "#n/a"})
 """What instruments write where there is no sample, in lower case."""
 
@@ -156,7 +157,9 @@ def _transposed(path: Path, lines: list[str], form: TextForm, wanted: Sequence[s
         found = f"expected lines of {len(cells[0])} values, found {len(cells[odd])}" if odd else "expected numbers"
         raise InputError(found, file=path, row=int(rows[odd]) if odd else form.first_row)
     names = form.names or (names_of(path, lines, form) if form.header_row else ())
-    if not names:
+    if not names and all(_NUMBER.match(row[0]) for row in cells):
+        names = tuple(f"column{k}" for k in range(1, len(cells) + 1))
+    elif not names:
         names, cells = tuple(row[0] for row in cells), [row[1:] for row in cells]
     if len(names) != len(cells):
         raise InputError(f"expected {len(cells)} names of as many lines, found {len(names)}", file=path)
