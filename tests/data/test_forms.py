@@ -73,6 +73,14 @@ def test_a_header_that_a_script_wrote_as_a_list_has_its_names(tmp_path, how, del
     assert np.allclose(np.column_stack(list(read.columns.values())), values, atol=1e-5)
 
 
+@pytest.mark.parametrize(
+    "header", ["time [s],torque cmd [Nm],q [rad]", "t (s),Angle,F (N)", "[s],[deg],[Nm]", "a=(s),b,c(1)"]
+)
+def test_brackets_behind_names_are_no_list(tmp_path, header):
+    path = written(tmp_path / "a.csv", header, values=drawn(1)[1])
+    assert read_recording(path, sniff(path)[0]).names == tuple(header.split(",")) and sniff(path)[0].names == ()
+
+
 @pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("between", [", ", "; ", "\t"])
 def test_names_with_another_delimiter_than_the_numbers(tmp_path, between, seed):

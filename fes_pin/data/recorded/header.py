@@ -131,10 +131,10 @@ def ways(line: str, form: TextForm, others: bool) -> Iterator[list[str]]:
     text = line.strip().removeprefix(form.comment).strip()
     if not text:
         return
-    if listed := re.match(r"^\w*\s*=?\s*[\[(](.*)[\])]$", text):
+    if listed := re.match(r"^(?:\w+\s*=\s*)?[\[(](.*)[\])]$", text):
         inner = listed[1]
-        quoted = re.findall(r"'([^']*)'|\"([^\"]*)\"", inner)
-        if quoted or "," in inner:
+        quoted = re.findall(r"'([^']*)'|\"([^\"]*)\"", inner) if inner.strip()[:1] in ("'", '"') else []
+        if quoted or ("," in inner and not re.search(r"[\[\]()]", inner)):  # `[s],[deg]` is a row of units
             yield [one or other for one, other in quoted] if quoted else [n.strip() for n in inner.split(",")]
     if form.delimiter != " ":
         yield list(cells_in(line, form))
