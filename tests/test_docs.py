@@ -175,7 +175,7 @@ def test_the_page_of_own_recordings_has_every_option_of_new_study():
     page = (DOCS / "own_recordings.md").read_text()
     own = {"files": "", "setting": "set", "force": "", "library": "", "name": ""}
     for name in inspect.signature(new_study).parameters:
-        assert not (option := own.get(name, name)) or f"--{option}" in page, name
+        assert not (option := own.get(name, name.replace("_", "-"))) or f"--{option}" in page, name
 
 
 def test_the_study_format_shows_toml():

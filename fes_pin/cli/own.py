@@ -32,19 +32,8 @@ if TYPE_CHECKING:
 @needs(
     **dict.fromkeys(
         (
-            "urdf",
-            "rig",
-            "name",
-            "column",
-            "setting",
-            "role",
-            "group",
-            "resample",
-            "source",
-            "offset",
-            "split",
-            "fill",
-            "library",
+            *("urdf", "rig", "name", "column", "setting", "role", "group", "resample", "fill", "library"),
+            *("source", "offset", "split", "names", "header_row", "first_row", "transposed"),
         ),
         "files",
     ),
@@ -102,6 +91,12 @@ def new_study(
         str | None, typer.Option(help="Several trials a file: restarts, holes, rests, a column that changes; or none.")
     ] = None,
     fill: Annotated[bool, typer.Option("--fill", help="Fill in short gaps of missing samples.")] = False,
+    names: Annotated[str | None, typer.Option(help="Of the columns of text files: t,angle,torque.")] = None,
+    header_row: Annotated[int | None, typer.Option(min=0, help="Line of the names; 0 for none.")] = None,
+    first_row: Annotated[int | None, typer.Option(min=1, help="Line of the first numbers.")] = None,
+    transposed: Annotated[
+        bool, typer.Option("--transposed", help="Each line of the files holds one quantity.")
+    ] = False,
     force: Annotated[
         bool, typer.Option("--force", help="Write over a study.toml that is there, and a URDF that was changed.")
     ] = False,
@@ -131,7 +126,8 @@ def new_study(
         typer.echo(f"wrote {(out or Path()) / template.name}")
         return
     catalogue, columns, settings = catalogue_with(library), pairs("--column", column), pairs("--set", setting)
-    schema = _schema(rig, catalogue, believed, (columns, resample, fill))
+    form = _form(names, header_row, first_row, transposed)
+    schema = _schema(rig, catalogue, believed, (columns, resample, fill, form))
     if resample == 0.0:
         raise InputError("expected a rate above 0 Hz", column="--resample")
     folder = _folder(files, out, force)
@@ -150,7 +146,9 @@ def new_study(
         sources=pairs("--source", source),
         split=split,
         offsets=offsets_of(pairs("--offset", offset)),
+        form=form,
         ask=_ask if sys.stdin.isatty() and sys.stdout.isatty() else None,
+        say=_say,
     )
     if schema.owner is None:
         made = new_body_study(wanted)
@@ -222,7 +220,8 @@ def _schema(rig: str | None, catalogue: Catalogue, urdf: Path | None, of_rigs: S
     rigs = known_rigs(catalogue.schemas())
     schema = rigs[one_of(rig or "joint", tuple(rigs), partial(InputError, column="--rig"))]
     if schema.owner is None and (urdf is not None or catalogue.origins() or any(of_rigs)):
-        raise InputError("expected no URDF, --column, --resample, --fill or --library for walking", column="--rig")
+        expected = "expected no URDF, --column, --resample, --fill, form of text files or --library for walking"
+        raise InputError(expected, column="--rig")
     if schema.owner is not None and ("urdf" in schema.files) != (urdf is not None):
         wanted = "--urdf FILE, or --pendulum LENGTH MASS, --rod, --slide or --wheel" if urdf is None else "no URDF"
         raise InputError(f"expected {wanted} for rig {schema.name}", column="--urdf")
@@ -230,6 +229,26 @@ def _schema(rig: str | None, catalogue: Catalogue, urdf: Path | None, of_rigs: S
         schema.check_files({"urdf": urdf})
         check_inertias(urdf)
     return schema
+
+
+def _form(
+    names: str | None, header_row: int | None, first_row: int | None, transposed: bool
+) -> dict[str, str | int | bool | tuple[str, ...]]:
+    """What was said of how text files are written, by the keys of [columns.file]."""
+    given = {
+        "names": None if names is None else tuple(name.strip() for name in names.split(",")),
+        "header_row": header_row,
+        "first_row": first_row,
+        "transposed": transposed or None,
+    }
+    if header_row is not None and first_row is not None and first_row <= header_row:
+        raise InputError(f"expected a line below the header in line {header_row}", column="--first-row")
+    return {key: value for key, value in given.items() if value is not None}
+
+
+def _say(text: str) -> None:
+    release_output()
+    print_text(text)
 
 
 def _ask(question: str) -> str:

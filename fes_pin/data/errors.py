@@ -5,7 +5,7 @@ A library that comes with an extra of the package, and is not installed, raises 
 
 import importlib
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -43,6 +43,17 @@ class InputError(ValueError):
             place.append(f"column {column}" if self.row is not None else column)
         line = as_text(f"{', '.join(place)}: {self.message}" if place else self.message)
         return line if line.isprintable() else "".join(each if each.isprintable() else " " for each in line)
+
+
+MOST_LISTED = 10
+"""Names that a message lists at most: as many as a person looks through."""
+
+
+def listed(names: Sequence[str], between: str = ", ") -> str:
+    """Names in one line, at most `MOST_LISTED` of them: `a, b, ... and 390 more`."""
+    if len(names) <= MOST_LISTED:
+        return between.join(names)
+    return f"{between.join(names[:MOST_LISTED])} ... and {len(names) - MOST_LISTED} more"
 
 
 class InputWarning(UserWarning):

@@ -2,13 +2,14 @@
 
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import read_text
-from fes_pin.data.recorded.text import TextForm, read_csv, read_text_recording
+from fes_pin.data.recorded.text import TextForm, names_of, read_csv, table_of_lines
 from fes_pin.data.schema import is_like, unknown
 from fes_pin.data.table import Table, check_time
 
@@ -32,6 +33,9 @@ _OPENSIM_GROUND = re.compile(
 )
 STORAGE = (".mot", ".sto")
 """Suffixes of OpenSim's files, whose columns have its own names."""
+MARKERS = (".c3d", ".trc")
+"""Suffixes of files of markers."""
+NO_ANGLES = "holds markers: OpenSim's inverse kinematics makes joint coordinates of them, and its .mot is read here"
 APART_M = 0.02
 """Least sideways distance of two plates' centres of pressure that identifies the right foot's."""
 BENT_RAD, BACK_RAD = 0.7, -0.26
@@ -54,6 +58,8 @@ def read_motion(path: str | Path) -> tuple[Table, bool | None]:
         As `read_csv` and `check_time`; a header without `endheader`, or that states another number of rows.
     """
     path = Path(path)
+    if path.suffix.lower() in MARKERS:
+        raise InputError(f"{path.suffix} {NO_ANGLES}", file=path)
     table, in_degrees = _read_storage(path) if is_storage(path) else (read_csv(path), False)
     if table.names[0] not in ("time", "time_s"):
         raise table.error(f"expected time_s or time as the first column, found {table.names[0][:40]}", "time_s")
@@ -66,23 +72,33 @@ def is_storage(path: Path) -> bool:
     return path.suffix.lower() in STORAGE
 
 
+def is_rotation(label: str) -> bool:
+    """True of a column of OpenSim's files whose unit `inDegrees` states: no translation, force or moment."""
+    return not re.search(
+        r"(^time$|_t[xyz]$|_t[xyz]/|force|torque|moment|activation|excitation|_[vp][xyz]$)", label.lower()
+    )
+
+
 def _read_storage(path: Path) -> tuple[Table, bool | None]:
-    lines = read_text(path).split("\n")
+    """A file as OpenSim writes it, or a spreadsheet that has saved it: with commas or semicolons, some at line ends."""
+    lines = [line.replace('"', "").rstrip(" ,;\r") for line in read_text(path).split("\n")]
     end = next((i for i, line in enumerate(lines) if line.strip().lower() == "endheader"), None)
     if end is None:
         raise InputError("expected a line endheader, as OpenSim writes it", file=path, row=len(lines))
     header = next((i for i in range(end + 1, len(lines)) if lines[i].strip()), None)
     if header is None:
         raise InputError("expected column labels after endheader", file=path, row=len(lines))
-    table = read_text_recording(path, TextForm(" ", header_row=header + 1, first_row=header + 2, strict=True))
+    delimiter = next((sign for sign in ";," if sign in lines[header]), " ")
+    decimal = "," if delimiter == ";" and any("," in line for line in lines[header + 1 :]) else "."
+    form = TextForm(delimiter, decimal, header_row=header + 1, first_row=header + 2, strict=True)
+    table = table_of_lines(path, lines, names_of(path, lines, form), form)
     keys = {}
     for line in lines[:end]:
         key, _, value = line.partition("=") if "=" in line else line.strip().partition(" ")
         keys[key.strip().lower()] = value.strip()
     rows = keys.get("nrows", keys.get("datarows"))
     if rows is not None and rows != str(len(table)):
-        message = f"expected {rows} rows as the header says, found {len(table)}"
-        raise table.error(message, table.names[0], len(table) - 1)
+        table = replace(table, said=(f"the header of {path.name} says {rows[:20]} rows, and there are {len(table)}",))
     return table, {"yes": True, "no": False}.get(keys.get("indegrees", "").lower())
 
 

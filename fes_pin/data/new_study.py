@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from fes_pin.data.as_read import HeldFile
-from fes_pin.data.errors import InputError, fault_at
+from fes_pin.data.errors import InputError, fault_at, listed
 from fes_pin.data.files import inside, read_bytes
 from fes_pin.data.new_view import APART, Recorded, free_part, recorded, view_keys
 from fes_pin.data.recorded.columns import INTERPOLATE
@@ -22,7 +22,7 @@ from fes_pin.data.recorded.text import TextForm
 from fes_pin.data.recorded.view import INTEGRATED
 from fes_pin.data.schema import NumberKey, any_number, check_known, one_of, unknown
 from fes_pin.data.study_text import HEADER, columns_text, form_in_words, source_from_option, source_in_words, toml_table
-from fes_pin.data.units import factor_of, known_unit, own_unit, quantities_of
+from fes_pin.data.units import factor_of, known_unit, own_unit, quantities_of, stated_unit
 from fes_pin.data.wanted import Wanted, labels_of, number_set, of_files
 
 
@@ -36,16 +36,16 @@ class NewStudy:
         By path below the study's folder: `study.toml`, and what is copied there.
     taken
         The rig's column, the file's name of it and its unit, as a person wants to see them.
-    said
-        What is odd about the files' times, and which part of them is proposed, a sentence each.
     origins
         Where each recording, and the URDF, lies, by its path below the study's folder.
+    said
+        What is odd about the recordings, and how they are taken, a sentence each.
     """
 
     contents: Mapping[str, str | bytes]
     taken: tuple[tuple[str, str, str], ...]
-    said: tuple[str, ...]
     origins: Mapping[str, Path]
+    said: tuple[str, ...] = ()
 
 
 Guess = Callable[[Mapping[str, float], Collection[str]], Mapping[str, float]]
@@ -66,7 +66,12 @@ def new_study(wanted: Wanted, guess: Guess) -> NewStudy:
     InputError
         A recording that cannot be read; what the files do not say and no option does, all of it in one line.
     """
-    return _Making(wanted).made(guess)
+    while True:
+        making = _Making(wanted)
+        made = making.made(guess)
+        if made is not None:
+            return made
+        wanted = making.answered()
 
 
 def with_kind(made: NewStudy, kind: str) -> NewStudy:
@@ -82,17 +87,20 @@ class _Making:
 
     def __init__(self, wanted: Wanted) -> None:
         self.wanted, self.schema = wanted, wanted.schema
-        self.missing: list[str] = []
+        self.missing: dict[str, str] = {}
+        """What nobody has said, as options, and what is asked for it, by `column NAME` or `set KEY`."""
         self.own = of_files(wanted.files, "--set", wanted.settings)
-        each = [propose(path, self.schema, wanted.revolute) for path in wanted.files]
+        chosen = tuple(wanted.columns.values())
+        each = [propose(p, self.schema, wanted.revolute, wanted.form, chosen) for p in wanted.files]
         self.trials = recorded(each, self.schema, wanted.sources)
         self.proposals = [one.proposal for one in self.trials]
         self.names = tuple(dict.fromkeys(n for p in self.proposals for n in p.recording.names))
         check_known(wanted.columns, self.schema.columns, fault_at("--column"))
         self.derived = {n: source for n, source in INTEGRATED.items() if self._is_integrated(n, source)}
-        self.said: list[str] = []
+        self.of_views: list[str] = []
 
-    def made(self, guess: Guess) -> NewStudy:
+    def made(self, guess: Guess) -> NewStudy | None:
+        """The study; None where something is missing and a person can be asked."""
         kinds = [self._kind(p) for p in self.proposals]
         columns = self._sources(set(kinds))
         times = self._times(columns)
@@ -100,8 +108,10 @@ class _Making:
         trials = [self._trial(p, kind) for p, kind in zip(self.proposals, kinds, strict=True)]
         known, start = self._start(guess, {**rig, **passive}, [*columns, *self.derived])
         self._check_settings(sorted(set(kinds)))
+        if self.missing and self.wanted.ask is not None:
+            return None
         if self.missing:
-            raise InputError("the files do not say everything; please add " + ", ".join(dict.fromkeys(self.missing)))
+            raise self._incomplete()
         contents: dict[str, str | bytes] = {}
         files = self._urdf(contents)
         places = {path: placed(path, self.wanted.folder, contents, "trials/") for path in self.wanted.files}
@@ -122,7 +132,67 @@ class _Making:
         origins = {place: path for path, place in places.items()}
         if self.wanted.urdf is not None:
             origins[files["urdf"]] = self.wanted.urdf
-        return NewStudy(contents, taken, tuple(self.said), origins)
+        return NewStudy(contents, taken, origins, (*self.said(times), *self.of_views))
+
+    def said(self, times: Mapping[str, Mapping[str, Any]]) -> tuple[str, ...]:
+        """What is odd about all files, and how they are taken; a sentence of several files once."""
+        by_sentence: dict[str, list[str]] = {}
+        for source, proposal in (one for trial in self.trials for one in trial.files.items()):
+            sentences = [*proposal.said]
+            if "rate_hz" in times.get(source, {}) and "time_s" not in self.wanted.columns:
+                sentences.append(f"no column of times: {proposal.rate_hz:g} Hz is what the header says")
+            for sentence in sentences:
+                by_sentence.setdefault(sentence, []).append(proposal.recording.path.name)
+        return tuple(f"{listed(names)}: {sentence}" for sentence, names in by_sentence.items())
+
+    def _incomplete(self) -> InputError:
+        odd = "".join(f"{sentence}; " for sentence in self.said({}))
+        return InputError(f"{odd}the files do not say everything; please add {', '.join(self.missing.values())}")
+
+    def answered(self) -> Wanted:
+        """What is wanted, with what a person answers: all that is odd is said once, then each thing asked for.
+
+        Raises
+        ------
+        InputError
+            A needed answer is empty; then all that is missing is in one line.
+        """
+        wanted = self.wanted
+        if wanted.say is not None:
+            wanted.say("\n".join([*self.said({}), "what the files do not say:", *self.missing.values()]))
+        columns, settings = dict(wanted.columns), dict(wanted.settings)
+        for key, what in self.missing.items():
+            table, _, name = key.partition(" ")
+            answer = self._answer(table, name, what)
+            if table == "column":
+                columns[name] = answer.removeprefix(f"{name}=")
+            else:
+                settings[name] = answer.rpartition("=")[2].strip()
+        return replace(wanted, columns=columns, settings=settings)
+
+    def _answer(self, table: str, name: str, what: str) -> str:
+        """A person's answer that is understood; one that is not is asked for again, with the reason."""
+        ask, why = self.wanted.ask, ""
+        if ask is None:
+            raise self._incomplete()
+        question = what.removeprefix("--column ").removeprefix("--set ")
+        while True:
+            answer = ask(f"{why}{question}").strip()
+            if not answer and "or nothing:" not in what:
+                raise self._incomplete()
+            try:
+                if table == "column":
+                    self._stated(name, answer.removeprefix(f"{name}="))
+                else:
+                    self._understood(name, answer.rpartition("=")[2].strip())
+                return answer
+            except InputError as error:
+                why = f"{error.message}; "
+
+    def _understood(self, key: str, text: str) -> None:
+        last = key.rpartition(":")[2].removeprefix("rig.")
+        tables = (self.schema.constants, self.schema.passive, self.schema.start, self.schema.conditions)
+        number_set(last, text, next(table[last] for table in tables if last in table))
 
     def _trial_keys(
         self,
@@ -145,7 +215,7 @@ class _Making:
                 one.path.name, next(iter(seconds.values())), one.proposal.recording.columns[position]
             )
             said += more
-        self.said += said
+        self.of_views += said
         view |= {"derive": self.derived} if self.derived else {}
         whole = {"sources": files} if one.is_joined else {"file": files[""]}
         paths = [p.recording.path for p in one.files.values()]
@@ -184,10 +254,13 @@ class _Making:
         if option.startswith("rate=") or option.rpartition(":")[0] in names or option in names:
             return source_from_option("time_s", option, names)
         candidates = tuple(dict.fromkeys(n for p in proposals for n in p.candidates["time_s"]))
+        rates = {p.rate_hz for p in proposals}
+        if not candidates and len(rates) == 1 and None not in rates:
+            return {"rate_hz": next(iter(rates))}
         if len(candidates) != 1:
             could = " or ".join(candidates or names)
             return self._asked("time_s", f"--column time_s=NAME:UNIT (of {source}: {could})") or {}
-        found = self._with_unit("time_s", f"{source}{APART}{candidates[0]}") or {}
+        found = self._with_unit("time_s", f"{source}{APART}{candidates[0]}", is_needed=True) or {}
         return found | {"name": candidates[0]}
 
     def _columns_text(
@@ -196,7 +269,8 @@ class _Making:
         """Lines of [columns], or of a table [sources.NAME] for each source."""
         options = {"resample_hz": self.wanted.resample_hz, "missing": INTERPOLATE if self.wanted.fill else None}
         if not self.trials[0].is_joined:
-            return columns_text(columns, self.names, self._one_form(""), options)
+            is_plain = not any(p.recording.said for p in self.proposals)
+            return columns_text(columns, self.names, self._one_form(""), options, is_plain=is_plain)
         text = []
         for source, time in times.items():
             before = f"{source}{APART}"
@@ -250,54 +324,81 @@ class _Making:
         return {column: source for column, source in sources.items() if source is not None}
 
     def _candidates(self, column: str) -> tuple[str, ...]:
-        return tuple(dict.fromkeys(n for p in self.proposals for n in p.candidates[column]))
+        """Columns of the files that could be this one, without those that a person named for another."""
+        named = [words for other, words in self.wanted.columns.items() if other != column]
+        found = dict.fromkeys(n for p in self.proposals for n in p.candidates[column])
+        return tuple(n for n in found if not any(w == n or w.startswith((f"{n}:", f"{n},")) for w in named))
 
     def _source(self, column: str, is_needed: bool) -> dict[str, Any] | None:
         if (option := self.wanted.columns.get(column)) is not None:
             return self._stated(column, option)
         candidates = self._candidates(column)
+        rates = {p.rate_hz for p in self.proposals}
+        if column == "time_s" and not candidates and len(rates) == 1 and None not in rates:
+            return {"rate_hz": next(iter(rates))}
         if len(candidates) != 1:
             if not is_needed and len(candidates) < 2:
                 return None
-            could = f"{' or '.join(candidates)}" if candidates else f"one of {', '.join(self.names)}"
+            could = listed(candidates, " or ") if candidates else f"one of {listed(self._with_units())}"
             what = f"--column {column}=NAME:UNIT ({could}"
             return self._asked(column, f"{what}; or nothing: --column {column}=)" if not is_needed else f"{what})")
-        return self._with_unit(column, candidates[0])
+        return self._with_unit(column, candidates[0], is_needed)
 
-    def _with_unit(self, column: str, name: str) -> dict[str, Any] | None:
+    def _with_units(self) -> list[str]:
+        """All columns of the files, each with the unit that they state in brackets behind it."""
+        units = {name: self._unit_of(name) for name in self.names}
+        return [f"{name} ({unit})" if unit and unit not in name else name for name, unit in units.items()]
+
+    def _with_unit(self, column: str, name: str, is_needed: bool) -> dict[str, Any] | None:
         """The column of that name, and the unit that it seems to be in."""
-        unit = self._unit_of(name)
+        _, unit = stated_unit(name, self._unit_of(name))
+        unit = unit or self._unit_of(name)
         quantities = quantities_of(column, self.wanted.revolute)
         bare = name.partition(APART)[2] if self.trials[0].is_joined else name
-        if bare == column or not quantities or quantities == ("pulses",):
+        is_own = bare == column and unit in ("", stated_unit(bare)[1])
+        if is_own or not quantities or quantities == ("pulses",):
             return {"name": name}
         if unit:
             if (found := known_unit(unit, quantities)) is not None:
                 return {"name": name, "unit": found[1]}
-            return self._asked(column, f"--column {column}={name},scale=NUMBER ({own_unit(column)} for each {unit})")
+            own = own_unit(column, self.wanted.revolute)
+            nothing = "" if is_needed else f"; or nothing: --column {column}="
+            return self._asked(column, f"--column {column}={name},scale=NUMBER ({own} for each {unit}{nothing})")
         units = own_unit(column, self.wanted.revolute)
         return self._asked(column, f"--column {column}={name}:UNIT ({self._range(name)}: {units}, or which unit?)")
 
     def _range(self, name: str) -> str:
         values = [p.recording.columns[name] for p in self.proposals if name in p.recording.columns]
-        low, high = (f(np.concatenate(values)) for f in (np.nanmin, np.nanmax))
-        return f"{low:.4g} to {high:.4g}"
+        there = np.concatenate(values)
+        there = there[np.isfinite(there)]
+        return f"{there.min():.4g} to {there.max():.4g}" if len(there) else "no number"
 
     def _asked(self, column: str, what: str) -> dict[str, Any] | None:
-        if self.wanted.ask is None:
-            self.missing.append(what)
-            return None
-        answer = self.wanted.ask(what.removeprefix("--column ")).strip().removeprefix(f"{column}=")
-        return self._stated(column, answer)
+        self.missing[f"column {column}"] = what
+        return None
 
     def _stated(self, column: str, words: str) -> dict[str, Any] | None:
         """A column as the user states it, in the unit of the file where the user names none."""
-        source = source_from_option(column, words, self.names) if words else None
+        try:
+            source = source_from_option(column, words, self.names) if words else None
+        except InputError as error:
+            odd = "".join(f"; {sentence}" for sentence in self.said({}))
+            raise InputError(f"{error.message}{odd}", column=error.column) from None
+        if source is not None and "unit" in source:
+            factor_of(source["unit"], column, self.wanted.revolute, partial(InputError, column=f"--column {column}"))
         if source is None or source.keys() & {"unit", "rate_hz", "edge"}:
             return source
-        stated = known_unit(self._unit_of(source["name"]), quantities_of(column, self.wanted.revolute))
-        if stated is None or stated[1] == own_unit(column, self.wanted.revolute):
+        quantities = quantities_of(column, self.wanted.revolute)
+        quantity, unit = stated_unit(source["name"], self._unit_of(source["name"]))
+        stated = known_unit(unit, quantities)
+        if stated is not None and stated[1] == own_unit(column, self.wanted.revolute):
             return source
+        if stated is None:
+            if "scale" in source or not (quantity or unit) or column == "stim" or not quantities:
+                return source
+            what = f"a {quantity} in {unit}" if quantity else unit
+            message = f"the file says {what}: expected NAME:UNIT, or NAME,scale=NUMBER ({own_unit(column)} for each)"
+            raise InputError(f"{message}, found {words!r}", column=f"--column {column}")
         if abs(source.get("scale", 1.0)) != 1.0:
             message = f"a scale, and the file says {stated[1]}: expected NAME:UNIT,scale=NUMBER, found {words!r}"
             raise InputError(message, column=f"--column {column}")
@@ -311,10 +412,9 @@ class _Making:
         """A number that somebody gave, by its key in the study; empty, and it is missing, if nobody has."""
         text = (self.own.get((path, key)) if path else None) or self.wanted.settings.get(key)
         place = f"{path.name}:" if path and len(self.proposals) > 1 else ""
-        if text is None and self.wanted.ask is not None:
-            text = self.wanted.ask(f"{place}{key}{f' in {number.unit}' if number.unit else ''}").strip()
         if not text:
-            self.missing.append(f"--set {place}{key}=NUMBER{f' ({number.unit})' if number.unit else ''}")
+            what = f"--set {place}{key}=NUMBER{f' ({number.unit})' if number.unit else ''}"
+            self.missing[f"set {path}:{key}" if place else f"set {key}"] = what
             return {}
         return {key.removeprefix("rig."): number_set(key, text, number)}
 

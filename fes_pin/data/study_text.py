@@ -12,7 +12,7 @@ from typing import Any
 
 from fes_pin.data.as_read import HeldFile
 from fes_pin.data.checks import check_constants, checked_label
-from fes_pin.data.errors import InputError, KeyFault
+from fes_pin.data.errors import InputError, KeyFault, listed
 from fes_pin.data.files import hold, read_json
 from fes_pin.data.numbers import in_full, number_in
 from fes_pin.data.recorded.columns import SOURCE_KEYS, Columns, columns_of
@@ -140,9 +140,13 @@ def toml_table(
 
 
 def toml_value(value: Any) -> str:
-    """A string, a number, or a table in one line, as TOML."""
+    """A string, a number, a truth, a list of them, or a table in one line, as TOML."""
     if isinstance(value, Mapping):
         return inline_table(value)
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(toml_value, value))}]"
+    if isinstance(value, bool):
+        return str(value).lower()
     return quoted(value) if isinstance(value, str) else repr(value) if isinstance(value, int) else in_full(value)
 
 
@@ -162,21 +166,31 @@ def columns_text(
     form: TextForm | None,
     options: Mapping[str, Any],
     where: str = "columns",
+    is_plain: bool = True,
 ) -> list[str]:
     """Lines of [columns], or of [sources.NAME], and of its table `file` with the options that are set.
 
-    There are none of [columns] where all is as by default.
+    Parameters
+    ----------
+    where
+        Name of the table.
+    is_plain
+        Whether no [columns] are written where all is as by default: nothing in the files is read in a way of its own.
     """
     used = {source["name"] for source in sources.values() if "name" in source}
     ignored = [name for name in names if name not in used]
-    plain = all(source == {"name": column} for column, source in sources.items()) and tuple(names[:1]) == ("time_s",)
-    if where == "columns" and plain and form == TextForm() and not ignored and not any(options.values()):
+    as_named = all(source == {"name": column} for column, source in sources.items())
+    plain = is_plain and where == "columns" and as_named and tuple(names[:1]) == ("time_s",)
+    if plain and form == TextForm() and not ignored and not any(options.values()):
         return []
     out = ["", f"[{where}]  # the rig's columns, as the recordings call them, and their units there"]
     out += [f"{column} = {inline_table(source)}" for column, source in sources.items()]
     out += [f"ignored = [{', '.join(map(quoted, ignored))}]"] if ignored else []
     about: dict[str, Any] = {k: v for k, v in options.items() if v is not None}
-    about |= {k: v for k, v in asdict(form or TextForm()).items() if v != getattr(TextForm(), k)}
+    form = form or TextForm()
+    about |= {k: v for k, v in asdict(form).items() if v != getattr(TextForm(), k)}
+    if form.first_row != form.header_row + 1:
+        about["first_row"] = form.first_row
     return out + toml_table(f"{where}.file", about, "how the recordings are written")
 
 
@@ -197,7 +211,7 @@ def source_from_option(column: str, option: str, names: Sequence[str]) -> dict[s
     name, colon, unit = first.rpartition(":") if first not in names else (first, "", "")
     out: dict[str, Any] = {"name": name if colon else first} | ({"unit": unit} if unit and colon else {})
     if out["name"] not in names:
-        raise error(f"expected a column of the files, one of {', '.join(names)}; found {out['name']!r}")
+        raise error(f"expected a column of the files, one of {listed(names)}; found {out['name']!r}")
     for pair in more:
         key, equals, value = pair.partition("=")
         if not equals or key not in SOURCE_KEYS:

@@ -6,12 +6,12 @@ nanometre.
 """
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
 
-from fes_pin.data.schema import without_unit
+from fes_pin.data.schema import MEANT, without_unit
 from fes_pin.data.table import own_table
 
 _TABLE = own_table(Path(__file__).with_name("units.csv"))
@@ -25,7 +25,17 @@ INCH, POUND = UNITS["length"]["in"], UNITS["force"]["lbf"]
 _SPELLINGS: dict[str, str] = {}
 """Other spellings, as measuring systems write them, in the form that `_plain` leaves."""
 
+CURRENTS = frozenset({"current", "amps", "ampere", "amperes", "strom", "courant", "corrente", "corriente"})
+"""Words for an electric current: no effort without a scale, and no pulse width."""
+LONGEST = 12
+"""Characters of the longest unit in a row that also has known ones; `revolutions` has 11."""
+SPELT_OUT = 4
+"""Characters that a name has more of which is itself a unit: `Microseconds`, but not `in` or `rev`."""
+_IN_NAMES = tuple(q for q in UNITS if q not in ("pressure", "power", "temperature", "counts"))
+"""Quantities whose units are looked for at the end of names; the others' are words, as the `bar` of a linkage."""
+
 _BY_SUFFIX = {"s": "time", "us": "pulse width", "rad": "angle", "m": "length", "n": "force", "nm": "torque"}
+_HELD = {*_BY_SUFFIX.values(), "angular rate", "speed", "pulses"}
 _OF_A_JOINT = {"position": ("angle", "length"), "velocity": ("angular rate", "speed"), "effort": ("torque", "force")}
 
 
@@ -92,17 +102,79 @@ def factor_of(
     raise error(f"expected a unit of {' or '.join(quantities)}: {', '.join(expected)}; found {unit[:40]!r}")
 
 
-def unit_in_name(name: str, column: str, revolute: bool | None = None) -> str:
-    """The unit in brackets behind a name, where it is one of the quantity of a rig's column; "" where there is none."""
-    found = _BRACKETED.match(name.strip())
-    known = known_unit(found["unit"], quantities_of(column, revolute)) if found and found["unit"] else None
-    return known[1] if known else ""
+def stated_unit(name: str, unit: str = "") -> tuple[str, str]:
+    """Quantity and unit that a file states of a column: in `unit`, else in its name; a current that says so has A.
+
+    The quantity is "" of a unit that no table here knows; both are "" where nothing is stated.
+    """
+    bare, in_name = split_header(name)
+    if (text := unit or in_name) and (known := known_unit(text, tuple(UNITS))):
+        return known
+    if not unit and CURRENTS & words_of(bare):
+        return "current", "A"
+    return "", unit if unit != in_name else ""  # what stands in brackets in a name need be no unit: `Angle [left]`
+
+
+def may_be(column: str, name: str, unit: str = "", revolute: bool | None = None) -> bool:
+    """Return whether a recorded column may be a rig's: False where it states a unit of another quantity.
+
+    A sensor may log any quantity in volts or counts, and a motor's torque is its current times a constant.
+    """
+    quantity, stated = stated_unit(name, unit)
+    if not quantity or known_unit(unit or stated, quantities_of(column, revolute)) is not None:
+        return True
+    return quantity in ("voltage", "counts", "share") or (quantity == "current" and column == "effort")
+
+
+def words_of(name: str) -> frozenset[str]:
+    """Lower-case words of a name: `Motor Torque`, `motorTorque`, `knee.angle`."""
+    apart = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)
+    return frozenset(w for w in re.split(r"[^a-z0-9]+", apart.lower()) if w)
+
+
+def bare_unit(cell: str) -> str:
+    """The unit that a cell of a row of units states; "" of one that has none."""
+    bare = cell.strip("[](){} ")
+    return "" if bare in ("-", "1") else bare
+
+
+def are_units(cells: Sequence[str], names: Sequence[str] = ()) -> bool:
+    """Return whether cells are a row of units: all in brackets, or all known, or below names half of them.
+
+    Parameters
+    ----------
+    names
+        The row of names that it belongs to, where that is known; units may then be of no table here (counts, LSB).
+    """
+    stated = [(k, unit) for k, cell in enumerate(cells) if (unit := bare_unit(cell))]
+    if not stated:
+        return False
+    if all(cell.strip()[:1] in ("[", "(", "{") for cell in cells if cell.strip()):
+        return True
+    known = [(k, unit) for k, unit in stated if known_unit(unit, tuple(UNITS))]
+    if len(known) == len(stated):
+        return True
+    if len(names) != len(cells) or any(len(unit) > LONGEST for _, unit in stated):
+        return False
+    return 2 * len(known) >= len(stated) or any(is_unit_of(unit, names[k]) for k, unit in known)
+
+
+def is_unit_of(unit: str, name: str) -> bool:
+    """True of a unit that measures what a word of a name is for: `ms` of `Time`."""
+    columns = (column for column, words in MEANT.items() if words & words_of(name))
+    return any(known_unit(unit, quantities_of(column)) for column in columns)
 
 
 def own_unit(column: str, revolute: bool | None = None) -> str:
     """The unit that the study format has in a column; "" where it has none."""
     units = [next(iter(UNITS[q])) for q in quantities_of(column, revolute)]
     return " or ".join(u for u in units if u != "1")
+
+
+def _ends_a_name(unit: str) -> bool:
+    """True of a unit at the end of a name; one letter there may be an index, but for a rig's units: `leg_a`."""
+    known = known_unit(unit, _IN_NAMES)
+    return known is not None and (known[0] in _HELD or len(unit) > 1 or not unit.isalnum())
 
 
 _BRACKETED = re.compile(r"^(?P<name>.*?)\s*[\[(<{]\s*(?P<unit>[^\])>}]*?)\s*[\])>}]\s*$")
@@ -122,10 +194,15 @@ def split_header(header: str) -> tuple[str, str]:
         return found["name"].strip(), found["unit"]
     for separator in ("/", "_", " ", "-", "."):
         name, at, unit = text.rpartition(separator)
-        if separator == "_" and at and "_" in name and unit.lower() in ("s",):  # rad_s, m_s: per second
-            before, _, per = name.rpartition("_")
+        if separator in "/_" and at and separator in name and unit.lower() in ("s",):  # rad_s, m/s: per second
+            before, _, per = name.rpartition(separator)
             if before and known_unit(f"{per}/{unit}", tuple(UNITS)):
                 return before, f"{per}/{unit}"
-        if at and name and known_unit(unit, tuple(UNITS)):
+        if at and name and _ends_a_name(unit):
             return name.strip(), unit
+    camel = re.match(r"^(.*[a-z])([A-Z][A-Za-z]+)$", text)  # CurrentKG, angleDeg
+    if camel and _ends_a_name(camel[2]):
+        return camel[1], camel[2]
+    if len(text) > SPELT_OUT and _ends_a_name(text):  # Microseconds
+        return text, text
     return text, ""

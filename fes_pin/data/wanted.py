@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from functools import cached_property, partial
 from glob import escape
 from pathlib import Path
+from typing import Any
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import number_in
@@ -45,8 +46,12 @@ class Wanted:
         By the name of a source the pattern of its files, where a trial has several.
     split, offsets
         See `[[trial]]`; None and empty where nothing was said.
+    form
+        What was said of how text files are written, by the keys of `[columns.file]`.
     ask
         None where nobody can be asked.
+    say
+        Prints something before a person is asked; None where nothing is printed.
     """
 
     files: tuple[Path, ...]
@@ -63,7 +68,9 @@ class Wanted:
     sources: Mapping[str, str] = field(default_factory=dict)
     split: str | None = None
     offsets: Mapping[str, float | str] = field(default_factory=dict)
+    form: Mapping[str, Any] = field(default_factory=dict)
     ask: Ask | None = None
+    say: Callable[[str], None] | None = None
 
     @cached_property
     def revolute(self) -> bool | None:

@@ -102,7 +102,6 @@ def test_paths_of_a_states_file(folder):
 BAD = {  # file, old, new, blamed, row, key, words
     "no_endheader": ("coords.mot", "endheader", "end", "coords.mot", 15, None, "endheader"),
     "no_unit": ("coords.mot", "inDegrees=yes", "inRadians=no", "coords.mot", 1, None, "inDegrees=yes"),
-    "rows": ("coords.mot", "nRows=7", "nRows=8", "coords.mot", 14, "time", "expected 8 rows"),
     "no_coordinate": ("coords.mot", "pelvis_tilt", "spine", "coords.mot", 7, "pelvis_tilt", "missing"),
     "coordinate_typo": ("coords.mot", "knee_angle_r", "knee_angel_r", "coords.mot", 7, "knee_angle_r", "knee_angel_r"),
     "text": ("coords.mot", "0.0166666667", "x", "coords.mot", 9, "time", "'x'"),

@@ -8,15 +8,18 @@ from typing import Any
 
 import numpy as np
 
-from fes_pin.data.errors import KeyFault
+from fes_pin.data.errors import KeyFault, listed
 from fes_pin.data.recorded.formats import read_recording
 from fes_pin.data.recorded.regular import check_steps, filled, resampled
 from fes_pin.data.recorded.text import DECIMALS, DELIMITERS, ENCODINGS, TextForm
 from fes_pin.data.schema import RigSchema, any_number, check_known, one_of, positive, unknown
 from fes_pin.data.table import Table
-from fes_pin.data.units import factor_of, unit_in_name
+from fes_pin.data.units import factor_of, known_unit, quantities_of, stated_unit
 
-FILE_KEYS = ("delimiter", "decimal", "header_row", "first_row", "comment", "encoding", "resample_hz", "missing")
+FILE_KEYS = (
+    *("delimiter", "decimal", "header_row", "first_row", "comment", "encoding", "names", "transposed"),
+    *("resample_hz", "missing"),
+)
 SOURCE_KEYS = ("name", "unit", "scale", "zero", "edge", "rate_hz")
 INTERPOLATE = "interpolate"
 
@@ -39,6 +42,8 @@ class ColumnSource:
         Of `stim`: a pulse begins where the recording rises above this.
     rate_hz
         Of `time_s`: the sample rate of a file without times.
+    is_stated
+        Whether a person said what the numbers are: a unit, a scale, an edge.
     """
 
     name: str
@@ -47,6 +52,7 @@ class ColumnSource:
     zero: float = 0.0
     edge: float | None = None
     rate_hz: float | None = None
+    is_stated: bool = False
 
     def __call__(self, recorded: np.ndarray) -> np.ndarray:
         """The study's numbers of what was recorded, shape (n,)."""
@@ -138,8 +144,7 @@ class Columns:
                 continue
             if source.name and source.name not in recording.names:
                 if column in needed:
-                    has = ", ".join(recording.names)[:200]
-                    message = f"missing; [columns] takes {column} from it, and this file has {has}"
+                    message = f"missing; [columns] takes {column} from it, and this file has {listed(recording.names)}"
                     raise recording.error(message, source.name)
                 continue
             taken[column] = source
@@ -151,6 +156,10 @@ class Columns:
                 expected = f"this rig reads {', '.join(known)}"
                 raise recording.error(f"expected it in [columns], or there among `ignored`; {expected}", name)
             taken[name] = ColumnSource(name)
+        for column, source in taken.items():
+            unit = recording.units.get(source.name, "")
+            if not source.is_stated and unit and (why := _unsaid(column, source.name, unit)):
+                raise recording.error(why, source.name)
         return {c: taken[c] for c in ("time_s", *(n for n in taken if n != "time_s")) if c in taken}
 
     def _time(self, recording: Table, source: ColumnSource | None) -> tuple[np.ndarray, float]:
@@ -242,11 +251,32 @@ def _source(column: str, value: Any, revolute: bool | None, error: KeyFault) -> 
         raise error(f"{column}.unit", "expected a unit as text")
     if rate is None and (not isinstance(name, str) or not name):
         raise error(f"{column}.name", "expected the name of a column of the files")
-    stated = "" if unit or "scale" in numbers else unit_in_name(name, column, revolute)
-    if stated and factor_of(stated, column, revolute) != 1.0:
-        raise error(f"{column}.unit", f"missing, and the name says {stated}: expected the unit of the numbers")
+    is_stated = bool(unit) or bool({"scale", "edge", "rate_hz"} & set(numbers))
+    if name != column and not is_stated and (why := _unsaid(column, name, "", revolute)):
+        raise error(f"{column}.unit", why)
     factor = factor_of(unit, column, revolute, partial(error, f"{column}.unit")) if unit else 1.0
-    return ColumnSource(name, factor, **numbers)
+    return ColumnSource(name, factor, **numbers, is_stated=is_stated)
+
+
+def _unsaid(column: str, name: str, unit: str, revolute: bool | None = None) -> str:
+    """What is missing where a file states other numbers than a rig's column holds; "" where they may be the same.
+
+    Parameters
+    ----------
+    unit
+        As the file states it apart from the name; "" where it states none.
+    """
+    quantity, stated = stated_unit(name, unit)
+    if not quantity and not stated:
+        return ""
+    says = "the file" if unit else "the name"
+    known = known_unit(stated, quantities_of(column, revolute))
+    if known is not None:
+        is_own = factor_of(stated, column, revolute) == 1.0
+        return "" if is_own else f"missing, and {says} says {stated}: expected the unit of the numbers"
+    if not quantities_of(column, revolute) or (column == "stim" and quantity != "current"):
+        return ""
+    return f"missing, and {says} says {f'a {quantity}, {stated}' if quantity else stated}: expected a unit or a scale"
 
 
 def _with_file(columns: Columns, about: Mapping[str, Any], error: KeyFault) -> Columns:
@@ -264,6 +294,14 @@ def _with_file(columns: Columns, about: Mapping[str, Any], error: KeyFault) -> C
             form[key] = value.strip()
         elif key == "resample_hz":
             form[key] = positive("Hz").check(value, partial(error, where))
+        elif key == "names":
+            if not isinstance(value, list) or not value or not all(isinstance(one, str) for one in value):
+                raise error(where, "expected a list of names, one for each column of the files")
+            form[key] = tuple(value)
+        elif key == "transposed":
+            if not isinstance(value, bool):
+                raise error(where, "expected true or false")
+            form[key] = value
         elif isinstance(value, bool) or not isinstance(value, int) or value < (key == "first_row"):
             raise error(where, "expected the number of a line, from 1" + (" (0: no header)" * (key == "header_row")))
         else:

@@ -10,7 +10,7 @@
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -18,10 +18,11 @@ from typing import Any
 
 import numpy as np
 
-from fes_pin.data.errors import InputError, optional_library
+from fes_pin.data.errors import MOST_LISTED, InputError, listed, optional_library
 from fes_pin.data.files import as_path, read_bytes
 from fes_pin.data.markers import TIME, c3d_points, trc_points
-from fes_pin.data.motion import STORAGE, read_motion
+from fes_pin.data.motion import STORAGE, is_rotation, read_motion
+from fes_pin.data.recorded.clock import since_first
 from fes_pin.data.recorded.text import TextForm, read_text_recording, without_twins
 from fes_pin.data.table import MIN_ROWS, Table
 
@@ -73,7 +74,7 @@ def read_recording(path: str | Path, form: TextForm | None = None, wanted: Seque
     suffix = path.suffix.lower()
     check_suffix(path)
     if suffix not in _READERS:
-        return read_text_recording(path, form or TextForm(), wanted)
+        return since_first(read_text_recording(path, form or TextForm(), wanted))
     read_bytes(path)  # their libraries open it themselves
     recording = _READERS[suffix](path, wanted)
     sizes = {len(values) for values in recording.columns.values()}
@@ -85,7 +86,7 @@ def read_recording(path: str | Path, form: TextForm | None = None, wanted: Seque
     for name, values in recording.columns.items():
         if np.isinf(values).any():
             raise recording.error("expected a finite number", name, int(np.argmax(np.isinf(values))))
-    return recording
+    return since_first(recording)
 
 
 def _library(module: str, extra: str, path: Path) -> Any:
@@ -148,6 +149,35 @@ def _matlab(path: Path, wanted: Sequence[str] | None) -> Table:
     return _made(path, columns, wanted)
 
 
+def by_length(path: Path, chosen: Collection[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Names of vectors of one length in a MATLAB file, and a sentence about others that go together.
+
+    Parameters
+    ----------
+    chosen
+        What a person says of columns: a vector's name begins it, and decides the length; else the most have it.
+
+    Raises
+    ------
+    InputError
+        As `matlab_vectors`.
+    """
+    columns = matlab_vectors(path)
+    groups: dict[int, list[str]] = {}
+    for name, values in columns.items():
+        groups.setdefault(len(values), []).append(name)
+    asked = [n for n in columns if any(words == n or words.startswith((f"{n}:", f"{n},")) for words in chosen)]
+    count = len(columns[asked[0]]) if asked else max(groups, key=lambda n: len(groups[n]), default=0)
+    others = {n: names for n, names in groups.items() if n != count and len(names) > 1}
+    if not others:
+        return tuple(groups.get(count, ())), ()
+    parts = "; ".join(f"{n} samples: {listed(names)}" for n, names in list(others.items())[:MOST_LISTED])
+    more = f" ... and {len(others) - MOST_LISTED} lengths more" if len(others) > MOST_LISTED else ""
+    first = next(iter(others.values()))[0]
+    how = f"--column COLUMN={first} takes those of its length"
+    return tuple(groups[count]), (f"vectors of {count} samples are taken; there are also {parts}{more}; {how}",)
+
+
 def _vectors(content: Any, name: str = "") -> Iterator[tuple[str, np.ndarray]]:
     """Vectors of numbers in nested structures, by dotted names; columns of a matrix are counted from 1."""
     if isinstance(content, Mapping):
@@ -200,8 +230,9 @@ def _trc(path: Path, wanted: Sequence[str] | None) -> Table:
 
 
 def _storage(path: Path, wanted: Sequence[str] | None) -> Table:
-    table, _ = read_motion(path)
-    return _made(path, table.columns, wanted, units={table.names[0]: "s"})
+    table, in_degrees = read_motion(path)
+    units = {} if in_degrees is None else {n: "deg" if in_degrees else "rad" for n in table.names if is_rotation(n)}
+    return _made(path, table.columns, wanted, units={**units, table.names[0]: "s"}, said=table.said)
 
 
 def _xdf(path: Path, wanted: Sequence[str] | None) -> Table:

@@ -4,22 +4,29 @@ The form is proposed to a person, or named by an error, and never used unseen. C
 numbers.
 """
 
+import operator
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
+from typing import Any
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import as_path, read_bytes, read_text
-from fes_pin.data.recorded.formats import check_suffix, is_text, read_recording
+from fes_pin.data.recorded.clock import clock_seconds
+from fes_pin.data.recorded.formats import by_length, check_suffix, is_text, read_recording
+from fes_pin.data.recorded.header import Header, cells_in, header_of, is_keyed, ways
 from fes_pin.data.recorded.text import DECIMALS, DELIMITERS, MISSING, TextForm, cells_of, read_text_recording
 from fes_pin.data.schema import MEANT, RigSchema, without_unit
 from fes_pin.data.table import Table
-from fes_pin.data.units import UNITS, known_unit, quantities_of, split_header
+from fes_pin.data.units import bare_unit, known_unit, may_be, quantities_of, split_header, words_of
 
 LOOKED_AT = 400
 """Lines that are looked at; no preamble of an instrument is nearly as long."""
 NEW_STUDY = "`fes-pin new-study` writes a [columns] table that reads it as it is"
+WIDE = 10
+"""Columns for each row, at least, of a table that looks transposed; the one with the fewest rows that is read has 3."""
 COMMENTS = ("#", "%", "//")
 _NUMBER = {
     ".": re.compile(r"^[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$"),
@@ -35,16 +42,79 @@ def sniff(path: Path) -> tuple[TextForm, dict[int, str]]:
     InputError
         Not a text file, or no rows of numbers in it.
     """
+    form, header = sniffed(path)
+    return form, dict(header.units)
+
+
+def sniffed(path: Path, stated: Mapping[str, Any] = MappingProxyType({})) -> tuple[TextForm, Header]:
+    """The form that a text file seems to have, and what stands above its numbers.
+
+    Parameters
+    ----------
+    stated
+        What a person says of `TextForm`, by its keys.
+
+    Raises
+    ------
+    InputError
+        As `sniff`.
+    """
     encoding = _encoding(path)
     lines = read_text(path, encoding).split("\n")[:LOOKED_AT]
     forms = [TextForm(delimiter, decimal, encoding=encoding) for delimiter in DELIMITERS for decimal in DECIMALS]
     rows, form = max(((_rows(lines, form), form) for form in forms), key=lambda pair: _likely(*pair))
     if not rows:
         raise InputError("expected rows of numbers, found none", file=path)
-    first, kinds = rows[-1]
     comment = next((c for line in lines for c in COMMENTS if line.lstrip().startswith(c)), "")
-    header, units = _header(lines[:first], replace(form, comment=comment), len(kinds))
-    return replace(form, header_row=header, first_row=first + 1, comment=comment), units
+    form = replace(form, comment=comment)
+    found = max(_first_of(lines, rows, form), int(stated.get("header_row", 0)))
+    first = int(stated.get("first_row", found + 1)) - 1
+    above = lines[:first]
+    turned = None if "transposed" in stated else _transposed(above, rows, form)
+    numbers = [cells_of(lines[place], form) for place, _ in reversed(rows[-2:])]
+    header = turned or (Header() if stated.get("transposed") else header_of(above, form, numbers))
+    if not turned and not header.row and not header.said and len(numbers[0]) >= WIDE * len(rows):
+        odd = f"{len(rows)} rows of {len(numbers[0])} columns without names: is the table transposed?"
+        header = replace(header, said=(f"{odd} --transposed says so",))
+    if {"names", "header_row", "transposed"} & set(stated):
+        header = Header(int(stated.get("header_row", header.row)), rate_hz=header.rate_hz)
+    form = replace(form, header_row=header.row, names=header.names, transposed=turned is not None, first_row=first + 1)
+    return replace(form, **stated), header
+
+
+def _first_of(lines: list[str], rows: list[tuple[int, list[bool]]], form: TextForm) -> int:
+    """Place of the first row of numbers: `Interval,0.5` is none above rows that are all numbers.
+
+    What is no number below a row of names is a sample that is wrong.
+    """
+    usual = [2 * sum(kinds[k] for _, kinds in rows) > len(rows) for k in range(len(rows[0][1]))]
+    like = [place for place, kinds in rows if all(map(operator.ge, kinds, usual))]
+    top, first = rows[-1][0], min(like, default=rows[-1][0])
+    odd = [cells_of(line, form) for line in lines[top:first] if line.strip()]
+    above = header_of(lines[:top], form, [[""] * len(usual)]) if odd and not any(map(is_keyed, odd)) else Header()
+    return top if above.row else first
+
+
+def _transposed(above: Sequence[str], rows: list[tuple[int, list[bool]]], form: TextForm) -> Header | None:
+    """The header of a table whose quantities stand in lines: as many names as lines, or a name before each line."""
+    count, columns = len(rows), len(rows[0][1])
+    if not 2 <= count < columns:
+        return None
+    if all(not kinds[0] and all(kinds[1:]) for _, kinds in rows):
+        words = f"{count} names before as many rows of {columns - 1} numbers: the table is taken as transposed"
+        return Header(said=(words,))
+    place = max((k for k, line in enumerate(above) if line.strip()), default=None)
+    if place is None or not all(all(kinds) for _, kinds in rows):
+        return None
+    names = next((n for n in ways(above[place], form, True) if len(n) == count and all(map(_is_word, n))), None)
+    if names is None:
+        return None
+    words = f"{count} names, {columns} columns, {count} rows: the table is taken as transposed"
+    return Header(place + 1, () if tuple(names) == cells_in(above[place], form) else tuple(names), said=(words,))
+
+
+def _is_word(cell: str) -> bool:
+    return re.match(r"[^\W\d_]", cell) is not None
 
 
 def _encoding(path: Path) -> str:
@@ -69,8 +139,8 @@ def _rows(lines: list[str], form: TextForm) -> list[tuple[int, list[bool]]]:
         if not line.strip() or line.lstrip().startswith(COMMENTS):
             continue
         cells = cells_of(line, form)
-        kinds = [bool(number.match(cell)) or cell.lower() in MISSING for cell in cells]
-        if (rows and len(kinds) != len(rows[0][1])) or not any(map(number.match, cells)):
+        kinds = [_is_number(cell, number) or cell.lower() in MISSING for cell in cells]
+        if (rows and len(kinds) != len(rows[0][1])) or not any(_is_number(cell, number) for cell in cells):
             break
         rows.append((place, kinds))
     return rows
@@ -83,28 +153,8 @@ def _likely(rows: list[tuple[int, list[bool]]], form: TextForm) -> tuple[float, 
     return round(share, 3), len(rows) > 1, len(cells) // max(len(rows), 1), form.decimal == "."
 
 
-def _header(lines: list[str], form: TextForm, columns: int) -> tuple[int, dict[int, str]]:
-    """Row of the names in the lines above the numbers, 0 if there is none; and the units of a row between, by place."""
-    units: dict[int, str] = {}
-    nearest = 0
-    for place in range(len(lines) - 1, -1, -1):
-        line = lines[place].lstrip()
-        cells = cells_of(line.removeprefix(form.comment), form)
-        cells += [""] * (len(cells) == columns - 1)  # a last one that is empty, as of a unit of words
-        if not line or len(cells) != columns or not any(re.search(r"[^\W\d_]", c) for c in cells):
-            continue
-        if not units and place and _are_units(cells):
-            units, nearest = {k: cell.strip("[](){} ") for k, cell in enumerate(cells)}, place + 1
-            continue
-        return place + 1, units
-    return nearest, {}  # a row like one of units, with no names above it, holds the names
-
-
-def _are_units(cells: list[str]) -> bool:
-    bare = [cell.strip("[](){} ") for cell in cells]
-    stated = [cell for cell in bare if cell not in ("", "-", "1")]
-    bracketed = all(cell[:1] in "[({" for cell in cells if cell)
-    return bool(stated) and (bracketed or all(known_unit(cell, tuple(UNITS)) for cell in stated))
+def _is_number(cell: str, number: re.Pattern[str]) -> bool:
+    return number.match(cell) is not None or (":" in cell and clock_seconds(cell) is not None)
 
 
 def read_csv_or_hint(path: str | Path) -> Table:
@@ -152,43 +202,72 @@ class Proposal:
         Names of columns that could be each of the rig's.
     units
         Unit of each of the file's columns as its name or the file itself states it; "" where neither does.
+    rate_hz
+        Of the samples, where lines above the numbers state it.
+    said
+        What is odd about the file and how it is taken, a sentence each.
     """
 
     recording: Table
     form: TextForm | None
     candidates: Mapping[str, tuple[str, ...]]
     units: Mapping[str, str]
+    rate_hz: float | None = None
+    said: tuple[str, ...] = ()
 
 
-def propose(path: Path, schema: RigSchema, revolute: bool | None) -> Proposal:
+def propose(
+    path: Path,
+    schema: RigSchema,
+    revolute: bool | None,
+    stated: Mapping[str, Any] = MappingProxyType({}),
+    chosen: Collection[str] = (),
+) -> Proposal:
     """What a file seems to hold for a rig.
+
+    Parameters
+    ----------
+    stated
+        What a person says of the form of a text file, by its keys.
+    chosen
+        What a person says of columns: a name begins it.
 
     Raises
     ------
     InputError
         The file cannot be read, or holds no numbers.
     """
-    form, stated = sniff(path) if is_text(path) else (None, {})
-    if form is None:
-        recording = read_recording(path)
-        units = dict(recording.units)
-    else:
+    if is_text(path):
+        form, header = sniffed(path, stated)
         recording = _numbers(path, form)
-        units = {name: stated[k] for k, name in enumerate(recording.names) if stated.get(k)}
+        by_place = header.units if recording.names else {}
+        units = {name: unit for k, name in enumerate(recording.names) if (unit := bare_unit(by_place.get(k, "")))}
+    else:
+        form, header = None, Header()
+        names, said = by_length(path, chosen) if path.suffix.lower() == ".mat" else (None, ())
+        recording, header = read_recording(path, wanted=names), Header(said=said)
+        units = {}
+    units = {**recording.units, **units}
     for name in recording.columns:
         units.setdefault(name, split_header(name)[1])
     named = {c: tuple(_candidates(c, recording.columns, units, revolute)) for c in schema.columns}
     named = _without_doubles(named)
     candidates = {c: found or _by_unit(c, named, units, revolute) for c, found in named.items()}
-    return Proposal(recording, form, _without_doubles(candidates), units)
+    if revolute is not None:  # a torque in newtons wants a scale, and is no other column's
+        either = {
+            c: tuple(_candidates(c, recording.columns, units, None)) for c, found in candidates.items() if not found
+        }
+        taken = {name for found in candidates.values() for name in found}
+        candidates |= {c: tuple(n for n in found if n not in taken) for c, found in either.items()}
+    return Proposal(recording, form, _without_doubles(candidates), units, header.rate_hz, header.said)
 
 
 def _numbers(path: Path, form: TextForm) -> Table:
-    """A text file's columns of numbers; columns of words or of dates are among its names only."""
+    """A text file's columns of numbers; columns of words are among its names only."""
     names = read_text_recording(path, form, ()).names
     while True:
         try:
-            return read_text_recording(path, form, names)
+            return read_recording(path, form, names)
         except InputError as error:
             if error.column not in names:
                 raise
@@ -198,14 +277,15 @@ def _numbers(path: Path, form: TextForm) -> Table:
 def _candidates(
     column: str, names: Sequence[str] | Mapping[str, object], units: Mapping[str, str], revolute: bool | None
 ) -> Iterator[str]:
-    quantities = quantities_of(column, revolute)
+    if column in names and may_be(column, column, units.get(column, ""), revolute):
+        yield column  # a name that is the rig's own needs no words
+        return
     for name in names:
         bare, _ = split_header(name)
-        unit = units.get(name, "")
-        if unit and known_unit(unit, quantities) is None and known_unit(unit, tuple(UNITS)) is not None:
+        if not may_be(column, name, units.get(name, ""), revolute):
             continue  # another quantity
-        words = _words(bare)
-        if name == column or without_unit(column) == "_".join(words) or words & MEANT.get(column, frozenset()):
+        words = words_of(bare)
+        if without_unit(column) == "_".join(words) or words & MEANT.get(column, frozenset()):
             yield name
 
 
@@ -216,12 +296,6 @@ def _by_unit(
     taken = {name for names in named.values() for name in names}
     quantities = quantities_of(column, revolute)
     return tuple(n for n, unit in units.items() if unit and n not in taken and known_unit(unit, quantities))
-
-
-def _words(name: str) -> frozenset[str]:
-    """Lower-case words of a name: `Motor Torque`, `motorTorque`, `knee.angle`."""
-    apart = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)
-    return frozenset(w for w in re.split(r"[^a-z0-9]+", apart.lower()) if w)
 
 
 def _without_doubles(candidates: Mapping[str, tuple[str, ...]]) -> dict[str, tuple[str, ...]]:

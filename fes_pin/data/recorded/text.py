@@ -5,20 +5,24 @@ They are read fast where they are clean, and cell by cell to say where they are 
 
 import csv
 import math
+import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import as_path, read_text
+from fes_pin.data.recorded.clock import clock_seconds, from_first
 from fes_pin.data.table import MIN_ROWS, Table
+from fes_pin.data.units import are_units, bare_unit
 
 DELIMITERS = (";", "\t", ",", " ")
 """Semicolon, tab, comma, and any white space."""
 DECIMALS = (".", ",")
 ENCODINGS = ("utf-8", "utf-16", "cp1252")
+_NUMBER = re.compile(r"^[+-]?[\d.,]+([eE][+-]?\d+)?$")
 MISSING = frozenset({"", "nan", "na", "n/a", "-", "--", "null", "none", "#n/a"})
 """What instruments write where there is no sample, in lower case."""
 
@@ -37,6 +41,10 @@ class TextForm:
         Line of the column names, from 1; 0 if the file has none, and columns are then called column1, column2 ...
     first_row
         Line of the first numbers; what stands between it and the header (a row of units) is passed over.
+    names
+        Of the columns, instead of those in the header; () for those.
+    transposed
+        Whether each line holds one quantity: its name, unless `names` or the header have the names, then its samples.
     comment
         What a line begins with that is passed over; "" for nothing.
     encoding
@@ -52,6 +60,8 @@ class TextForm:
     first_row: int = 2
     comment: str = ""
     encoding: str = "utf-8"
+    names: tuple[str, ...] = ()
+    transposed: bool = False
     strict: bool = False
 
     def in_words(self) -> str:
@@ -61,6 +71,8 @@ class TextForm:
             said.append({";": "semicolons", "\t": "tabs", " ": "white space"}[self.delimiter] + " between values")
         if self.decimal != plain.decimal:
             said.append("decimal commas")
+        if self.transposed:
+            said.append("one quantity in each line")
         if self.header_row == 0:
             said.append("no header")
         elif self.header_row > 1:
@@ -131,7 +143,30 @@ def read_text_recording(path: Path, form: TextForm, wanted: Sequence[str] | None
         A file that is not of this form, with row and column.
     """
     lines = read_text(path, form.encoding).split("\n")
-    return table_of_lines(path, lines, _names(path, lines, form), form, wanted)
+    if form.transposed:
+        return _transposed(path, lines, form, wanted)
+    return table_of_lines(path, lines, names_of(path, lines, form), form, wanted)
+
+
+def _transposed(path: Path, lines: list[str], form: TextForm, wanted: Sequence[str] | None) -> Table:
+    """The table whose quantities stand in lines; a sample's row is its place in them."""
+    body, rows = _body(lines, form)
+    cells = [cells_of(line, form) for line in body]
+    odd = next((k for k, row in enumerate(cells) if len(row) != len(cells[0])), None)
+    if odd is not None or not cells:
+        found = f"expected lines of {len(cells[0])} values, found {len(cells[odd])}" if odd else "expected numbers"
+        raise InputError(found, file=path, row=int(rows[odd]) if odd else form.first_row)
+    names = form.names or (names_of(path, lines, form) if form.header_row else ())
+    if not names and all(_NUMBER.match(row[0]) for row in cells):
+        names = tuple(f"column{k}" for k in range(1, len(cells) + 1))
+    elif not names:
+        names, cells = tuple(row[0] for row in cells), [row[1:] for row in cells]
+    if len(names) != len(cells):
+        raise InputError(f"expected {len(cells)} names of as many lines, found {len(names)}", file=path)
+    between = ";" if form.decimal == "," else ","
+    turned = [between.join(row) for row in zip(*cells, strict=True)]
+    table = table_of_lines(path, turned, without_twins(list(names)), TextForm(between, form.decimal, 0, 1), wanted)
+    return replace(table, header_row=form.header_row)
 
 
 def table_of_lines(
@@ -143,11 +178,14 @@ def table_of_lines(
     if len(body) < MIN_ROWS:
         row = int(rows[-1]) if len(rows) else form.first_row - 1
         message = f"expected at least {MIN_ROWS} rows of numbers, found {len(body)}"
-        raise InputError(message, file=path, row=row, column=names[0])
+        raise InputError(message, file=path, row=row, column=names[0] if names else None)
+    if form.names:
+        _check_count(path, body, rows, form)
     places = [names.index(n) for n in chosen]
+    clocks: dict[str, str] = {}
     values = _fast(body, form, places, len(names))
     if values is None:
-        values = _slowly(path, body, rows, form, (names, places))
+        values, clocks = _slowly(path, body, rows, form, (names, places))
 
     def half_digit(name: str) -> float:
         place = names.index(name)
@@ -155,17 +193,50 @@ def table_of_lines(
         return 0.5 * 10.0 ** -max(_decimals(cells[place], form.decimal) for cells in texts if place < len(cells))
 
     columns = dict(zip(chosen, values.T.copy(), strict=True))
-    return Table(path, names, columns, rows, form.header_row, half_digit_of=half_digit)
+    units = {**units_between(lines, names, form), **dict.fromkeys(clocks, "s")}
+    sentences = tuple(f"{name} holds {what}: it is read as seconds from its first row" for name, what in clocks.items())
+    return Table(path, names, columns, rows, form.header_row, units, half_digit_of=half_digit, said=sentences)
 
 
-def _names(path: Path, lines: list[str], form: TextForm) -> tuple[str, ...]:
+def units_between(lines: list[str], names: tuple[str, ...], form: TextForm) -> dict[str, str]:
+    """By name the units that the first line between the header and the numbers states; none of a line of other cells.
+
+    A unit that is not known is kept as the file has it.
+    """
+    between = lines[form.header_row : form.first_row - 1] if form.header_row else []
+    for line in between:
+        cells = cells_of(line.lstrip().removeprefix(form.comment or "\0"), form)
+        cells += [""] * (len(cells) == len(names) - 1)  # a last one that is empty, as of a unit of words
+        if len(cells) == len(names) and are_units(cells):
+            return {name: unit for name, cell in zip(names, cells, strict=True) if (unit := bare_unit(cell))}
+    return {}
+
+
+def _check_count(path: Path, body: list[str], rows: np.ndarray, form: TextForm) -> None:
+    """Require as many names that are stated as the first row has cells; one more where a delimiter ends it."""
+    cells, ends = len(cells_of(body[0], form)), body[0].rstrip(" \r").endswith(form.delimiter)
+    if len(form.names) not in (cells, cells + ends):
+        message = f"expected names of {cells} columns, found {len(form.names)}"
+        raise InputError(message, file=path, row=int(rows[0]))
+
+
+def names_of(path: Path, lines: list[str], form: TextForm) -> tuple[str, ...]:
+    """Names of the columns of a text file's lines, as its form says.
+
+    Raises
+    ------
+    InputError
+        No header where the form has one; where it is strict also a column without a name, or two of one name.
+    """
+    if form.names:
+        return without_twins(list(form.names))
     if not form.header_row:
         first = next((line for line in lines[form.first_row - 1 :] if line.strip()), "")
         return without_twins([""] * len(cells_of(first, form)))
     line = lines[form.header_row - 1] if form.header_row <= len(lines) else ""
-    if not line.strip():
-        raise InputError("expected a header row of column names, found nothing", file=path, row=form.header_row)
     names = cells_of(line.removeprefix(form.comment), form)
+    if not names or not line.strip():
+        raise InputError("expected a header row of column names, found nothing", file=path, row=form.header_row)
     if not form.strict:
         return without_twins(names)
     names = [name.strip('"') for name in names]
@@ -210,13 +281,17 @@ def _is_regular(body: list[str], form: TextForm, count: int) -> bool:
     delimiter = None if form.delimiter == " " else form.delimiter
     cells = {len(line.split(delimiter)) for line in body}
     most = count if form.strict or delimiter is None else count + 1  # a delimiter at the end begins no cell
+    if most > count and cells == {most} and not all(line.rstrip(" \r").endswith(form.delimiter) for line in body):
+        return False
     return len(cells) == 1 and cells <= {count, most} and not any(sign in line for line in body for sign in odd)
 
 
 def _slowly(
     path: Path, body: list[str], rows: np.ndarray, form: TextForm, which: tuple[tuple[str, ...], list[int]]
-) -> np.ndarray:
+) -> tuple[np.ndarray, dict[str, str]]:
+    """All numbers, cell by cell, and by name what columns hold that are times of a clock, in words."""
     names, places = which
+    clocks: dict[str, str] = {}
     values = np.empty((len(body), len(places)))
     missing = {""} if form.strict else MISSING
     for index, (line, row) in enumerate(zip(body, rows.tolist(), strict=True)):
@@ -231,8 +306,15 @@ def _slowly(
             is_missing = cell.lower() in missing
             if is_missing and form.strict:
                 raise InputError("expected a number, found nothing", file=path, row=row, column=names[place])
-            values[index, k] = np.nan if is_missing else _number(cell, path, row, names[place], form.decimal)
-    return values
+            clock = None if form.strict or is_missing or ":" not in cell else clock_seconds(cell)
+            if clock is not None:
+                values[index, k], clocks[names[place]] = clock
+            else:
+                values[index, k] = np.nan if is_missing else _number(cell, path, row, names[place], form.decimal)
+    for k, place in enumerate(places):
+        if what := clocks.get(names[place]):
+            values[:, k] = from_first(values[:, k], of_day=what != "dates")
+    return values, clocks
 
 
 def _number(cell: str, path: Path, row: int, column: str, decimal: str) -> float:
@@ -252,5 +334,5 @@ def _number(cell: str, path: Path, row: int, column: str, decimal: str) -> float
 def _decimals(cell: str, decimal: str) -> int:
     """How many digits stand after the decimal sign, an exponent counted in."""
     mantissa, _, exponent = cell.lower().partition("e")
-    digits = len(mantissa.partition(decimal)[2].strip())
+    digits = len(re.split(r"[^\d]", mantissa.rpartition(":")[2].partition(decimal)[2].strip(), maxsplit=1)[0])
     return digits - (int(exponent) if exponent.lstrip("+-").isdigit() else 0)
