@@ -59,7 +59,7 @@ def test_one_quantity_a_file(monkeypatch, capsys, tmp_path):
     files = sorted(tmp_path.glob("*.t"))
     said = fails(monkeypatch, capsys, "new-study", *files, *ROD)
     assert "position=pos.column2:UNIT" in said
-    assert "time_s=pos.column1:UNIT" in said
+    assert "column1:UNIT (0 to 5.99: s" in said
     units = ("time_s=column1:s", "position=pos.column2:rad", "effort=tau.column2:Nm")
     asked = [word for one in units for word in ("--column", one)]
     assert run(monkeypatch, "new-study", *files, *ROD, *asked) == 0
