@@ -36,6 +36,7 @@ from fes_pin.data.trial import (
     trial_csv,
     walk_recordings,
 )
+from fes_pin.data.turns import with_whole_turns
 
 EDITED = "edited after it was read"
 """What stands in the place of a hash of a file that is no longer what its study holds."""
@@ -113,7 +114,7 @@ class Study(ReadOnly):
             check_files(schema, files)
         trials = tuple(self.trials) if isinstance(self.trials, Iterable) else (self.trials,)
         if all(isinstance(t, Trial) for t in trials):
-            trials = with_kinds(trials, schema)
+            trials = with_kinds(with_whole_turns(trials, files), schema)
         self._check_trials(trials, schema)
         if schema.inputs_required:  # else a trial without an input is one that nothing drives
             check_same_inputs([(t.kind, t.columns) for t in trials], schema, numbers["constants"], _fault_of(trials))
@@ -366,7 +367,8 @@ class _Reader(StudyTables):
         start = self.start_table(constants)
         own, tables = self.columns_table(files), self._trial_tables()
         each = enumerate(zip(tables, self._trial_names(tables), strict=True))
-        trials = with_kinds([self._trial(f"trial[{i}]", table, name, own) for i, (table, name) in each], self.schema)
+        read = [self._trial(f"trial[{i}]", table, name, own) for i, (table, name) in each]
+        trials = with_kinds(with_whole_turns(read, files), self.schema)
         check_same_inputs([(t.kind, t.columns) for t in trials], self.schema, constants, self._fault_of)
         horizon = checked_horizon(self.document.table("study").get(HORIZON), self.document.under("study"))
         folder = self.folder.absolute()

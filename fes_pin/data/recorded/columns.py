@@ -12,6 +12,7 @@ from fes_pin.data.errors import KeyFault
 from fes_pin.data.recorded.formats import read_recording
 from fes_pin.data.recorded.regular import check_steps, filled, resampled
 from fes_pin.data.recorded.text import DECIMALS, DELIMITERS, ENCODINGS, TextForm
+from fes_pin.data.recorded.wraps import table_without_wraps
 from fes_pin.data.schema import RigSchema, any_number, check_known, one_of, positive, unknown
 from fes_pin.data.table import Table
 from fes_pin.data.units import factor_of, unit_in_name
@@ -72,6 +73,8 @@ class Columns:
         None: times must be equally spaced.
     fills
         Whether missing samples are filled in.
+    revolute
+        Whether the rig's joint turns; None if it has none, or that is not known.
     """
 
     sources: Mapping[str, ColumnSource]
@@ -79,9 +82,10 @@ class Columns:
     form: TextForm = field(default_factory=TextForm)
     resample_hz: float | None = None
     fills: bool = False
+    revolute: bool | None = None
 
     def read(self, path: str | Path, schema: RigSchema, kind: str, inputs_only: bool = False) -> Table:
-        """The rig's columns of one recording, in the study format's units, time first; `said` has what was done to them.
+        """The rig's columns of a recording, in the study format's units, time first; `said` has what was done to them.
 
         Raises
         ------
@@ -136,6 +140,8 @@ class Columns:
 
     def _regular(self, table: Table, held: tuple[str, ...]) -> Table:
         """Times and columns without holes."""
+        if self.fills or self.resample_hz is not None:
+            table = table_without_wraps(table, self.revolute)
         said = list(table.said)
         for name, values in table.columns.items():
             if np.isnan(values).any() and (name == "time_s" or not self.fills):
@@ -192,7 +198,7 @@ def columns_of(table: Mapping[str, Any], schema: RigSchema, revolute: bool | Non
     for column, source in sources.items():
         if source.name in ignored or (source.name and names.count(source.name) > 1):
             raise error(column, f"{source.name!r} is named twice in [columns]")
-    return _with_file(Columns(sources, ignored), about, error)
+    return _with_file(Columns(sources, ignored, revolute=revolute), about, error)
 
 
 def _source(column: str, value: Any, revolute: bool | None, error: KeyFault) -> ColumnSource:
