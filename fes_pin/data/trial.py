@@ -400,7 +400,8 @@ def read_trial(
         table = read_csv_or_hint(path) if own is None else own.read(path, schema, kind, inputs_only)
     columns, time = _checked_columns(table, schema, kind, inputs_only)
     labels["remarks"] += table.said
-    return _made(columns, time, AsRead(sha256, b"", table.half_digit), **labels)
+    factors = own.factors() if own is not None else {}
+    return _made(columns, time, AsRead(sha256, b"", table.half_digit, factors=factors), **labels)
 
 
 def _made(columns: Mapping[str, np.ndarray], time: np.ndarray, as_read: AsRead, **labels: Any) -> Trial:

@@ -1,5 +1,6 @@
 """The table `[columns]` of a study: which column of the recordings is which of the rig's, in which unit."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -75,6 +76,8 @@ class Columns:
         Whether missing samples are filled in.
     revolute
         Whether the rig's joint turns; None if it has none, or that is not known.
+    scaled
+        Columns whose scale is stated.
     """
 
     sources: Mapping[str, ColumnSource]
@@ -83,6 +86,11 @@ class Columns:
     resample_hz: float | None = None
     fills: bool = False
     revolute: bool | None = None
+    scaled: frozenset[str] = frozenset()
+
+    def factors(self) -> dict[str, float]:
+        """What numbers are multiplied by as their unit is stated, by column; NaN where a scale is stated."""
+        return {c: math.nan if c in self.scaled else s.factor for c, s in self.sources.items()}
 
     def read(self, path: str | Path, schema: RigSchema, kind: str, inputs_only: bool = False) -> Table:
         """The rig's columns of a recording, in the study format's units, time first; `said` has what was done to them.
@@ -198,7 +206,8 @@ def columns_of(table: Mapping[str, Any], schema: RigSchema, revolute: bool | Non
     for column, source in sources.items():
         if source.name in ignored or (source.name and names.count(source.name) > 1):
             raise error(column, f"{source.name!r} is named twice in [columns]")
-    return _with_file(Columns(sources, ignored, revolute=revolute), about, error)
+    scaled = frozenset(c for c in sources if isinstance(table[c], dict) and "scale" in table[c])
+    return _with_file(Columns(sources, ignored, revolute=revolute, scaled=scaled), about, error)
 
 
 def _source(column: str, value: Any, revolute: bool | None, error: KeyFault) -> ColumnSource:
