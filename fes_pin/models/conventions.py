@@ -48,7 +48,9 @@ TIMES_SLOWER = 10.0
 ROWS = 3.0
 """Periods of the slowest band that a trial lasts, at least, where no other band is seen."""
 UNFIT = 0.5
-"""Share of the variance that a pendulum's own swing leaves in a wrong unit, at least."""
+"""Share of the variance that inertia and gravity leave in a wrong unit, or of a command that nothing follows."""
+ANSWERED = 0.9
+"""Share of the variance of efforts from which the angle alone explains them."""
 DEGREE = math.pi / 180.0
 UNLESS = "no scale that [columns] states is doubted"
 """How a convention is stated that the data seem to contradict."""
@@ -102,6 +104,22 @@ def with_meant_columns(trials: Sequence[Trial], rig: Rig) -> tuple[tuple[Trial, 
     return out, said
 
 
+def answered_angle(trials: Sequence[Trial], rig: Rig) -> list[str]:
+    """Return a warning about efforts that fall with the angle, as those of a controller do and of no load.
+
+    What the URDF's inertia and gravity explain is no answer.
+    """
+    seen = _Seen(trials, rig.constants) if isinstance(rig, Joint) else None
+    if seen is None or not seen.is_driven or not seen.motions:
+        return []
+    share, slope = seen.answer()
+    if not (share > ANSWERED and slope < 0.0) or seen.tried(Convention("effort", "as stated")).left < UNFIT:
+        return []
+    angle = "sin(position)" if rig.constants["revolute"] else "position"
+    said = f"the effort answers the angle: R2 {share:.2f} with {slope:.3g} {angle}"
+    return [f"{said}: it is a controller's command or has the other sign; no load pulls so"]
+
+
 def _meant(trial: Trial, by: Convention) -> Trial:
     """Return a trial with its columns and its start by the factors of a convention."""
     factors = {"position": by.position, "velocity": by.position, "effort": by.effort}
@@ -147,7 +165,7 @@ class _Seen:
         return inertia / self.constants["inertia"] if seen else math.nan
 
     def tried(self, of: Convention) -> Tried:
-        """Return a convention with what the URDF's gravity and friction leave under it."""
+        """Return what a convention makes of inertia and weight, and what the URDF's gravity and friction leave then."""
         turned, lines = of.position, []
         usual = _usual(np.concatenate([m[1] for m in self.motions]))
         for q, v, a, effort in self.motions:
@@ -168,6 +186,13 @@ class _Seen:
         beliefs = _belief(inertia) + (_belief(weight) if heavy else 0.0)
         unlikely = count * math.log(share + 1e-6) + beliefs
         return Tried(of, float(inertia), float(weight) if heavy else math.nan, share, unlikely)
+
+    def answer(self) -> tuple[float, float]:
+        """Return the share of the variance of efforts that the angle alone explains, and its factor: of its sine."""
+        turns = self.constants["revolute"]
+        rows = self._rows([[np.ones_like(q), np.sin(q) if turns else q, effort] for q, _, _, effort in self.motions])
+        slope = np.linalg.lstsq(rows[:, :2], rows[:, 2], rcond=None)[0]
+        return 1.0 - float(np.var(rows[:, 2] - rows[:, :2] @ slope) / np.var(rows[:, 2])), float(slope[1])
 
     def units(self) -> list[Convention]:
         """Return the units that columns may be in, but for those that are stated."""
