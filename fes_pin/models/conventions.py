@@ -113,7 +113,9 @@ def answered_angle(trials: Sequence[Trial], rig: Rig) -> list[str]:
     if seen is None or not seen.is_driven or not seen.motions:
         return []
     share, slope = seen.answer()
-    if not (share > ANSWERED and slope < 0.0) or seen.tried(Convention("effort", "as stated")).left < UNFIT:
+    stated = seen.tried(Convention("effort", "as stated"))
+    is_load = stated.left < UNFIT and (stated.inertia > 1.0 / PHYSICAL or not stated.weight < 0.0)
+    if is_load or not (share > ANSWERED and slope < 0.0):
         return []
     angle = "sin(position)" if rig.constants["revolute"] else "position"
     said = f"the effort answers the angle: R2 {share:.2f} with {slope:.3g} {angle}"
