@@ -296,7 +296,7 @@ def _unit_of_free_motion(seen: _Seen) -> tuple[Convention | None, list[str]]:
     for one in (k for k in seen.units() if k.column == "position" and before > UNFIT):
         tried = seen.tried(one)
         if tried.left < UNFIT * before and 1.0 / PHYSICAL < tried.weight < PHYSICAL:
-            leaves = f"gravity leaves {100.0 * tried.left:.2g} % of its acceleration, not {100.0 * before:.2g} %"
+            leaves = f"gravity leaves {100.0 * tried.left:.2g} % of its acceleration, not {100.0 * before:.3g} %"
             return one, [f"{one.column} is {one.words}: {leaves}; it is read so ({UNLESS})"]
     return None, []
 

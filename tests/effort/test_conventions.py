@@ -94,7 +94,7 @@ def test_a_diagnosis_in_degrees_names_what_one_in_rad_does(tmp_path):
     found = fp.diagnose(wrong)
     assert [c.name for c in found.causes] == ["coulomb_friction"]
     assert found.extended.values["coulomb_friction.torque_nm"] == pytest.approx(0.15, rel=0.2)
-    assert any(one.startswith("position is in degrees, not rad") for one in found.as_dict()["warnings"])
+    assert any(one.startswith("position is in degrees, not rad") for one in found.warnings)
 
 
 def commanded(seed, slope, folder, coupled):
