@@ -37,7 +37,7 @@ LONG = 2.0
 """Periods from which an unwrapped motion turns round."""
 
 
-class Unwrapped(NamedTuple):
+class Continuous(NamedTuple):
     """A reading without jumps, shape (n,), the period that was added, and what is said of it."""
 
     values: np.ndarray
@@ -67,7 +67,7 @@ def table_without_wraps(table: Table, revolute: bool | None) -> Table:
     return replace(table, columns=columns, said=(*table.said, *said)) if said else table
 
 
-def unwrapped(name: str, time: np.ndarray, values: np.ndarray, velocity: np.ndarray | None = None) -> Unwrapped | None:
+def unwrapped(name: str, time: np.ndarray, values: np.ndarray, velocity: np.ndarray | None = None) -> Continuous | None:
     """Return a reading with whole periods added where it wraps; None where it does not.
 
     Parameters
@@ -103,7 +103,7 @@ def unwrapped(name: str, time: np.ndarray, values: np.ndarray, velocity: np.ndar
     count = int(is_jump.sum())
     more = ", which velocity confirms" if agrees else ""
     where = f"{count} samples" if count > 1 else "a sample"
-    return Unwrapped(out, period, f"{name} jumps by {words} at {where}: unwrapped{more}")
+    return Continuous(out, period, f"{name} jumps by {words} at {where}: unwrapped{more}")
 
 
 def _expected(steps: np.ndarray, times: np.ndarray, is_jump: np.ndarray) -> np.ndarray:
