@@ -65,8 +65,8 @@ def measured_study(study: Study) -> Measured:
         If no trial has a reading that is not stuck.
     """
     rig, trials, found = nominal_model(study).rig, [], {}
-    meant, warnings = with_meant_columns(study.trials, rig)
-    driven, said = with_efforts_of_goals(meant, rig)
+    efforts, warnings = with_efforts_of_goals(study.trials, rig)  # goals would show an inertia over their stiffness
+    driven, said = with_meant_columns(efforts, rig)
     warnings += said
     directed, said = contradicted(driven, study.schema)
     warnings += said
