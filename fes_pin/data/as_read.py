@@ -38,12 +38,15 @@ class AsRead(ReadOnly):
         Half of the last digit that the times were printed with, s; None: as they themselves show.
     recordings
         Of a walk: time and columns of the coordinates and of the ground reaction, each at its own rate.
+    factors
+        What numbers of a column were multiplied by, as their unit was stated; NaN where a scale was stated.
     """
 
     sha256: Mapping[str, str]
     digest: bytes
     half_digit: float | None = None
     recordings: tuple[tuple[np.ndarray, Mapping[str, np.ndarray]], ...] = field(default=(), repr=False)
+    factors: Mapping[str, float] = field(default_factory=dict)
 
 
 class HeldFile(PosixPath):

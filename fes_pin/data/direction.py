@@ -105,7 +105,7 @@ def with_kinds(trials: Sequence[Trial], schema: RigSchema) -> tuple[Trial, ...]:
         return tuple(trials)
     open_ones = [t for t in trials if not t.kind and schema.is_driven_or_read(t.columns)]
     found = direction_of(open_ones)
-    remark = f'{LEFT_OUT} and "{found.kind}" is taken: {found.reason}'
+    remark = f'{LEFT_OUT} and "{found.kind}" is taken, of two that were tried: {found.reason}'
     made = {id(t): derived_trial(t, kind=found.kind, remarks=(*t.remarks, remark)) for t in open_ones}
     return tuple(made.get(id(t), t if t.kind else derived_trial(t, kind=schema.default_kind)) for t in trials)
 

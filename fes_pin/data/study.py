@@ -48,6 +48,7 @@ from fes_pin.data.trial import (
     trial_csv,
     walk_recordings,
 )
+from fes_pin.data.turns import with_whole_turns
 
 EDITED = "edited after it was read"
 """What stands in the place of a hash of a file that is no longer what its study holds."""
@@ -126,7 +127,7 @@ class Study(ReadOnly):
             check_files(schema, files)
         trials = tuple(self.trials) if isinstance(self.trials, Iterable) else (self.trials,)
         if all(isinstance(t, Trial) for t in trials):
-            trials = with_kinds(trials, schema)
+            trials = with_kinds(with_whole_turns(trials, files), schema)
         self._check_trials(trials, schema)
         if schema.inputs_required:  # else a trial without an input is one that nothing drives
             check_same_inputs([(t.kind, t.columns) for t in trials], schema, numbers["constants"], _fault_of(trials))
@@ -383,7 +384,8 @@ class _Reader(StudyTables):
         each = enumerate(zip(tables, views, names, strict=True))
         read = [self._trials(f"trial[{i}]", table, view, name) for i, (table, view, name) in each]
         self._places = [i for i, some in enumerate(read) for _ in some]
-        trials = with_kinds([one for some in read for one in some], self.schema)
+        every = [one for some in read for one in some]
+        trials = with_kinds(with_whole_turns(every, files), self.schema)
         check_same_inputs([(t.kind, t.columns) for t in trials], self.schema, constants, self._fault_of)
         horizon = checked_horizon(self.document.table("study").get(HORIZON), self.document.under("study"))
         folder = self.folder.absolute()

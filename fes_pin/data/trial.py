@@ -435,6 +435,7 @@ def read_view(
         own = replace(own, resample_hz=view.rate_hz)
     moved = [n for n in (*schema.outputs.values(), *schema.imposed, "velocity") if n in table.columns]
     parts = view.parts(table, [n for n in moved if n not in held] or moved)
+    factors = {c: f for _, one in recordings.values() if one is not None for c, f in one.factors().items()}
     trials = []
     for place, part in enumerate(parts):
         regular = view.derived(own.regular(part, held))
@@ -443,7 +444,7 @@ def read_view(
         if len(parts) > 1:
             fields_of["name"] = f"{labels['name']}-{place + 1}"
             fields_of["conditions"] = _conditions_of(place, time[0] - table.time[0], labels["conditions"], view)
-        trials.append(_made(columns, time, AsRead(sha256, b"", regular.half_digit), **fields_of))
+        trials.append(_made(columns, time, AsRead(sha256, b"", regular.half_digit, factors=factors), **fields_of))
     return trials
 
 

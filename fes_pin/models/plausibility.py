@@ -14,6 +14,7 @@ from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.data.urdf import impossible_inertias, stated_of_joint
 from fes_pin.infer.levels import SEEN_DEVIATIONS
+from fes_pin.models.conventions import answered_angle
 from fes_pin.models.effects.coulomb_friction import STATED
 from fes_pin.models.goals import check_no_goal
 from fes_pin.models.model import Model
@@ -62,6 +63,7 @@ def odd_numbers(study: Study | ToPredict, model: Model, simulated: Simulation) -
     check_no_goal(study, model.rig)
     odd = [*implausible(study), *_steps(study, model), *_range(study, model)]
     odd += _of_urdf(study, model) if isinstance(study, Study) and isinstance(model.rig, Joint) else []
+    odd += answered_angle(study.trials, model.rig)
     return [*odd, *_swings(study, model), *_turned(study, model, simulated), *_at_rest(study, model)]
 
 

@@ -14,6 +14,7 @@ from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.infer.held_out import FOLDS, deal
 from fes_pin.models.clipped import with_limited_efforts
+from fes_pin.models.conventions import with_meant_columns
 from fes_pin.models.goals import with_efforts_of_goals
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.plausibility import odd_numbers
@@ -64,7 +65,9 @@ def measured_study(study: Study) -> Measured:
         If no trial has a reading that is not stuck.
     """
     rig, trials, found = nominal_model(study).rig, [], {}
-    driven, warnings = with_efforts_of_goals(study.trials, rig)
+    efforts, warnings = with_efforts_of_goals(study.trials, rig)  # goals would show an inertia over their stiffness
+    driven, said = with_meant_columns(efforts, rig)
+    warnings += said
     directed, said = contradicted(driven, study.schema)
     warnings += said
     directed, said = with_limited_efforts(directed, rig)

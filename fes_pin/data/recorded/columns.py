@@ -1,5 +1,6 @@
 """The table `[columns]` of a study: which column of the recordings is which of the rig's, in which unit."""
 
+import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -12,6 +13,7 @@ from fes_pin.data.errors import KeyFault, listed
 from fes_pin.data.recorded.formats import read_recording
 from fes_pin.data.recorded.regular import check_steps, filled, resampled
 from fes_pin.data.recorded.text import DECIMALS, DELIMITERS, ENCODINGS, TextForm
+from fes_pin.data.recorded.wraps import table_without_wraps
 from fes_pin.data.schema import RigSchema, any_number, check_known, one_of, positive, unknown
 from fes_pin.data.table import Table
 from fes_pin.data.units import factor_of, known_unit, quantities_of, stated_unit
@@ -78,6 +80,10 @@ class Columns:
         None: times must be equally spaced.
     fills
         Whether missing samples are filled in.
+    revolute
+        Whether the rig's joint turns; None if it has none, or that is not known.
+    scaled
+        Columns whose scale is stated.
     """
 
     sources: Mapping[str, ColumnSource]
@@ -85,6 +91,12 @@ class Columns:
     form: TextForm = field(default_factory=TextForm)
     resample_hz: float | None = None
     fills: bool = False
+    revolute: bool | None = None
+    scaled: frozenset[str] = frozenset()
+
+    def factors(self) -> dict[str, float]:
+        """What numbers are multiplied by as their unit is stated, by column; NaN where a scale is stated."""
+        return {c: math.nan if c in self.scaled else s.factor for c, s in self.sources.items()}
 
     def read(self, path: str | Path, schema: RigSchema, kind: str, inputs_only: bool = False) -> Table:
         """The rig's columns of one recording, as a trial has them: `taken`, then `regular`."""
@@ -173,6 +185,8 @@ class Columns:
 
     def _regular(self, table: Table, held: tuple[str, ...]) -> Table:
         """Times and columns without holes."""
+        if self.fills or self.resample_hz is not None:
+            table = table_without_wraps(table, self.revolute)
         said = list(table.said)
         for name, values in table.columns.items():
             if np.isnan(values).any() and (name == "time_s" or not self.fills):
@@ -229,7 +243,8 @@ def columns_of(table: Mapping[str, Any], schema: RigSchema, revolute: bool | Non
     for column, source in sources.items():
         if source.name in ignored or (source.name and names.count(source.name) > 1):
             raise error(column, f"{source.name!r} is named twice in [columns]")
-    return _with_file(Columns(sources, ignored), about, error)
+    scaled = frozenset(c for c in sources if isinstance(table[c], dict) and "scale" in table[c])
+    return _with_file(Columns(sources, ignored, revolute=revolute, scaled=scaled), about, error)
 
 
 def _source(column: str, value: Any, revolute: bool | None, error: KeyFault) -> ColumnSource:
