@@ -36,6 +36,7 @@ from fes_pin.data.trial import (
     trial_csv,
     walk_recordings,
 )
+from fes_pin.data.walk_conventions import STANDARD
 
 EDITED = "edited after it was read"
 """What stands in the place of a hash of a file that is no longer what its study holds."""
@@ -361,10 +362,14 @@ def _document(path: str | Path) -> Document:
 class _Reader(StudyTables):
     """One reading of a study.toml with its trials."""
 
+    walks: Mapping[str, Any]
+    """What a body's trials are read by: stated conventions and its mass."""
+
     def study(self) -> Study:
         constants, files = self.rig_table()
         start = self.start_table(constants)
         own, tables = self.columns_table(files), self._trial_tables()
+        self.walks = {"conventions": self.conventions_table(), "mass_kg": constants.get("mass_kg")}
         each = enumerate(zip(tables, self._trial_names(tables), strict=True))
         trials = with_kinds([self._trial(f"trial[{i}]", table, name, own) for i, (table, name) in each], self.schema)
         check_same_inputs([(t.kind, t.columns) for t in trials], self.schema, constants, self._fault_of)
@@ -410,7 +415,7 @@ class _Reader(StudyTables):
         if len(paths) == 1:
             trial = read_trial(paths[0], rig=self.schema, kind=kind, own=own, **labels)
             return trial if "kind" in table else derived_trial(trial, kind="")
-        return read_body_trial(paths[0], paths[1], **labels)
+        return read_body_trial(paths[0], paths[1], **self.walks, **labels)
 
     def _fault_of(self, place: int | None, key: str, message: str) -> InputError:
         return self.error(f"rig.{key}" if place is None else f"trial[{place}].{key}", message)
@@ -456,6 +461,8 @@ def write_study(study: Study, folder: str | Path) -> None:
         tables.append({**dict(zip(schema.recordings, named, strict=True)), **known})
     head = {"name": study.name, "rig": study.rig, **({HORIZON: study.horizon_s} if study.horizon_s else {})}
     document = {"study": head, "rig": rig, "start": dict(study.start)}
+    if len(schema.recordings) > 1:
+        document["conventions"] = STANDARD
     contents["study.toml"] = tomli_w.dumps({**document, "trial": tables})
     write_files(folder, contents)
 

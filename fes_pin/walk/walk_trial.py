@@ -15,21 +15,14 @@ from scipy.ndimage import distance_transform_edt, find_objects, label
 from fes_pin.body.joints import SIDES
 from fes_pin.body.skeleton import TO_WORLD
 from fes_pin.data.smooth import low_pass
+from fes_pin.data.walk_conventions import LOADED_N, level_in_the_air
 from fes_pin.walk.motion import Motion, Session, about
 
-LOADED_N = 20.0
-"""A foot stands where its vertical force is above this: the usual threshold on instrumented treadmills."""
 ORDINARY_N = 1.5
 """Standard deviation of the force of calibrated plates: its mean errors were 2.5 to 5 N (A. Cappello et al., Gait
 Posture 33:724, 2011)."""
 SHORTEST_S = 0.1
 """A single support shorter than this is no step."""
-SWINGS = 0.2
-"""Share of the time that a foot which steps is in the air, at least: it swings for 0.4 of a stride (J. Perry, Gait
-Analysis, 1992). The load of one who sways by a quarter of the weight each way is within `LOADED_N` of its least for
-less than 0.16."""
-LEAST = 0.05
-"""Quantile that is taken as the least reading: a few samples may be spikes (a round figure)."""
 
 
 @dataclass(frozen=True)
@@ -113,19 +106,6 @@ def plates_of(
         loaded[side] = _at(at, time, force[:, 2:]).ravel() > LOADED_N + level
         pressure[side] = _held(_at(at, time, point), loaded[side] | (2.0 * abs(level) > LOADED_N))
     return Plates(np.asarray(at, dtype=float), session.way(at), feet, pressure, loaded)
-
-
-def level_in_the_air(up: np.ndarray, total: np.ndarray) -> float:
-    """Return the vertical force that a plate reads while its foot is in the air, N; 0 of a foot that does not step.
-
-    Parameters
-    ----------
-    up, total
-        Vertical force of this plate and of both, (n,) N. A foot that steps carries half of the mean total at least.
-    """
-    least = up < np.quantile(up, LEAST) + LOADED_N
-    level = float(np.median(up[least]))
-    return level if np.mean(least) > SWINGS and 2.0 * (np.max(up) - level) > np.mean(total) else 0.0
 
 
 def _at(at: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarray:
