@@ -38,12 +38,15 @@ class AsRead(ReadOnly):
         Half of the last digit that the times were printed with, s; None: as they themselves show.
     recordings
         Of a walk: time and columns of the coordinates and of the ground reaction, each at its own rate.
+    stated
+        Of a walk: keys of the conventions that its study states, which are not tested.
     """
 
     sha256: Mapping[str, str]
     digest: bytes
     half_digit: float | None = None
     recordings: tuple[tuple[np.ndarray, Mapping[str, np.ndarray]], ...] = field(default=(), repr=False)
+    stated: frozenset[str] = frozenset()
 
 
 class HeldFile(PosixPath):

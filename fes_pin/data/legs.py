@@ -15,6 +15,9 @@ HIP = np.array([-0.0402, -0.0376, 0.0475])
 THIGH, SHANK, ANKLE = 0.245, 0.246, 0.039
 """Lengths, and height of the ankle, as shares of the body's height: D. A. Winter, "Biomechanics and Motor Control of
 Human Movement", figure 4.1."""
+AHEAD = 0.05
+"""How far the middle of the sole lies ahead of the ankle, as a share of the body's height: a foot is 0.152 long, its
+heel 0.03 behind the ankle (Winter, figure 4.1)."""
 ADULT_M, HEIGHTS_M = 1.7, (0.8, 2.3)
 """Height, m, that is taken where a pelvis shows none that a person can have, between these."""
 X, Y, Z = np.eye(3)
@@ -33,8 +36,8 @@ class Leg:
 
     Attributes
     ----------
-    ankle
-        (n, 3) m.
+    ankle, sole
+        (n, 3) m: the ankle, and a point ahead of it, above the middle of the sole.
     velocity
         (n, 3) m/s, of the ankle.
     spin
@@ -42,6 +45,7 @@ class Leg:
     """
 
     ankle: np.ndarray = field(repr=False)
+    sole: np.ndarray = field(repr=False)
     velocity: np.ndarray = field(repr=False)
     spin: np.ndarray = field(repr=False)
 
@@ -66,9 +70,8 @@ def leg_of(columns: Mapping[str, np.ndarray], time: np.ndarray, side: str, knee:
     thigh = pelvis @ turn(Z, flexion) @ turn(mirror * X, adduction) @ turn(mirror * Y, rotation)
     shank = thigh @ turn(Z, knee * columns[f"q_knee_angle_{side}"])
     foot = shank @ turn(Z, columns[f"q_ankle_angle_{side}"])
-    ankle = origin + _height(origin) * (
-        pelvis @ (HIP * [1.0, 1.0, mirror]) - THIGH * thigh[:, :, 1] - SHANK * shank[:, :, 1]
-    )
+    height = _height(origin)
+    ankle = origin + height * (pelvis @ (HIP * [1.0, 1.0, mirror]) - THIGH * thigh[:, :, 1] - SHANK * shank[:, :, 1])
     both = np.hstack([ankle, foot.reshape(-1, 9)])
     step = float(time[-1] - time[0]) / (len(time) - 1)
     if len(time) > np.ceil(1.0 / (CUTOFF_HZ * step)):
@@ -76,7 +79,7 @@ def leg_of(columns: Mapping[str, np.ndarray], time: np.ndarray, side: str, knee:
     rate = np.gradient(both, step, axis=0)
     turned = rate[:, 3:].reshape(-1, 3, 3) @ both[:, 3:].reshape(-1, 3, 3).transpose(0, 2, 1)
     spin = np.stack([turned[:, 2, 1], turned[:, 0, 2], turned[:, 1, 0]], axis=1)
-    return Leg(both[:, :3], rate[:, :3], spin)
+    return Leg(both[:, :3], both[:, :3] + AHEAD * height * both[:, 3::3], rate[:, :3], spin)
 
 
 def _height(origin: np.ndarray) -> float:

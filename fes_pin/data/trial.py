@@ -472,7 +472,7 @@ def read_body_trial(
     if len(time) < MIN_ROWS:
         message = f"expected at least {MIN_ROWS} samples in the time of {coordinates.name}, found {len(time)}"
         raise pushes.error(message, pushes.names[0], 0)
-    as_read = AsRead(sha256, b"", recordings=recordings)
+    as_read = AsRead(sha256, b"", recordings=recordings, stated=frozenset(conventions or ()))
     labels["remarks"] = (*labels.get("remarks", ()), *moves.said, *pushes.said, *said)
     return _made(columns, time, as_read, name=name, kind="motion", conditions=conditions, **labels)
 

@@ -93,19 +93,19 @@ def plates_of(
     """
     time, dt = time - later_s, float(time[-1] - time[0]) / (len(time) - 1)
     feet, pressure, loaded, total = {}, {}, {}, columns["r_Fy"] + columns["l_Fy"]
+    turn = session.turn @ TO_WORLD
     for side in SIDES:
         force, point, free = (
-            np.stack([columns[f"{side[0]}_{kind}{c}"] for c in "xyz"], axis=1) @ TO_WORLD.T
-            for kind in ("F", "cop", "T")
+            np.stack([columns[f"{side[0]}_{kind}{c}"] for c in "xyz"], axis=1) @ turn.T for kind in ("F", "cop", "T")
         )
-        point = point + session.way(time)
+        point = point + session.way(time) @ session.turn.T
         wrench = np.hstack([force, np.cross(point, force) + free])
         smooth = low_pass(wrench, dt, session.cutoff_hz)
         feet[side] = _at(at, time, smooth)
         level = level_in_the_air(force[:, 2], total)
         loaded[side] = _at(at, time, force[:, 2:]).ravel() > LOADED_N + level
         pressure[side] = _held(_at(at, time, point), loaded[side] | (2.0 * abs(level) > LOADED_N))
-    return Plates(np.asarray(at, dtype=float), session.way(at), feet, pressure, loaded)
+    return Plates(np.asarray(at, dtype=float), session.way(at) @ session.turn.T, feet, pressure, loaded)
 
 
 def _at(at: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -137,6 +137,8 @@ class WalkTrial:
         Function of times, and of how much later than their clock says the plates are read: the plates.
     session
         Low pass and treadmill.
+    said
+        What was taken otherwise than it was read, a sentence each.
     """
 
     name: str
@@ -147,6 +149,7 @@ class WalkTrial:
     moved: Callable[[np.ndarray, Mapping[str, np.ndarray]], Motion] = field(repr=False)
     read: Callable[..., Plates] = field(repr=False)
     session: Session
+    said: tuple[str, ...] = ()
 
     def read_later(self, later_s: float) -> WalkTrial:
         """Return the trial with the plates read that much later than their clock says."""
