@@ -181,6 +181,15 @@ class _Walk:
         on = load > STANDS * load.max()
         return on if np.sum(on) >= FEWEST else np.zeros(len(on), dtype=bool)
 
+    def steps(self, label: str) -> Iterator[np.ndarray]:
+        """Samples of each stance on a plate: (n,) bool."""
+        on = self.standing(label)
+        ends = np.flatnonzero(np.diff(np.r_[False, on, False].astype(int)))
+        rows = np.arange(len(on))
+        for start, stop in zip(ends[::2], ends[1::2], strict=True):
+            if stop - start >= FEWEST // 2:
+                yield (rows >= start) & (rows < stop)
+
     def turned(self, names: Sequence[str]) -> None:
         """Give coordinates, and their rates, the other sign."""
         for name in names:
@@ -322,14 +331,12 @@ class _Walk:
         return now > WIDER * then > 0.0
 
     def _wandering(self, moves: Columns) -> float:
-        """How far centres of pressure wander from the ankle that is nearest in the mean, m: the least of all knees."""
-        moves, heading = unwrapped(moves)[0], _heading(pelvis_of(unwrapped(moves)[0]))
-        out = 0.0
-        for label in self.plates:
-            if (on := self.standing(label)).any():
-                legs = (leg_of(moves, self.time, side, knee) for side in SIDES for knee in (1.0, -1.0))
-                out += min(_wandered(self.plate(label, "cop"), leg, heading, on) for leg in legs)
-        return out
+        """How far centres of pressure wander from an ankle in a step, m, in the mean: the least of both feet's."""
+        moves = unwrapped(moves)[0]
+        heading = _heading(pelvis_of(moves))
+        legs = [leg_of(moves, self.time, side, knee) for side in SIDES for knee in (1.0, -1.0)]
+        steps = [(self.plate(label, "cop"), on) for label in self.plates for on in self.steps(label)]
+        return float(np.mean([min(_wandered(point, leg, heading, on) for leg in legs) for point, on in steps] or [0.0]))
 
     def unit_of_pressure(self) -> None:
         """Centres of pressure in m: under the feet."""
@@ -402,7 +409,7 @@ class _Walk:
         if odd := [label for label in chosen if label not in self.plates]:
             raise InputError(f"[conventions] states plate {odd[0]}; the file has {', '.join(self.plates)}")
         if chosen:
-            self.plates = self._composed({label: [(0, s)] for label, s in chosen.items()})
+            self.plates = self._composed({label: [(0.0, s)] for label, s in chosen.items()})
         elif set(self.plates) == set(SIDES):
             self._exchanged()
         else:
@@ -422,29 +429,24 @@ class _Walk:
 
     def _numbered(self) -> None:
         """The foot that is nearer by far stands on a plate, step by step."""
-        owners: dict[str, list[tuple[int, str]]] = {}
+        owners: dict[str, list[tuple[float, str]]] = {}
         words = []
         for label in self.plates:
             steps = []
-            on = self.standing(label)
-            for start, stop in _stretches(on):
-                rows = np.arange(len(on))
-                here = (rows >= start) & (rows < stop)
-                if np.sum(here) < FEWEST // 2:
-                    continue
+            for here in self.steps(label):
                 by = {side: self._from_foot(label, side, here) for side in SIDES}
                 near, far = sorted(by, key=lambda side: by[side])
+                times = self.time[here]
                 if by[near] > NEARER * by[far]:
-                    times = f"{self.time[start]:.2f} to {self.time[stop - 1]:.2f} s"
                     raise InputError(
                         f"expected columns that name the foot, r_ and l_, or right_plates in [conventions]: whose foot "
-                        f"stands on plate {label} at {times} does not show"
+                        f"stands on plate {label} at {times[0]:.2f} to {times[-1]:.2f} s does not show"
                     )
-                steps.append(((start + stop) // 2, near))
+                steps.append((float(np.mean(times)), near))
             if steps:
                 owners[label] = steps
-            feet = dict.fromkeys(SIDES[side] for _, side in steps)
-            whose = f"is {' and '.join(f'the {foot} foot' for foot in feet)}'s" if feet else "carries nobody: left out"
+            feet = {SIDES[side] for _, side in steps}
+            whose = "is each foot's in turn" if len(feet) > 1 else f"is the {min(feet)} foot's" if feet else "is empty"
             words.append(f"plate {label} {whose}")
         if not owners:
             raise InputError("expected columns that name the foot, r_ and l_: nobody steps on a plate")
@@ -458,12 +460,12 @@ class _Walk:
         legs = (self.leg(side, knee) for knee in (1.0, -1.0))
         return min(float(np.mean(_level(self.plate(label, "cop")[rows] - leg.sole[rows]))) for leg in legs)
 
-    def _composed(self, owners: Mapping[str, Sequence[tuple[int, str]]]) -> dict[str, Columns]:
-        """Both feet's reactions: all that plates read while they are a foot's; `owners` by sample of the motion."""
+    def _composed(self, owners: Mapping[str, Sequence[tuple[float, str]]]) -> dict[str, Columns]:
+        """Both feet's reactions: all that plates read while they are a foot's; `owners` by time, s."""
         n, out = len(self.push_time), {s: {kind.removeprefix("_"): np.zeros(0) for kind in PLATE} for s in SIDES}
         parts: dict[str, list[tuple[Columns, np.ndarray]]] = {s: [] for s in SIDES}
         for label, steps in owners.items():
-            at = np.array([self.time[k] for k, _ in steps])
+            at = np.array([at for at, _ in steps])
             nearest = np.abs(self.push_time[:, None] - at).argmin(axis=1)
             for side in SIDES:
                 mine = np.isin(nearest, [k for k, (_, s) in enumerate(steps) if s == side])
@@ -528,9 +530,3 @@ def _level(vectors: np.ndarray) -> np.ndarray:
 def _correlation(one: np.ndarray, other: np.ndarray) -> float:
     size = float(np.linalg.norm(one) * np.linalg.norm(other))
     return float(one @ other) / size if size else 0.0
-
-
-def _stretches(where: np.ndarray) -> Iterator[tuple[int, int]]:
-    """First and last-but-one rows of the stretches in which something holds."""
-    ends = np.flatnonzero(np.diff(np.r_[False, where, False].astype(int)))
-    yield from zip(ends[::2].tolist(), ends[1::2].tolist(), strict=True)

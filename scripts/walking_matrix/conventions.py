@@ -182,7 +182,7 @@ WRONG: Mapping[str, tuple[Callable[[Path], None], str]] = {
     "both knees": (_knee("rl"), "both knees count flexion positive"),
     "exchanged feet": (exchanged, "the feet are exchanged"),
     "numbered plates": (numbered, "plate 1 is the left foot's, plate 2 is the right foot's"),
-    "three plates": (walkway, "plate 3 is the"),
+    "three plates": (walkway, "plate 3 is "),
     "action": (scaled("grf.csv", lambda n: n[2] in "FT", -1.0), "as those on the ground"),
     "shear sign": (scaled("grf.csv", lambda n: n[2:] in ("Fx", "Fz"), -1.0), "forces along x are taken with the other"),
     "lateral sign": (scaled("grf.csv", lambda n: n[2:] == "Fz", -1.0), "forces along z are taken with the other sign"),
