@@ -1,0 +1,173 @@
+"""Other conventions of a walk's files are told by its motion, said, and taken; what is right is left alone."""
+
+import re
+
+import numpy as np
+import pytest
+
+import fes_pin as fp
+from fes_pin.data.errors import InputError
+from fes_pin.data.motion import read_coordinates
+from fes_pin.walk.recording import recordings_of
+
+pytestmark = pytest.mark.shared
+WRONG = ("right knee", "left knee", "both knees", "exchanged feet", "numbered plates", "three plates", "action",
+         "shear sign", "lateral sign", "moments in N mm", "moments about a corner", "moment sign", "forces in kN",
+         "degrees under no", "rad under yes", "wraps", "pressure in mm", "translations in mm")  # fmt: skip
+RIGHT = ("as it is", "laboratory turned by 90 degrees", "laboratory turned by -40 degrees",
+         "laboratory turned by 180 degrees", "clock that began 1000 s before", "columns reordered")  # fmt: skip
+
+
+@pytest.fixture(params=[False, True], ids=["usual", "limping"])
+def made(gait, tmp_path, request):
+    """Return the folder of a walk of 2 to 5 strides, drawn anew by each day of the year, and its limp."""
+    from walking_matrix.conventions import walk
+
+    walk(gait, tmp_path / "walk", 40 + request.param, request.param)
+    return tmp_path / "walk"
+
+
+def reaction(folder):
+    (one,) = recordings_of(fp.read_study(folder))
+    return one
+
+
+def test_there_are_no_others():
+    from walking_matrix import conventions
+
+    assert tuple(conventions.WRONG) == WRONG and tuple(conventions.RIGHT) == RIGHT
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_a_wrong_convention_is_named_and_the_walk_is_the_same(made, name):
+    from walking_matrix import conventions
+
+    usual = reaction(made)
+    conventions.WRONG[name][0](made)
+    study = fp.read_study(made)
+    assert conventions.named(name, fp.check(study).odd), fp.check(study).odd
+    found = reaction(made)
+    size = np.sqrt(np.mean(usual.measured**2, axis=0))
+    assert np.all(np.abs(found.measured - usual.measured).max(axis=0) < 0.02 * size + 0.1)
+    assert np.all(np.abs(found.needed - usual.needed).max(axis=0) < 0.02 * size + 0.1)
+
+
+@pytest.mark.parametrize("name", RIGHT)
+def test_of_what_is_right_nothing_is_said_and_the_walk_is_the_same(made, name):
+    from walking_matrix import conventions
+
+    usual = reaction(made)
+    conventions.RIGHT[name](made)
+    assert fp.check(fp.read_study(made)).odd == ()
+    found = reaction(made)
+    if "turned" in name:  # the walker faces x by some degrees, or to the degree
+        lengths = [np.linalg.norm(one.residual[:, :2], axis=1) for one in (usual, found)]
+        assert np.allclose(*lengths, atol=0.5)
+    else:
+        assert np.allclose(found.residual, usual.residual, atol=0.5)
+
+
+def stated(folder, **keys):
+    lines = "\n".join(f"{key} = {value!r}".replace("'", '"') for key, value in keys.items())
+    path = folder / "study.toml"
+    path.write_text(path.read_text() + f"\n[conventions]\n{lines}\n")
+
+
+def test_what_is_stated_is_kept_and_not_tested(made):
+    from walking_matrix.conventions import WRONG
+
+    usual = fp.read_study(made).trials[0]
+    WRONG["right knee"][0](made)
+    stated(made, knee_flexion_right="positive", knee_flexion_left="negative")
+    study = fp.read_study(made)
+    assert study.trials[0].remarks == ()
+    np.testing.assert_allclose(study.trials[0]["q_knee_angle_r"], usual["q_knee_angle_r"])
+    text = (made / "study.toml").read_text()
+    (made / "study.toml").write_text(text.replace("positive", "negative"))
+    kept = fp.read_study(made).trials[0]  # although the walk says otherwise
+    np.testing.assert_allclose(kept["q_knee_angle_r"], -usual["q_knee_angle_r"])
+
+
+def test_a_plate_is_stated_by_its_number(made):
+    from walking_matrix.conventions import numbered
+
+    usual = reaction(made)
+    numbered(made)
+    stated(made, right_plates=[2], left_plates=[1])
+    assert fp.read_study(made).trials[0].remarks == ()
+    np.testing.assert_allclose(reaction(made).measured, usual.measured, atol=0.01)
+    text = (made / "study.toml").read_text()
+    (made / "study.toml").write_text(text.replace("right_plates = [2]", "right_plates = [7]"))
+    with pytest.raises(InputError, match="states plate 7; the file has 1, 2"):
+        fp.read_study(made)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "words"),
+    [
+        ("knee_flexion", "positive", "conventions.knee_flexion: unknown"),
+        ("knee_flexion_left", "up", "expected one of negative, positive; found 'up'"),
+        ("moment_unit", "mN m", "expected one of N m, N mm, kN m"),
+        ("right_plates", 1, "expected a list of plates"),
+    ],
+)
+def test_what_no_file_follows_cannot_be_stated(made, key, value, words):
+    stated(made, **{key: value})
+    with pytest.raises(InputError, match=re.escape(words)) as caught:
+        fp.read_study(made)
+    assert "study.toml" in str(caught.value)
+
+
+def test_what_is_written_is_as_the_format_has_it(made, tmp_path):
+    from walking_matrix.conventions import WRONG
+
+    for name in ("left knee", "action"):
+        WRONG[name][0](made)
+    study = fp.read_study(made)
+    fp.write_study(study, tmp_path / "copy")
+    again = fp.read_study(tmp_path / "copy")
+    assert again.trials[0].remarks == study.trials[0].remarks and len(again.trials[0].remarks) == 2
+    for column in study.trials[0].columns:
+        np.testing.assert_allclose(again.trials[0][column], study.trials[0][column], atol=1e-9)
+
+
+def test_each_trial_of_a_convention_is_named_once(gait, tmp_path):
+    from walking_matrix.conventions import WRONG, walk
+
+    for name in ("a", "b"):
+        walk(gait, tmp_path / name, 3, False)
+        WRONG["both knees"][0](tmp_path / name)
+        for file in ("coords.csv", "grf.csv"):
+            (tmp_path / name / file).rename(tmp_path / f"{name}_{file}")
+    text = (tmp_path / "a/study.toml").read_text().replace("coords.csv", "a_coords.csv").replace("grf.csv", "a_grf.csv")
+    (tmp_path / "study.toml").write_text(
+        text + '\n[[trial]]\ncoordinates = "b_coords.csv"\nground_reaction = "b_grf.csv"\n'
+    )
+    (said,) = fp.check(fp.read_study(tmp_path)).odd
+    assert said == "both knees count flexion positive: taken with the other sign (a_coords, b_coords)"
+
+
+def test_an_angle_that_wraps_is_unwrapped_in_coordinates_alone(made):
+    from walking_matrix.conventions import read, turned
+
+    turned(np.pi, wraps=True)(made)
+    assert np.ptp(read(made / "coords.csv")["q_pelvis_rotation"]) > 6.0
+    assert np.ptp(read_coordinates(made / "coords.csv")[1]["q_pelvis_rotation"]) < 1.0
+
+
+def test_the_measured_walk_follows_the_format(walk, tmp_path):
+    from walking_matrix import conventions
+
+    for source, name in (("coords_mtpfree.csv", "coords.csv"), ("grf_raw_600hz.csv", "grf.csv")):
+        (tmp_path / name).write_bytes((walk / source).read_bytes())
+    rig = '[study]\nname = "w"\nrig = "body"\n[rig]\nmass_kg = 72.6\nheight_m = 1.80\n[[trial]]\n'
+    trial = 'coordinates = "coords.csv"\nground_reaction = "grf.csv"\nbelt_speed_mps = 1.135\n'
+    (tmp_path / "study.toml").write_text(rig + trial)
+    assert fp.check(fp.read_study(tmp_path)).odd == ()
+    for name in ("right knee", "lateral sign", "pressure in mm"):
+        conventions.WRONG[name][0](tmp_path)
+    said = fp.check(fp.read_study(tmp_path)).odd
+    assert [conventions.WRONG[n][1] in " ".join(said) for n in ("right knee", "lateral sign", "pressure in mm")] == [
+        *(True, True, True)
+    ]
+    assert len(said) == 3
