@@ -170,7 +170,7 @@ class _Walk:
     def load(self, label: str) -> np.ndarray:
         """A plate's vertical force at the motion's times, less what it reads in the air: (n,), 0 where it has none."""
         up = self.plates[label]["Fy"]
-        level = level_in_the_air(up, sum(p["Fy"] for p in self.plates.values()))
+        level = level_in_the_air(up, np.sum([p["Fy"] for p in self.plates.values()], axis=0))
         load = np.interp(self.time, self.push_time, up - level)
         within = np.isin(np.arange(len(self.time)), self.rows)
         return np.where(within & (load > LOADED_N), load, 0.0)
@@ -373,7 +373,7 @@ class _Walk:
         costs = {s: {k: self._unrest(s, k) if self.long else 0.0 for k in (1.0, -1.0)} for s in SIDES}
         both = knees_bend_positively(self.moves)
 
-        def cost(pair: tuple[float, float]) -> float:
+        def cost(pair: tuple[float, ...]) -> float:
             mixed = UNUSUAL if pair[0] != pair[1] else 0.0
             usual = CLEAR if both != (pair == (-1.0, -1.0)) else 0.0
             return sum(costs[s][k] for s, k in zip(SIDES, pair, strict=True)) + mixed + usual
