@@ -7,7 +7,6 @@ said.
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -373,14 +372,15 @@ class _Walk:
         costs = {s: {k: self._unrest(s, k) if self.long else 0.0 for k in (1.0, -1.0)} for s in SIDES}
         both = knees_bend_positively(self.moves)
 
-        def cost(pair: tuple[float, ...]) -> float:
+        def cost(pair: tuple[float, float]) -> float:
             mixed = UNUSUAL if pair[0] != pair[1] else 0.0
             usual = CLEAR if both != (pair == (-1.0, -1.0)) else 0.0
             return sum(costs[s][k] for s, k in zip(SIDES, pair, strict=True)) + mixed + usual
 
-        may = [pair for pair in itertools.product((1.0, -1.0), repeat=2) if all(
-            signs[s] in (None, k) for s, k in zip(SIDES, pair, strict=True))]  # fmt: skip
-        found = dict(zip(SIDES, min(may, key=cost), strict=True))
+        right, left = ((1.0, -1.0) if sign is None else (sign,) for sign in signs.values())
+        may = [(one, other) for one in right for other in left]
+        best = min(may, key=cost)
+        found = dict(zip(SIDES, best, strict=True))
         bent = [s for s, k in found.items() if k < 0.0]
         self.turned([f"knee_angle_{s}" for s in bent])
         if told := [SIDES[s] for s in bent if signs[s] is None]:

@@ -53,7 +53,7 @@ def test_there_are_no_others():
     assert tuple(conventions.WRONG) == WRONG and tuple(conventions.RIGHT) == RIGHT
 
 
-@pytest.mark.parametrize(("number", "name"), enumerate(WRONG))
+@pytest.mark.parametrize(("number", "name"), [*enumerate(WRONG)])
 def test_a_wrong_convention_is_named_and_the_walk_is_the_same(walks, tmp_path, number, name):
     from walking_matrix import conventions
 
@@ -69,7 +69,7 @@ def test_a_wrong_convention_is_named_and_the_walk_is_the_same(walks, tmp_path, n
         assert np.allclose(one[:, [2, 5]], other[:, [2, 5]], atol=0.005 * size)
 
 
-@pytest.mark.parametrize(("number", "name"), enumerate(RIGHT))
+@pytest.mark.parametrize(("number", "name"), [*enumerate(RIGHT)])
 def test_of_what_is_right_nothing_is_said_and_the_walk_is_the_same(walks, tmp_path, number, name):
     from walking_matrix import conventions
 
