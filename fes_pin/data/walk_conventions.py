@@ -1,6 +1,6 @@
 """Conventions of a recorded walk, tested: units and signs of its coordinates and plates, and whose plate is which.
 
-The test is that a foot which stands has its centre of pressure under it, and moves with the ground alone. What is
+The test is that a foot which stands has its centre of pressure below its sole, and moves with the ground alone. What is
 stated is kept; else a file is taken as the study format has it, unless another convention is unmistakable, which is
 said.
 """
@@ -17,7 +17,7 @@ from fes_pin.data.legs import Leg, leg_of, origin_of, pelvis_of
 from fes_pin.data.motion import PLATE, in_radians, is_angle, knees_bend_positively, unwrapped
 from fes_pin.data.schema import check_known, one_of
 
-Columns = dict[str, np.ndarray]
+Numbers = dict[str, np.ndarray]
 SIDES = {"r": "right", "l": "left"}
 ON = ("foot", "ground")
 LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
@@ -44,7 +44,7 @@ STANDARD = {key: words[0] for key, words in WORDS.items() if key != MOMENTS_ON} 
 ENOUGH_S, FEWEST = 0.3, 10
 """s and samples; of less nothing is tested (a single support lasts 0.4 s)."""
 STANDS = 0.2
-"""Share of its largest vertical force above which a foot stands for a test: a centre of pressure is exact there."""
+"""Share of its largest vertical force above which a foot counts as standing: its centre of pressure is exact there."""
 LOADED_N = 20.0
 """A foot stands where its vertical force is above this: the usual threshold on instrumented treadmills."""
 SWINGS = 0.2
@@ -61,7 +61,7 @@ HIGHEST_M = 10.0
 """No pelvis is so high, m: translations are in another unit."""
 PERSON_KG, CARRIED = (3.0, 400.0), (0.2, 3.0)
 """Masses between which a body is, kg: an infant's and the heaviest's; share of a known mass that plates may carry in
-the mean: a walker may step beside them, and a stated mass be wrong."""
+the mean: a walker may step next to them, and a stated mass be wrong."""
 TURN = 2.0 * np.pi
 WIDER = 1.2
 """Factor by which standing feet wander from their centres of pressure in one unit of angles that shows the other: in
@@ -107,7 +107,7 @@ def conventional(
     plates: Mapping[str, Mapping[str, np.ndarray]],
     stated: Mapping[str, Any] | None = None,
     mass_kg: float | None = None,
-) -> tuple[Columns, Columns, tuple[str, ...]]:
+) -> tuple[Numbers, Numbers, tuple[str, ...]]:
     """A walk as the study format has it, whatever conventions its files follow.
 
     Parameters
@@ -151,7 +151,7 @@ def conventional(
 class _Walk:
     """A walk while its conventions are tested, one after the other."""
 
-    def __init__(self, time: np.ndarray, moves: Columns, push_time: np.ndarray, plates: dict[str, Columns],
+    def __init__(self, time: np.ndarray, moves: Numbers, push_time: np.ndarray, plates: dict[str, Numbers],
                  stated: dict[str, Any]) -> None:  # fmt: skip
         self.time, self.moves, self.push_time, self.plates, self.stated = time, moves, push_time, plates, stated
         self.said: list[str] = []
@@ -329,7 +329,7 @@ class _Walk:
         now, then = (self._wandering(in_radians(self.moves, unit)) for unit in (in_degrees, not in_degrees))
         return now > WIDER * then > 0.0
 
-    def _wandering(self, moves: Columns) -> float:
+    def _wandering(self, moves: Numbers) -> float:
         """How far centres of pressure wander from an ankle in a step, m, in the mean: the least of both feet's."""
         moves = unwrapped(moves)[0]
         heading = _heading(pelvis_of(moves))
@@ -460,10 +460,10 @@ class _Walk:
         legs = (self.leg(side, knee) for knee in (1.0, -1.0))
         return min(float(np.mean(_level(self.plate(label, "cop")[rows] - leg.sole[rows]))) for leg in legs)
 
-    def _composed(self, owners: Mapping[str, Sequence[tuple[float, str]]]) -> dict[str, Columns]:
+    def _composed(self, owners: Mapping[str, Sequence[tuple[float, str]]]) -> dict[str, Numbers]:
         """Both feet's reactions: all that plates read while they are a foot's; `owners` by time, s."""
         n, out = len(self.push_time), {s: {kind.removeprefix("_"): np.zeros(0) for kind in PLATE} for s in SIDES}
-        parts: dict[str, list[tuple[Columns, np.ndarray]]] = {s: [] for s in SIDES}
+        parts: dict[str, list[tuple[Numbers, np.ndarray]]] = {s: [] for s in SIDES}
         for label, steps in owners.items():
             at = np.array([at for at, _ in steps])
             nearest = np.abs(self.push_time[:, None] - at).argmin(axis=1)

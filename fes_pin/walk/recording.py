@@ -108,8 +108,8 @@ def carried_along(motion: Motion, plates: Plates) -> slice:
 
 
 SLOPE, BETTER = 1.5, 0.7
-"""Moments with the other sign leave twice themselves in what the motion does not explain: a slope between 0 and that,
-and the share of the rest's standard deviation that the right sign must leave, from which the sign is changed. In made
+"""Moments with the other sign leave twice themselves in what the motion does not explain. The sign is changed from this
+slope of the remainder over the moments, where the right sign leaves less than this share of its deviation. In made
 walks it leaves 0.2 to 0.45; what a measured walk leaves is no multiple of its moments."""
 FEWEST = 10
 """Samples of motion and reaction together, at least."""
