@@ -17,7 +17,7 @@ from fes_pin.data.legs import Leg, leg_of, origin_of, pelvis_of
 from fes_pin.data.motion import PLATE, in_radians, is_angle, knees_bend_positively, unwrapped
 from fes_pin.data.schema import check_known, one_of
 
-Numbers = dict[str, np.ndarray]
+Arrays = dict[str, np.ndarray]
 SIDES = {"r": "right", "l": "left"}
 ON = ("foot", "ground")
 LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
@@ -107,7 +107,7 @@ def conventional(
     plates: Mapping[str, Mapping[str, np.ndarray]],
     stated: Mapping[str, Any] | None = None,
     mass_kg: float | None = None,
-) -> tuple[Numbers, Numbers, tuple[str, ...]]:
+) -> tuple[Arrays, Arrays, tuple[str, ...]]:
     """A walk as the study format has it, whatever conventions its files follow.
 
     Parameters
@@ -151,7 +151,7 @@ def conventional(
 class _Walk:
     """A walk while its conventions are tested, one after the other."""
 
-    def __init__(self, time: np.ndarray, moves: Numbers, push_time: np.ndarray, plates: dict[str, Numbers],
+    def __init__(self, time: np.ndarray, moves: Arrays, push_time: np.ndarray, plates: dict[str, Arrays],
                  stated: dict[str, Any]) -> None:  # fmt: skip
         self.time, self.moves, self.push_time, self.plates, self.stated = time, moves, push_time, plates, stated
         self.said: list[str] = []
@@ -329,7 +329,7 @@ class _Walk:
         now, then = (self._wandering(in_radians(self.moves, unit)) for unit in (in_degrees, not in_degrees))
         return now > WIDER * then > 0.0
 
-    def _wandering(self, moves: Numbers) -> float:
+    def _wandering(self, moves: Arrays) -> float:
         """How far centres of pressure wander from an ankle in a step, m, in the mean: the least of both feet's."""
         moves = unwrapped(moves)[0]
         heading = _heading(pelvis_of(moves))
@@ -460,10 +460,10 @@ class _Walk:
         legs = (self.leg(side, knee) for knee in (1.0, -1.0))
         return min(float(np.mean(_level(self.plate(label, "cop")[rows] - leg.sole[rows]))) for leg in legs)
 
-    def _composed(self, owners: Mapping[str, Sequence[tuple[float, str]]]) -> dict[str, Numbers]:
+    def _composed(self, owners: Mapping[str, Sequence[tuple[float, str]]]) -> dict[str, Arrays]:
         """Both feet's reactions: all that plates read while they are a foot's; `owners` by time, s."""
         n, out = len(self.push_time), {s: {kind.removeprefix("_"): np.zeros(0) for kind in PLATE} for s in SIDES}
-        parts: dict[str, list[tuple[Numbers, np.ndarray]]] = {s: [] for s in SIDES}
+        parts: dict[str, list[tuple[Arrays, np.ndarray]]] = {s: [] for s in SIDES}
         for label, steps in owners.items():
             at = np.array([at for at, _ in steps])
             nearest = np.abs(self.push_time[:, None] - at).argmin(axis=1)
