@@ -135,12 +135,7 @@ def turned(angle: float, wraps: bool = False) -> Callable[[Path], None]:
         tilt, lean, rotation = (moves[f"q_pelvis_{n}"] for n in ("tilt", "list", "rotation"))
         about = turn(Y, np.array([angle]))[0]
         pelvis = about @ turn(Z, tilt) @ turn(X, lean) @ turn(Y, rotation)
-        # R = Rz(tilt) Rx(list) Ry(rotation)
-        moves["q_pelvis_list"] = np.arcsin(np.clip(pelvis[:, 2, 1], -1.0, 1.0))
-        moves["q_pelvis_tilt"] = np.arctan2(-pelvis[:, 0, 1], pelvis[:, 1, 1])
-        moves["q_pelvis_rotation"] = np.arctan2(-pelvis[:, 2, 0], pelvis[:, 2, 2])
-        if not wraps:
-            moves["q_pelvis_rotation"] = np.unwrap(moves["q_pelvis_rotation"])
+        _put_pelvis(moves, pelvis, wraps)
         place = np.stack([moves[f"q_pelvis_t{c}"] for c in "xyz"], 1) @ about.T
         moves |= {f"q_pelvis_t{c}": place[:, k] for k, c in enumerate("xyz")}
         for side in "rl":
@@ -151,6 +146,50 @@ def turned(angle: float, wraps: bool = False) -> Callable[[Path], None]:
         put(folder / "grf.csv", pushes)
 
     return spoil
+
+
+def over_ground(by: float, speed: float = 1.1) -> Callable[[Path], None]:
+    """Return what has the walker go over ground, m/s, and turn to the left by an angle, rad, midway.
+
+    Forces turn with the walker: what this costs of inertia is left out, so that the motion does not require them.
+    """
+
+    def spoil(folder: Path) -> None:
+        moves, pushes = read(folder / "coords.csv"), read(folder / "grf.csv")
+        fine = np.linspace(-1.0, moves["time_s"][-1] + 1.0, 4000)
+        angle = by * np.clip((fine / moves["time_s"][-1] - 0.3) / 0.4, 0.0, 1.0)
+        way = np.cumsum(np.stack([np.cos(angle), 0.0 * fine, -np.sin(angle)], 1), axis=0) * speed * (fine[1] - fine[0])
+        centre = np.array([moves["q_pelvis_tx"].mean(), 0.0, moves["q_pelvis_tz"].mean()])
+
+        def moved(values: np.ndarray, time: np.ndarray, place: bool) -> np.ndarray:
+            about = turn(Y, np.interp(time, fine, angle))
+            on = np.stack([np.interp(time, fine, column) for column in way.T], 1) if place else 0.0
+            return np.einsum("nij,nj->ni", about, values - (centre if place else 0.0)) + on
+
+        time = moves["time_s"]
+        tilt, lean, rotation = (moves[f"q_pelvis_{n}"] for n in ("tilt", "list", "rotation"))
+        pelvis = turn(Y, np.interp(time, fine, angle)) @ turn(Z, tilt) @ turn(X, lean) @ turn(Y, rotation)
+        _put_pelvis(moves, pelvis, True)
+        place = moved(np.stack([moves[f"q_pelvis_t{c}"] for c in "xyz"], 1), time, True)
+        moves |= {f"q_pelvis_t{c}": place[:, k] for k, c in enumerate("xyz")}
+        for side in "rl":
+            loaded = pushes[f"{side}_Fy"] != 0.0
+            for kind in ("F", "cop", "T"):
+                values = np.stack([pushes[f"{side}_{kind}{c}"] for c in "xyz"], 1)
+                values = moved(values, pushes["time_s"], kind == "cop") * loaded[:, None]
+                pushes |= {f"{side}_{kind}{c}": values[:, k] for k, c in enumerate("xyz")}
+        put(folder / "coords.csv", moves)
+        put(folder / "grf.csv", pushes)
+
+    return spoil
+
+
+def _put_pelvis(moves: Columns, pelvis: np.ndarray, wraps: bool) -> None:
+    """Give the pelvis an orientation: R = Rz(tilt) Rx(list) Ry(rotation)."""
+    moves["q_pelvis_list"] = np.arcsin(np.clip(pelvis[:, 2, 1], -1.0, 1.0))
+    moves["q_pelvis_tilt"] = np.arctan2(-pelvis[:, 0, 1], pelvis[:, 1, 1])
+    rotation = np.arctan2(-pelvis[:, 2, 0], pelvis[:, 2, 2])
+    moves["q_pelvis_rotation"] = rotation if wraps else np.unwrap(rotation)
 
 
 def later(seconds: float) -> Callable[[Path], None]:

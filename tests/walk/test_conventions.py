@@ -2,6 +2,7 @@
 
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -80,6 +81,35 @@ def test_of_what_is_right_nothing_is_said_and_the_walk_is_the_same(walks, tmp_pa
     found = reaction(folder)
     assert np.allclose(level(found.residual), level(usual.residual), atol=0.5)
     assert np.allclose(found.residual[:, [2, 5]], usual.residual[:, [2, 5]], atol=0.5)
+
+
+@pytest.mark.parametrize("by", [0.0, np.pi / 2.0, np.pi, -4.0])
+@pytest.mark.parametrize("how", ["numbered", "walkway", "exchanged"])
+def test_the_feet_of_one_who_turns_are_known(made, by, how):
+    """The right of a walker who turns is no direction of the laboratory."""
+    from walking_matrix import conventions
+
+    conventions.over_ground(by)(made)
+    usual = fp.read_study(made).trials[0]
+    jumps = [words for words in usual.remarks if "jumps by a turn" in words]
+    assert len(usual.remarks) == len(jumps) == (abs(by) > 3.0)
+    getattr(conventions, how)(made)
+    found = fp.read_study(made).trials[0]
+    assert len(found.remarks) == 1 + len(jumps)
+    assert np.ptp(found["q_pelvis_rotation"]) == pytest.approx(abs(by), abs=0.5)
+    for name in ("r_Fy", "l_Fy", "r_copx", "l_copz", "r_Ty"):
+        loaded = usual[f"{name[0]}_Fy"] > 30.0
+        np.testing.assert_allclose(found[name][loaded], usual[name][loaded], atol=1e-3)
+
+
+def test_of_one_who_stands_nothing_is_said(gait, tmp_path):
+    from walks.synthetic import Wrong, make
+
+    still = replace(
+        gait, coefficients=gait.coefficients * np.r_[1.0, np.full(len(gait.coefficients) - 1, 0.03)][:, None]
+    )
+    make(replace(still, share=0.0 * gait.share + 0.5), tmp_path, Wrong(strides=3, tissue=0.05), 7)
+    assert fp.read_study(tmp_path).trials[0].remarks == ()
 
 
 def stated(folder, **keys):
