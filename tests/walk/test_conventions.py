@@ -11,6 +11,9 @@ import pytest
 import fes_pin as fp
 from fes_pin.data.errors import InputError
 from fes_pin.data.motion import read_coordinates
+from fes_pin.data.new_body_study import new_body_study
+from fes_pin.data.schema import BODY
+from fes_pin.data.wanted import Wanted
 from fes_pin.walk.recording import recordings_of
 
 pytestmark = pytest.mark.shared
@@ -212,3 +215,18 @@ def test_the_measured_walk_follows_the_format(walk, tmp_path):
     assert len(said) == 3 and all(
         conventions.WRONG[n][1] in " ".join(said) for n in ("right knee", "lateral sign", "pressure in mm")
     )
+
+
+def test_a_new_study_states_conventions_that_are_set(walks, tmp_path):
+    from walking_matrix.conventions import numbered
+
+    folder = Path(shutil.copytree(walks[False][0], tmp_path / "walk"))
+    numbered(folder)
+    (folder / "grf.csv").unlink()
+    (folder / "study.toml").unlink()
+    settings = {"mass_kg": "70", "height_m": "1.7", "knee_flexion_left": "positive"}
+    wanted = Wanted(tuple(sorted(folder.glob("*.*"))), BODY, folder, "mine", settings=settings)
+    text = new_body_study(wanted).contents["study.toml"]
+    assert '[conventions]\nknee_flexion_left = "positive"\n' in text
+    (folder / "study.toml").write_text(text)
+    assert "plate 1 is the left foot's" in " ".join(fp.read_study(folder).trials[0].remarks)
