@@ -290,11 +290,11 @@ class _Walk:
         design = np.concatenate([np.stack([zero, fz, -fy], axis=1), np.stack([fy, -fx, zero], axis=1)])
         for unit, factor in MOMENTS.items():
             left = (arm - factor * level).T.ravel()
-            if not np.isfinite(left).all():
+            if not (np.isfinite(left).all() and np.isfinite(design).all()):
                 continue
             origin = np.linalg.lstsq(design, left, rcond=None)[0]
             rest = left - design @ origin
-            if np.sum(rest**2) > (1.0 - EXPLAINED) * np.sum((factor * level) ** 2):
+            if not np.sum(rest**2) < (1.0 - EXPLAINED) * np.sum((factor * level) ** 2) < np.inf:
                 continue
             free = factor * moment - np.cross(point - origin, force)
             plate.update(Tx=0.0 * free[:, 1], Ty=np.where(force[:, 1] > LOADED_N, free[:, 1], 0.0), Tz=0.0 * free[:, 1])

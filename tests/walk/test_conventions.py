@@ -86,7 +86,7 @@ def test_of_what_is_right_nothing_is_said_and_the_walk_is_the_same(walks, tmp_pa
     assert np.allclose(found.residual[:, [2, 5]], usual.residual[:, [2, 5]], atol=0.5)
 
 
-@pytest.mark.parametrize("by", [0.0, np.pi / 2.0, np.pi, -4.0])
+@pytest.mark.parametrize("by", [0.0, np.pi / 2.0, np.pi, -8.0])
 @pytest.mark.parametrize("how", ["numbered", "walkway", "exchanged"])
 def test_the_feet_of_one_who_turns_are_known(made, by, how):
     """The right of a walker who turns is no direction of the laboratory."""
