@@ -1,7 +1,7 @@
 """Postures of the walk by name, and measured walking as postures of a body that stands on one forefoot."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import lru_cache, partial
 from pathlib import Path
 
@@ -10,6 +10,7 @@ import numpy as np
 from fes_pin.body.anthropometry import HIP_SPACING
 from fes_pin.body.joints import JOINT_NAMES, MIRROR_SIGN, SIDES, mirrored
 from fes_pin.data.errors import InputError
+from fes_pin.data.legs import turn
 from fes_pin.data.named import NamedArray
 from fes_pin.data.numbers import all_known, known_word
 from fes_pin.data.table import own_table
@@ -67,13 +68,6 @@ def mirror(angles: Mapping[str, float]) -> dict[str, float]:
 # Axes of OpenSim's ankle and subtalar joints of the right leg (gait2354, `subject01_model.json`), in our axes.
 _ANKLE_AXIS = np.array([-0.10501355, -0.97912632, -0.17402245])
 _SUBTALAR_AXIS = np.array([0.78717961, 0.12094949, 0.60474746])
-
-
-def turn(axis: Sequence[float] | np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """Rotations about an axis by angles (n,), rad: (n, 3, 3)."""
-    x, y, z = np.asarray(axis) / np.linalg.norm(axis)
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + np.sin(angle)[:, None, None] * cross + (1.0 - np.cos(angle))[:, None, None] * (cross @ cross)
 
 
 def ankle_angles(rotation: np.ndarray, side: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

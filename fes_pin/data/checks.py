@@ -164,7 +164,10 @@ def check_values(
         raise error(f"expected 0 or 1, found {columns['stim'][sample]:g}", "stim", sample)
     if len(schema.recordings) > 1 and knees_bend_positively(columns):
         raise error("its knees bend positively; expected flexion below 0, as gait2354 has it", "q_knee_angle_r", None)
-    turning = [f"q_{one}" for one in REQUIRED if one not in TRANSLATIONS] if len(schema.recordings) > 1 else []
+    turning = [
+        f"q_{one}" for one in REQUIRED if one not in (*TRANSLATIONS, "pelvis_rotation")
+    ]  # one may walk in circles
+    turning = turning if len(schema.recordings) > 1 else []
     for name in ("angle_rad", *turning):
         if name in columns and (most := float(np.abs(columns[name]).max())) > TURN:
             message = f"reaches {most:.4g}; no {'ankle' if name == 'angle_rad' else 'joint'} turns so far"

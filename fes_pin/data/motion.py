@@ -24,11 +24,13 @@ OPTIONAL = (
     *(f"{joint}_{side}" for side in "rl" for joint in ("subtalar_angle", "mtp_angle")),
     *("lumbar_extension", "lumbar_bending", "lumbar_rotation"),
 )
-GROUND_REACTION = tuple(f"{side}_{kind}{axis}" for side in "rl" for kind in ("F", "cop", "T") for axis in "xyz")
+PLATE = tuple(f"_{kind}{axis}" for kind in ("F", "cop", "T") for axis in "xyz")
+GROUND_REACTION = tuple(f"{side}{kind}" for side in "rl" for kind in PLATE)
+"""Columns of one plate after its label, and of both feet."""
 
 _OPENSIM_GROUND = re.compile(
-    r"^(?P<before>(?:[12rl]|right|left)_|)ground_(?P<what>force|torque|moment)"
-    r"_?(?:(?P<foot>[12rl]|right|left|calcn_[rl])_)?(?P<kind>[vpm]?)(?P<axis>[xyz])$",
+    r"^(?P<before>(?:\d|[rl]|right|left)_|)ground_(?P<what>force|torque|moment)"
+    r"_?(?:(?P<foot>\d|[rl]|right|left|calcn_[rl])_)?(?P<kind>[vpm]?)(?P<axis>[xyz])$",
     re.IGNORECASE,
 )
 STORAGE = (".mot", ".sto")
@@ -38,6 +40,8 @@ MARKERS = (".c3d", ".trc")
 NO_ANGLES = "holds markers: OpenSim's inverse kinematics makes joint coordinates of them, and its .mot is read here"
 APART_M = 0.02
 """Least sideways distance of two plates' centres of pressure that identifies the right foot's."""
+ONE_TURN = 2.0 * np.pi * (1.0 + 1e-3)
+"""rad; an angle that wraps varies by no more, but for rounding."""
 BENT_RAD, BACK_RAD = 0.7, -0.26
 """Knees that both pass the first and never the second count flexion positive: none extends 0.7 rad beyond straight."""
 
@@ -123,7 +127,25 @@ def read_coordinates(path: str | Path) -> tuple[np.ndarray, dict[str, np.ndarray
 
 
 def coordinates_of(table: Table, in_degrees: bool | None) -> dict[str, np.ndarray]:
-    """The coordinates that a table holds, in rad and m; see `read_coordinates`."""
+    """The coordinates that a table holds, in rad and m, by themselves; see `read_coordinates`."""
+    return _knees_as_gait2354(unwrapped(in_radians(named_coordinates(table), stated_degrees(table, in_degrees)))[0])
+
+
+def stated_degrees(table: Table, in_degrees: bool | None) -> bool:
+    """Whether the header says degrees; InputError where it says nothing."""
+    if in_degrees is None:
+        raise InputError("expected inDegrees=yes or inDegrees=no in the header", file=table.path, row=1)
+    return in_degrees
+
+
+def named_coordinates(table: Table) -> dict[str, np.ndarray]:
+    """The coordinates that a table holds as `q_<coordinate>`, with their rates, in the units of the file.
+
+    Raises
+    ------
+    InputError
+        A required coordinate is missing, or in another unit, or one is misspelt.
+    """
     storage = is_storage(table.path)
     names = {(_coordinate(name) if storage else name): name for name in table.names[1:]}
     known = [f"q_{name}" for name in (*REQUIRED, *OPTIONAL)]
@@ -133,14 +155,29 @@ def coordinates_of(table: Table, in_degrees: bool | None) -> dict[str, np.ndarra
     for name, original in names.items():
         if name.startswith("q_") and name not in known and is_like(name, known, cutoff=0.92):
             raise table.error(unknown(name, known), original)
-    if in_degrees is None:
-        raise InputError("expected inDegrees=yes or inDegrees=no in the header", file=table.path, row=1)
-    columns = {}
-    for name, original in names.items():
-        if name.startswith(("q_", "qd_", "qdd_")):
-            angle = name.split("_", 1)[1] not in TRANSLATIONS
-            columns[name] = table.columns[original] * (np.pi / 180.0 if in_degrees and angle else 1.0)
-    return _knees_as_gait2354(columns)
+    return {name: table.columns[of] for name, of in names.items() if name.startswith(("q_", "qd_", "qdd_"))}
+
+
+def is_angle(name: str) -> bool:
+    """Whether a column `q_<coordinate>`, or of its rates, is of an angle."""
+    return name.split("_", 1)[1] not in TRANSLATIONS
+
+
+def in_radians(columns: Mapping[str, np.ndarray], in_degrees: bool) -> dict[str, np.ndarray]:
+    """Coordinates with their angles in rad."""
+    return {n: v * (np.pi / 180.0 if in_degrees and is_angle(n) else 1.0) for n, v in columns.items()}
+
+
+def unwrapped(columns: Mapping[str, np.ndarray]) -> tuple[dict[str, np.ndarray], list[str]]:
+    """Coordinates whose angles, rad, do not jump by a turn, and the names of those that did.
+
+    What wraps stays within one turn.
+    """
+    within = {n: v for n, v in columns.items() if n.startswith("q_") and is_angle(n) and np.ptp(v) < ONE_TURN}
+    angles = {n: np.unwrap(v) for n, v in within.items()}
+    jumped = [n for n, v in angles.items() if np.ptp(v - columns[n]) > np.pi]
+    turns = {n: angles[n] - 2.0 * np.pi * np.round(np.mean(angles[n]) / (2.0 * np.pi)) for n in jumped}
+    return {**columns, **turns}, jumped
 
 
 def knees_bend_positively(columns: Mapping[str, np.ndarray]) -> bool:
@@ -191,16 +228,36 @@ def read_ground_reaction(path: str | Path) -> tuple[np.ndarray, dict[str, np.nda
 
 def ground_reaction_of(table: Table) -> dict[str, np.ndarray]:
     """The ground reaction that a table holds; see `read_ground_reaction`."""
-    names = {(_ground(name) if is_storage(table.path) else name): name for name in table.names[1:]}
-    if "2_Fy" in names:
-        right = _right_plate(table, names)
-        names = {{right: "r", "12".replace(right, ""): "l"}.get(n[0], n[0]) + n[1:]: name for n, name in names.items()}
-    else:
-        names = {("l" if n.startswith("1_") else n[0]) + n[1:]: name for n, name in names.items()}
+    plates = plates_in(table)
+    if not set(plates) & set("rl"):
+        right = _right_plate(table, plates)
+        plates = {("r" if label == right else "l"): values for label, values in plates.items()}
     for name in GROUND_REACTION:
-        if name not in names:
+        if name[0] not in plates:
             raise _missing(table, name, table.names)
-    return {name: table.columns[names[name]] for name in GROUND_REACTION}
+    return {name: plates[name[0]][name[2:]] for name in GROUND_REACTION}
+
+
+def plates_in(table: Table) -> dict[str, dict[str, np.ndarray]]:
+    """Columns `Fx` ... `Tz` of every plate, by the foot that the file names, `r` or `l`, or by the plate's number.
+
+    Raises
+    ------
+    InputError
+        A column of a plate is missing, or there is no plate.
+    """
+    names = {(_ground(name) if is_storage(table.path) else name): name for name in table.names[1:]}
+    labels = list(dict.fromkeys(n[0] for n in names if n[1:] in PLATE))
+    numbered = [n for n in labels if n.isdigit()]
+    if numbered and "r" in labels:  # as in OpenSim's gait examples, where a column without a foot or number is of `r`
+        called = {"1": "l"} if numbered == ["1"] else {"r": "0"}
+        names = {called.get(n[0], n[0]) + n[1:]: of for n, of in names.items()}
+        labels = list(dict.fromkeys(called.get(n, n) for n in labels))
+    for label in labels or ["r"]:
+        for kind in PLATE:
+            if f"{label}{kind}" not in names:
+                raise _missing(table, f"{label}{kind}", table.names)
+    return {label: {kind[1:]: table.columns[names[f"{label}{kind}"]] for kind in PLATE} for label in labels}
 
 
 def _ground(name: str) -> str:
@@ -214,17 +271,15 @@ def _ground(name: str) -> str:
     return f"{foot}_{kind}{found['axis'].lower()}"
 
 
-def _right_plate(table: Table, names: Mapping[str, str]) -> str:
-    """Which of plates 1 and 2 is under the right foot."""
+def _right_plate(table: Table, plates: Mapping[str, Mapping[str, np.ndarray]]) -> str:
+    """Which of two plates is under the right foot of one who walks along x, where nothing is known of the feet."""
     across = {}
-    for plate in "12":
-        if not {f"{plate}_Fy", f"{plate}_copz"} <= set(names):
-            raise table.error("missing", next(n for n in ("Fy", "copz") if f"{plate}_{n}" not in names))
-        load = np.clip(table.columns[names[f"{plate}_Fy"]], 0.0, None)
-        across[plate] = float(load @ table.columns[names[f"{plate}_copz"]] / max(load.sum(), 1e-9))
-    if abs(across["1"] - across["2"]) < APART_M:
+    for label, plate in plates.items():
+        load = np.clip(plate["Fy"], 0.0, None)
+        across[label] = float(load @ plate["copz"] / max(load.sum(), 1e-9))
+    if len(across) != 2 or np.ptp(list(across.values())) < APART_M:
         message = "expected columns that name the foot, r_ and l_: the plates' order does not show it"
-        raise table.error(message, names["1_Fy"])
+        raise InputError(message, file=table.path, row=table.header_row or None)
     return max(across, key=lambda plate: across[plate])
 
 

@@ -3,18 +3,19 @@
 from pathlib import Path
 
 from fes_pin.data.errors import InputError, fault_at
-from fes_pin.data.motion import coordinates_of, ground_reaction_of, read_motion
+from fes_pin.data.motion import named_coordinates, plates_in, read_motion, stated_degrees
 from fes_pin.data.new_study import NewStudy, placed
 from fes_pin.data.schema import BODY, check_known
 from fes_pin.data.study_text import HEADER, toml_table
+from fes_pin.data.walk_conventions import WORDS, checked_conventions
 from fes_pin.data.wanted import Wanted, labels_of, number_set
 
 
 def new_body_study(wanted: Wanted) -> NewStudy:
     """Propose a study of a walking body: the first coordinates go with the first ground reaction.
 
-    Its files are `.mot`, `.sto` or CSV, named as the study format says; what is set is `mass_kg` and `height_m`, and
-    conditions of all trials.
+    Its files are `.mot`, `.sto` or CSV, named as the study format says; what is set is `mass_kg` and `height_m`,
+    conditions of all trials, and conventions of the files.
 
     Raises
     ------
@@ -27,13 +28,15 @@ def new_body_study(wanted: Wanted) -> NewStudy:
     if len(moves) != len(pushes) or not moves:
         found = f"{len(moves)} of coordinates and {len(pushes)} of ground reaction"
         raise InputError(f"expected as many files of joint coordinates as of ground reaction, found {found}")
-    check_known(settings, (*BODY.constants, *BODY.conditions), fault_at("--set {}"))
+    stated = checked_conventions({k: v for k, v in settings.items() if k in WORDS}, fault_at("--set {}"))
+    check_known(settings, (*BODY.constants, *BODY.conditions, *WORDS), fault_at("--set {}"))
     missing = [f"--set {key}=NUMBER ({BODY.constants[key].unit})" for key in BODY.either if key not in settings]
     if missing:
         raise InputError(f"the files do not say everything; please add {', '.join(missing)}")
     contents: dict[str, str | bytes] = {}
     rig = {key: number_set(key, settings[key], BODY.constants[key]) for key in BODY.either}
     text = [*HEADER, *toml_table("study", {"name": wanted.name, "rig": BODY.name}), *toml_table("rig", rig)]
+    text += toml_table("conventions", stated)
     given = {key: number_set(key, settings[key], n) for key, n in BODY.conditions.items() if key in settings}
     origins: dict[str, Path] = {}
     for move, push in zip(moves, pushes, strict=True):
@@ -49,8 +52,9 @@ def _is_ground_reaction(path: Path) -> bool:
     """True for a ground reaction, False for joint coordinates."""
     table, in_degrees = read_motion(path)
     try:
-        ground_reaction_of(table)
+        plates_in(table)
     except InputError:
-        coordinates_of(table, in_degrees)
+        named_coordinates(table)
+        stated_degrees(table, in_degrees)
         return False
     return True

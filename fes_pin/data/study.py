@@ -49,6 +49,7 @@ from fes_pin.data.trial import (
     walk_recordings,
 )
 from fes_pin.data.turns import with_whole_turns
+from fes_pin.data.walk_conventions import STANDARD
 
 EDITED = "edited after it was read"
 """What stands in the place of a hash of a file that is no longer what its study holds."""
@@ -375,10 +376,14 @@ def _document(path: str | Path) -> Document:
 class _Reader(StudyTables):
     """One reading of a study.toml with its trials."""
 
+    walks: Mapping[str, Any]
+    """What a body's trials are read by: stated conventions and its mass."""
+
     def study(self) -> Study:
         constants, files = self.rig_table()
         start = self.start_table(constants, files)
         written, tables = self.recordings_tables(files), self._trial_tables()
+        self.walks = {"conventions": self.conventions_table(), "mass_kg": constants.get("mass_kg")}
         views = [self._view(f"trial[{i}]", table, written) for i, table in enumerate(tables)]
         names = self._trial_names(tables, views)
         each = enumerate(zip(tables, views, names, strict=True))
@@ -450,7 +455,7 @@ class _Reader(StudyTables):
             (coordinates, _), (reaction, _) = recordings.values()
             if odd := [key for key in OF_A_VIEW if key in table and key not in ("from", "to")]:
                 raise error(odd[0], f"expected no {odd[0]} of a rig {self.rig}: from and to alone")
-            return [read_body_trial(coordinates, reaction, view, **labels)]
+            return [read_body_trial(coordinates, reaction, view, **self.walks, **labels)]
         trials = read_view(recordings, view, self.schema, {**labels, "kind": kind})
         return trials if "kind" in table else [derived_trial(t, kind="") for t in trials]
 
@@ -499,6 +504,8 @@ def write_study(study: Study, folder: str | Path, *, overwrite: bool = False) ->
         tables.append({**dict(zip(schema.recordings, named, strict=True)), **known})
     head = {"name": study.name, "rig": study.rig, **({HORIZON: study.horizon_s} if study.horizon_s else {})}
     document = {"study": head, "rig": rig, "start": dict(study.start)}
+    if len(schema.recordings) > 1:
+        document["conventions"] = STANDARD
     contents["study.toml"] = tomli_w.dumps({**document, "trial": tables})
     Outputs("fp.write_study", overwrite).write(as_path(folder, "folder"), contents)
 

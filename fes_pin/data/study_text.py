@@ -21,6 +21,7 @@ from fes_pin.data.schema import Rigs, RigSchema, check_known, number_or_none, on
 from fes_pin.data.toml import Document
 from fes_pin.data.units import own_unit
 from fes_pin.data.urdf import is_revolute, moving_joints
+from fes_pin.data.walk_conventions import checked_conventions
 
 NOTES = ("description", "subject", "source", "licence", "license", "date", "notes")
 HORIZON = "horizon_s"
@@ -61,7 +62,8 @@ class StudyTables:
         self.document, self.rigs = document, rigs
         self.folder = document.path.parent
         self.error = document.error
-        check_known(document.data, ("study", "rig", "start", "columns", "sources", "trial"), self.error)
+        known = ("study", "rig", "start", "columns", "sources", "conventions", "trial")
+        check_known(document.data, known, self.error)
         self.name, self.rig = self._study_table()
         self.schema = rigs[self.rig]
 
@@ -102,6 +104,13 @@ class StudyTables:
         stated = self.schema.left_out(files, {*table, *constants})
         known = {key: number for key, number in known.items() if key not in stated}
         return {**self.document.numbers("start", table, known), **stated}
+
+    def conventions_table(self) -> dict[str, Any]:
+        """Conventions that a study of a walking body states, by key."""
+        table = self.document.table("conventions")
+        if table and len(self.schema.recordings) == 1:
+            raise self.error("conventions", f"rig {self.rig} takes none; its [columns] have units, scales and zeros")
+        return checked_conventions(table, self.document.under("conventions"))
 
     def columns_table(self, files: Mapping[str, Path]) -> Columns | None:
         """How the recordings are written, where the study says so."""

@@ -13,9 +13,18 @@ import numpy as np
 
 from fes_pin.data.as_read import AsRead, digest_of, hashing
 from fes_pin.data.checks import check_columns, check_values, checked_label, checked_labels, checked_mapping
-from fes_pin.data.errors import InputError, fault_at
+from fes_pin.data.errors import InputError, errors_of, fault_at
 from fes_pin.data.files import as_path
-from fes_pin.data.motion import GROUND_REACTION, coordinates_of, ground_reaction_of, on_common_time, read_motion
+from fes_pin.data.motion import (
+    GROUND_REACTION,
+    coordinates_of,
+    ground_reaction_of,
+    named_coordinates,
+    on_common_time,
+    plates_in,
+    read_motion,
+    stated_degrees,
+)
 from fes_pin.data.numbers import instance
 from fes_pin.data.outputs import written_by
 from fes_pin.data.read_only import ReadOnly
@@ -33,6 +42,7 @@ from fes_pin.data.schema import (
 )
 from fes_pin.data.show import DataFrame, frame
 from fes_pin.data.table import MIN_ROWS, Table, check_time, check_times, format_csv
+from fes_pin.data.walk_conventions import conventional
 
 OF_THE_START = ("position0", "velocity0")
 """Conditions that state where a trial begins: of its later parts they say nothing."""
@@ -510,11 +520,14 @@ def read_body_trial(
     *,
     name: str,
     conditions: Mapping[str, float],
+    conventions: Mapping[str, Any] | None = None,
+    mass_kg: float | None = None,
     **labels: Any,
 ) -> Trial:
     """Read a walking trial from its two files, on the coordinates' times; `labels` are further fields of it.
 
-    Of a view its two ends are taken.
+    Of a view its two ends are taken. Conventions that are not stated are tested: see `data.walk_conventions`. Its
+    remarks say which were taken.
 
     Raises
     ------
@@ -526,13 +539,16 @@ def read_body_trial(
         pushes, _ = read_motion(ground_reaction)
     if view is not None:
         (moves,), (pushes,) = view.parts(moves, ()), view.parts(pushes, ())
-    recordings = ((moves.time, coordinates_of(moves, in_degrees)), (pushes.time, ground_reaction_of(pushes)))
+    raw, plates, degrees = named_coordinates(moves), plates_in(pushes), stated_degrees(moves, in_degrees)
+    with errors_of(ground_reaction):
+        placed, pushed, said = conventional(moves.time, raw, degrees, pushes.time, plates, conventions, mass_kg)
+    recordings = ((moves.time, placed), (pushes.time, pushed))
     time, columns = on_common_time(*recordings[0], *recordings[1])
     if len(time) < MIN_ROWS:
         message = f"expected at least {MIN_ROWS} samples in the time of {coordinates.name}, found {len(time)}"
         raise pushes.error(message, pushes.names[0], 0)
-    as_read = AsRead(sha256, b"", recordings=recordings)
-    labels["remarks"] = (*labels.get("remarks", ()), *moves.said, *pushes.said)
+    as_read = AsRead(sha256, b"", recordings=recordings, stated=frozenset(conventions or ()))
+    labels["remarks"] = (*labels.get("remarks", ()), *moves.said, *pushes.said, *said)
     return _made(columns, time, as_read, name=name, kind="motion", conditions=conditions, **labels)
 
 

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from fes_pin.body.gait import turn
 from fes_pin.body.joints import axis_of
+from fes_pin.data.legs import turn
 from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.table import own_table
 

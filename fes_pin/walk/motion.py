@@ -138,15 +138,41 @@ class Session:
         Speed of the belt, taken as walking over ground: its way is added to pelvis and centres of pressure.
     start_s
         Time at which that way is 0, s.
+    heading_rad
+        How far the walker faces to the left of the laboratory's x, rad: what is read is turned back by it, so that
+        forward is where the walker faces, whatever way the laboratory's axes lie.
     """
 
     cutoff_hz: float = CUTOFF_HZ
     belt_speed_mps: float = 0.0
     start_s: float = 0.0
+    heading_rad: float = 0.0
+
+    @property
+    def ahead(self) -> np.ndarray:
+        """Forward in the laboratory's axes: (3,)."""
+        return np.array([np.cos(self.heading_rad), np.sin(self.heading_rad), 0.0])
+
+    @property
+    def turn(self) -> np.ndarray:
+        """Rotation of the laboratory's axes that has the walker face x: (3, 3)."""
+        return np.array([self.ahead, np.cross([0.0, 0.0, 1.0], self.ahead), [0.0, 0.0, 1.0]])
 
     def way(self, time: np.ndarray) -> np.ndarray:
-        """Return the way of the belt, forwards: (n, 3) m."""
-        return np.outer(self.belt_speed_mps * (time - self.start_s), [1.0, 0.0, 0.0])
+        """Return the way of the belt in the laboratory's axes: (n, 3) m."""
+        return np.outer(self.belt_speed_mps * (time - self.start_s), self.ahead)
+
+
+FACES, TURNS_ROUND = np.radians(20.0), 0.7
+"""One who faces the laboratory's x within the first walks along it; the mean of the directions that one faces is
+shorter than the second where one turns round, and then the laboratory's axes are kept."""
+
+
+def heading_of(columns: Mapping[str, np.ndarray]) -> float:
+    """How far a walker faces to the left of x in the mean, rad; 0 where it is little, or the walker turns round."""
+    faced = np.mean(pelvis_turns(columns)[:, :2, 0], axis=0)
+    angle = float(np.arctan2(faced[1], faced[0]))
+    return angle if abs(angle) > FACES and np.linalg.norm(faced) > TURNS_ROUND else 0.0
 
 
 def motion_of(
@@ -177,14 +203,17 @@ def motion_of(
     if absent := [n for n in REQUIRED if n not in names]:
         raise InputError("the coordinate is missing", column=f"q_{absent[0]}")
     place, rate, change = _paths(columns, time, names, session.cutoff_hz)
-    ahead = names.index("pelvis_tx")
-    place[:, ahead] += session.way(time)[:, 0]
-    rate[:, ahead] += session.belt_speed_mps
+    level = [names.index("pelvis_tx"), names.index("pelvis_tz")]
+    place[:, level] += session.way(time)[:, :2] * [1.0, -1.0]
+    rate[:, level] += session.belt_speed_mps * session.ahead[:2] * [1.0, -1.0]
     moved = (place + step * rate + 0.5 * step**2 * change for step in (0.0, _STEP, -_STEP, 2.0 * _STEP, -2.0 * _STEP))
     q, *near = (_placed(body, model, dict(zip(names, m.T, strict=True)), hip) for m in moved)
     apart = np.array([list(map(partial(pin.difference, model), q, other)) for other in near])
     v = np.tensordot([8.0, -8.0, -1.0, 1.0], apart, 1) / (12.0 * _STEP)
     a = np.tensordot([16.0, 16.0, -1.0, -1.0], apart, 1) / (12.0 * _STEP**2)
+    if session.heading_rad:
+        back = pin.SE3(session.turn, np.zeros(3))
+        q[:, :7] = [pin.SE3ToXYZQUAT(back * pin.XYZQUATToSE3(row)) for row in q[:, :7]]
     return Motion(body, model, np.array(time, dtype=float), q, v, a)
 
 

@@ -39,6 +39,8 @@ class Stated:
     air_n, air_std_n
         (6,) N: forward, left and up force of the left plate, then of the right one, while its foot is in the air, with
         standard errors, infinite of a foot that never is.
+    said
+        What was taken otherwise than it was read.
     """
 
     body_kg: float
@@ -46,6 +48,7 @@ class Stated:
     mass_std_kg: float
     air_n: np.ndarray
     air_std_n: np.ndarray
+    said: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, trials: Sequence[WalkTrial], strides: Strides) -> Stated:
@@ -54,10 +57,20 @@ class Stated:
         air, air_std = (np.hstack(each) for each in zip(*(_in_the_air(trials, side) for side in SIDES), strict=True))
         up = np.array([trials[k].measured[rows, 2].mean() for k, rows, _ in strides.windows if strides.whole])
         mass, std = _mean((up - air[2] - air[5]) / GRAVITY)
-        return cls(body, float(mass), float(np.hypot(std, MEAN_FORCE * body)), air, air_std)
+        said = tuple(words for trial in trials for words in trial.said)
+        return cls(body, float(mass), float(np.hypot(std, MEAN_FORCE * body)), air, air_std, said)
 
     def contradictions(self, study: Study) -> Iterator[str]:
-        """Yield a sentence on the mass where a study states another, and on each plate that reads an unloaded foot."""
+        """Yield a sentence on the mass where a study states another, and on each plate that reads an unloaded foot.
+
+        What was assumed on reading comes first.
+        """
+        done: dict[str, list[str]] = {}
+        for trial in study.trials:
+            for words in trial.remarks:
+                done.setdefault(words, []).append(trial.name)
+        yield from (words if len(study) == 1 else f"{words} ({', '.join(names)})" for words, names in done.items())
+        yield from self.said
         if abs(self.mass_kg - self.body_kg) > max(SEEN_DEVIATIONS * self.mass_std_kg, MASS_SHARE * self.body_kg):
             whose = "mass_kg states" if "mass_kg" in study.constants else "its segments weigh"
             yield f"the plates carry {self.mass_kg:.1f} kg in the mean of whole strides, {whose} {self.body_kg:.4g}"

@@ -15,21 +15,14 @@ from scipy.ndimage import distance_transform_edt, find_objects, label
 from fes_pin.body.joints import SIDES
 from fes_pin.body.skeleton import TO_WORLD
 from fes_pin.data.smooth import low_pass
+from fes_pin.data.walk_conventions import LOADED_N, level_in_the_air
 from fes_pin.walk.motion import Motion, Session, about
 
-LOADED_N = 20.0
-"""A foot stands where its vertical force is above this: the usual threshold on instrumented treadmills."""
 ORDINARY_N = 1.5
 """Standard deviation of the force of calibrated plates: its mean errors were 2.5 to 5 N (A. Cappello et al., Gait
 Posture 33:724, 2011)."""
 SHORTEST_S = 0.1
 """A single support shorter than this is no step."""
-SWINGS = 0.2
-"""Share of the time that a foot which steps is in the air, at least: it swings for 0.4 of a stride (J. Perry, Gait
-Analysis, 1992). The load of one who sways by a quarter of the weight each way is within `LOADED_N` of its least for
-less than 0.16."""
-LEAST = 0.05
-"""Quantile that is taken as the least reading: a few samples may be spikes (a round figure)."""
 
 
 @dataclass(frozen=True)
@@ -100,32 +93,19 @@ def plates_of(
     """
     time, dt = time - later_s, float(time[-1] - time[0]) / (len(time) - 1)
     feet, pressure, loaded, total = {}, {}, {}, columns["r_Fy"] + columns["l_Fy"]
+    turn = session.turn @ TO_WORLD
     for side in SIDES:
         force, point, free = (
-            np.stack([columns[f"{side[0]}_{kind}{c}"] for c in "xyz"], axis=1) @ TO_WORLD.T
-            for kind in ("F", "cop", "T")
+            np.stack([columns[f"{side[0]}_{kind}{c}"] for c in "xyz"], axis=1) @ turn.T for kind in ("F", "cop", "T")
         )
-        point = point + session.way(time)
+        point = point + session.way(time) @ session.turn.T
         wrench = np.hstack([force, np.cross(point, force) + free])
         smooth = low_pass(wrench, dt, session.cutoff_hz)
         feet[side] = _at(at, time, smooth)
         level = level_in_the_air(force[:, 2], total)
         loaded[side] = _at(at, time, force[:, 2:]).ravel() > LOADED_N + level
         pressure[side] = _held(_at(at, time, point), loaded[side] | (2.0 * abs(level) > LOADED_N))
-    return Plates(np.asarray(at, dtype=float), session.way(at), feet, pressure, loaded)
-
-
-def level_in_the_air(up: np.ndarray, total: np.ndarray) -> float:
-    """Return the vertical force that a plate reads while its foot is in the air, N; 0 of a foot that does not step.
-
-    Parameters
-    ----------
-    up, total
-        Vertical force of this plate and of both, (n,) N. A foot that steps carries half of the mean total at least.
-    """
-    least = up < np.quantile(up, LEAST) + LOADED_N
-    level = float(np.median(up[least]))
-    return level if np.mean(least) > SWINGS and 2.0 * (np.max(up) - level) > np.mean(total) else 0.0
+    return Plates(np.asarray(at, dtype=float), session.way(at) @ session.turn.T, feet, pressure, loaded)
 
 
 def _at(at: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -157,6 +137,8 @@ class WalkTrial:
         Function of times, and of how much later than their clock says the plates are read: the plates.
     session
         Low pass and treadmill.
+    said
+        What was taken otherwise than it was read, a sentence each.
     """
 
     name: str
@@ -167,6 +149,7 @@ class WalkTrial:
     moved: Callable[[np.ndarray, Mapping[str, np.ndarray]], Motion] = field(repr=False)
     read: Callable[..., Plates] = field(repr=False)
     session: Session
+    said: tuple[str, ...] = ()
 
     def read_later(self, later_s: float) -> WalkTrial:
         """Return the trial with the plates read that much later than their clock says."""

@@ -53,9 +53,10 @@ def scaled(path, chosen, factor):
     put(path, names, values)
 
 
-def exchanged(path):
+def moved(path, part, by):
     names, values = table(path)
-    put(path, [{"r_": "l_", "l_": "r_"}.get(n[:2], n[:2]) + n[2:] for n in names], values)
+    values[:, [part in n for n in names]] += by
+    put(path, names, values)
 
 
 def emptied(path):
@@ -71,10 +72,8 @@ def shortened(path):
 
 
 REFUSED = {  # file, change, words
-    "millimetres": ("grf.csv", lambda p: scaled(p, lambda n: "cop" in n, 1000.0), "580 m from the body: expected m"),
-    "action": ("grf.csv", lambda p: scaled(p, lambda n: n[2:3] == "F", -1.0), "the ground pushes up"),
-    "exchanged": ("grf.csv", exchanged, "the feet are exchanged"),
-    "beside": ("grf.csv", lambda p: scaled(p, lambda n: n != "time", 1e-3), "does a foot step next to them?"),
+    "elsewhere": ("grf.csv", lambda p: moved(p, "copx", 5.0), "m from the body: expected m"),
+    "beside": ("grf.csv", lambda p: scaled(p, lambda n: n[2:3] == "F", 1e-2), "does a foot step next to them?"),
     "gap": ("coords.csv", emptied, "row 51, column q_pelvis_ty: expected a number, found nothing"),
     "samples": ("coords.csv", shortened, "expected a fixed step"),
 }
