@@ -45,7 +45,7 @@ def new_body_study(wanted: Wanted) -> NewStudy:
         named = dict(zip(BODY.recordings, places, strict=True))
         text += toml_table("[trial]", {**named, **labels_of(wanted, move, push), **given})
     contents["study.toml"] = "\n".join(text) + "\n"
-    return NewStudy(contents, (), (), origins)
+    return NewStudy(contents, (), origins)
 
 
 def _is_ground_reaction(path: Path) -> bool:
