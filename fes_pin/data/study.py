@@ -24,6 +24,7 @@ from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.recorded.columns import Columns
 from fes_pin.data.schema import Rigs, RigSchema, check_conditions, check_known, checked_numbers, known_rigs, schema_of
 from fes_pin.data.show import DataFrame, by_columns, frame, table_html
+from fes_pin.data.stimulus import with_one_stimulus
 from fes_pin.data.study_text import HORIZON, StudyTables, check_files, checked_horizon
 from fes_pin.data.table import format_csv
 from fes_pin.data.toml import Document, document_of, read_toml
@@ -113,7 +114,7 @@ class Study(ReadOnly):
             check_files(schema, files)
         trials = tuple(self.trials) if isinstance(self.trials, Iterable) else (self.trials,)
         if all(isinstance(t, Trial) for t in trials):
-            trials = with_kinds(trials, schema)
+            trials = with_one_stimulus(with_kinds(trials, schema), numbers["constants"])
         self._check_trials(trials, schema)
         if schema.inputs_required:  # else a trial without an input is one that nothing drives
             check_same_inputs([(t.kind, t.columns) for t in trials], schema, numbers["constants"], _fault_of(trials))
@@ -366,7 +367,8 @@ class _Reader(StudyTables):
         start = self.start_table(constants)
         own, tables = self.columns_table(files), self._trial_tables()
         each = enumerate(zip(tables, self._trial_names(tables), strict=True))
-        trials = with_kinds([self._trial(f"trial[{i}]", table, name, own) for i, (table, name) in each], self.schema)
+        read = [self._trial(f"trial[{i}]", table, name, own) for i, (table, name) in each]
+        trials = with_one_stimulus(with_kinds(read, self.schema), constants)
         check_same_inputs([(t.kind, t.columns) for t in trials], self.schema, constants, self._fault_of)
         horizon = checked_horizon(self.document.table("study").get(HORIZON), self.document.under("study"))
         folder = self.folder.absolute()

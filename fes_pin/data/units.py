@@ -1,6 +1,6 @@
 """Units that recordings come in, and what they are in the study format's own.
 
-A table and no units library: a study holds eight quantities, every factor of `units.csv` is exact by definition, and
+A table and no units library: a study holds a dozen quantities, every factor of `units.csv` is exact by definition, and
 headers write units as no library reads them: `Torque_Nm` is a newton metre, which a units library takes for a
 nanometre.
 """
@@ -26,6 +26,7 @@ _SPELLINGS: dict[str, str] = {}
 """Other spellings, as measuring systems write them, in the form that `_plain` leaves."""
 
 _BY_SUFFIX = {"s": "time", "us": "pulse width", "rad": "angle", "m": "length", "n": "force", "nm": "torque"}
+_BY_SUFFIX |= {"ma": "current", "uc": "charge", "hz": "frequency"}
 _OF_A_JOINT = {"position": ("angle", "length"), "velocity": ("angular rate", "speed"), "effort": ("torque", "force")}
 
 
@@ -73,6 +74,16 @@ def known_unit(unit: str, quantities: tuple[str, ...]) -> tuple[str, str] | None
     return next(((q, _KNOWN[q][plain]) for q in quantities if plain in _KNOWN[q]), None)
 
 
+def is_another(unit: str, column: str, revolute: bool | None = None) -> bool:
+    """Return whether a unit is known, and of a quantity that a rig's column cannot hold.
+
+    A motor's current is an effort up to the motor's constant.
+    """
+    scaled = ("current",) if column == "effort" else ()
+    is_own = known_unit(unit, (*quantities_of(column, revolute), *scaled)) is not None
+    return bool(unit) and not is_own and known_unit(unit, tuple(UNITS)) is not None
+
+
 def factor_of(
     unit: str, column: str, revolute: bool | None = None, error: Callable[[str], Exception] = ValueError
 ) -> float:
@@ -105,6 +116,10 @@ def own_unit(column: str, revolute: bool | None = None) -> str:
     return " or ".join(u for u in units if u != "1")
 
 
+_CAPITALS = re.compile(r"^(?P<name>.*[a-z])(?P<unit>[A-Z]{2,})$")
+"""A unit in capitals behind a word: `ForceKG`."""
+_LETTERS = ("a",)
+"""Units that in a name are letters, as those of channels, but for behind a stroke: `force_a`, `I/A`."""
 _BRACKETED = re.compile(r"^(?P<name>.*?)\s*[\[(<{]\s*(?P<unit>[^\])>}]*?)\s*[\])>}]\s*$")
 
 
@@ -126,6 +141,11 @@ def split_header(header: str) -> tuple[str, str]:
             before, _, per = name.rpartition("_")
             if before and known_unit(f"{per}/{unit}", tuple(UNITS)):
                 return before, f"{per}/{unit}"
-        if at and name and known_unit(unit, tuple(UNITS)):
+        if at and name and known_unit(unit, tuple(UNITS)) and (separator == "/" or unit.lower() not in _LETTERS):
             return name.strip(), unit
+    if len(text) > len("hertz") and known_unit(text, tuple(UNITS)):  # a unit written out: `MilliAmpere`
+        return text, text
+    found = _CAPITALS.match(text)
+    if found and known_unit(found["unit"], tuple(UNITS)):
+        return found["name"], found["unit"]
     return text, ""

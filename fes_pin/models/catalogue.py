@@ -11,6 +11,7 @@ from typing import Any
 from fes_pin.data.errors import InputError
 from fes_pin.data.schema import RigSchema
 from fes_pin.models import effects, rigs
+from fes_pin.models.in_channel import in_channel
 from fes_pin.models.outside import check_effect, check_rig, classes_of, in_one_line, load_module, origin
 from fes_pin.models.rigs.base import Rig
 from fes_pin.models.stage import Effect, by_name, in_order
@@ -46,8 +47,9 @@ class Catalogue:
         return by_name(self.effects, name)
 
     def effects_for(self, rig: Rig | type[Rig]) -> tuple[type[Effect], ...]:
-        """The effects that a rig can have."""
-        return tuple(e for e in self.effects if rig.takes(e))
+        """The effects that a rig can have, of a rig with a stimulus in the unit of that."""
+        channel = rig.channel if isinstance(rig, Rig) else None
+        return tuple(in_channel(e, channel) for e in self.effects if rig.takes(e))
 
     def schemas(self) -> dict[str, RigSchema]:
         """What a study of each rig must and may hold, by the rig's name; see `read_study`."""

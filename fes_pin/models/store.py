@@ -12,6 +12,7 @@ from fes_pin.data.numbers import instance
 from fes_pin.data.schema import NumberKey, one_of
 from fes_pin.data.toml import Document, read_toml
 from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
+from fes_pin.models.in_channel import in_channel
 from fes_pin.models.model import Model
 from fes_pin.models.outside import origin
 from fes_pin.models.rigs.base import Rig
@@ -95,7 +96,7 @@ def load_model(path: str | Path, *, library: Source | Sequence[Source] | None = 
     listed = document.table("effects")
     for name in listed:
         try:
-            model = model + _effect(document, catalogue, name, listed)
+            model = model + _effect(document, catalogue, name, listed, model.rig)
         except InputError as problem:
             if problem.file is not None:
                 raise
@@ -117,10 +118,10 @@ def _missing(document: Document, name: object, otherwise: str) -> str:
     return f"{name} is of {where}; expected library='{'PATH/' if where.endswith('.py') else ''}{where}'"
 
 
-def _effect(document: Document, catalogue: Catalogue, name: str, listed: dict[str, Any]) -> Effect:
+def _effect(document: Document, catalogue: Catalogue, name: str, listed: dict[str, Any], rig: Rig) -> Effect:
     key = f"effects.{name}"
     try:
-        kind = catalogue.effect(name)
+        kind = in_channel(catalogue.effect(name), rig.channel)
     except InputError as problem:
         raise document.error(key, _missing(document, name, problem.message)) from None
     each_trial = document.table(key, listed).pop(EACH_TRIAL, False)

@@ -13,6 +13,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from fes_pin.data.channels import CHANNELS, WIDTH
 from fes_pin.data.errors import InputError
 from fes_pin.data.imposed import MOTION
 from fes_pin.data.numbers import shortened
@@ -183,13 +184,14 @@ def _try_on(rig: type[Rig], one: type[Effect], model: Model) -> None:
 
 
 def _rig(rig: type[Rig]) -> Rig:
-    return rig(constants={n: k + 1.0 for k, n in enumerate(rig.needed)})
+    ends = [n for n in WIDTH.ends if n in rig.schema.constants]
+    return rig(constants={n: k + 1.0 for k, n in enumerate(dict.fromkeys((*rig.needed, *ends)))})
 
 
 def _kinds(rig: type[Rig]) -> Iterator[tuple[str, tuple[str, ...]]]:
     """Every kind of trial, with each stimulus."""
     for kind in rig.schema.outputs:
-        for stimulus in rig.schema.stimuli(kind) or ("",):
+        for stimulus in [n for n in rig.schema.stimuli(kind) if n not in CHANNELS or n == WIDTH.column] or ("",):
             yield kind, (*filter(None, [stimulus]), *(MOTION if rig.schema.motion(kind) else ()))
 
 

@@ -15,7 +15,7 @@ from fes_pin.data.recorded.formats import check_suffix, is_text, read_recording
 from fes_pin.data.recorded.text import DECIMALS, DELIMITERS, MISSING, TextForm, cells_of, read_text_recording
 from fes_pin.data.schema import MEANT, RigSchema, without_unit
 from fes_pin.data.table import Table
-from fes_pin.data.units import UNITS, known_unit, quantities_of, split_header
+from fes_pin.data.units import UNITS, is_another, known_unit, quantities_of, split_header
 
 LOOKED_AT = 400
 """Lines that are looked at; no preamble of an instrument is nearly as long."""
@@ -198,12 +198,11 @@ def _numbers(path: Path, form: TextForm) -> Table:
 def _candidates(
     column: str, names: Sequence[str] | Mapping[str, object], units: Mapping[str, str], revolute: bool | None
 ) -> Iterator[str]:
-    quantities = quantities_of(column, revolute)
     for name in names:
         bare, _ = split_header(name)
         unit = units.get(name, "")
-        if unit and known_unit(unit, quantities) is None and known_unit(unit, tuple(UNITS)) is not None:
-            continue  # another quantity
+        if is_another(unit, column, revolute):
+            continue
         words = _words(bare)
         if name == column or without_unit(column) == "_".join(words) or words & MEANT.get(column, frozenset()):
             yield name

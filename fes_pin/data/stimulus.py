@@ -1,0 +1,84 @@
+"""Trials of a muscle with the one quantity of their pulses that recruits."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from fes_pin.data.channels import AMPLITUDE, CHARGE, RATE, STIMULI, WIDTH, Channel, channel_of
+from fes_pin.data.trial import Trial, derived_trial
+
+SAME = 0.01
+"""Share by which a quantity of the pulses varies that a stimulator holds: a log rounds it, or reads it back."""
+
+
+def usual_rate(trials: Sequence[Trial]) -> float | None:
+    """The median rate in Hz of trials while they are stimulated; None where no rate was recorded above 0."""
+    rates = np.concatenate([[], *(t[RATE][t[RATE] > 0.0] for t in trials if RATE in t)])
+    return float(np.median(rates)) if len(rates) else None
+
+
+def is_stimulated(trial: Trial) -> bool:
+    """Whether any of a trial's pulses is not 0."""
+    return any(n in trial and bool(trial[n].any()) for n in STIMULI)
+
+
+def with_one_stimulus(trials: Sequence[Trial], constants: Mapping[str, float]) -> tuple[Trial, ...]:
+    """Trials with the one channel that recruits, of those that hold width and amplitude; each says what was done.
+
+    Where a threshold in mA or us is known, the other quantity must be the same in all pulses; where one in uC is, the
+    charge of a pulse is the product of both. Without any the one that varies is taken, if one alone does.
+
+    Raises
+    ------
+    InputError
+        Both vary, and no threshold of the charge says so.
+    """
+    both = [t for t in trials if WIDTH.column in t and AMPLITUDE.column in t]
+    if not both:
+        return tuple(trials)
+    channel = channel_of(constants) or varying(both)
+    if channel is CHARGE:
+        made = {t.name: _by_charge(t) for t in both}
+    else:
+        other = AMPLITUDE if channel is WIDTH else WIDTH
+        found = _in_pulses(both, other)
+        if len(found) and np.ptp(found) > SAME * np.max(found):
+            words = f"{found.min():.4g} to {found.max():.4g} {other.unit}: a threshold in {channel.unit} is not one"
+            needed = " and ".join(CHARGE.ends)
+            raise both[0].error(f"varies in {words} of all these pulses; expected {needed} of their charge", other.column)
+        size = f"{np.median(found):.4g} {other.unit}" if len(found) else "0"
+        made = {t.name: _alone(t, channel, other, size) for t in both}
+    return tuple(made.get(t.name, t) for t in trials)
+
+
+def varying(trials: Sequence[Trial]) -> Channel:
+    """The channel that recruits in trials with width and amplitude, by which of them varies between pulses."""
+    varies = [bool(len(x := _in_pulses(trials, c)) and np.ptp(x) > SAME * x.max()) for c in (WIDTH, AMPLITUDE)]
+    return CHARGE if all(varies) else AMPLITUDE if varies[1] else WIDTH
+
+
+def _in_pulses(trials: Sequence[Trial], channel: Channel) -> np.ndarray:
+    """A quantity of all pulses: where neither width nor amplitude is 0."""
+    acting = [(t[WIDTH.column] != 0.0) & (t[AMPLITUDE.column] != 0.0) for t in trials]
+    return np.concatenate([t[channel.column][on] for t, on in zip(trials, acting, strict=True)])
+
+
+def _by_charge(trial: Trial) -> Trial:
+    charge = 1e-3 * trial[WIDTH.column] * trial[AMPLITUDE.column]
+    words = f"the stimulus is the charge of a pulse, {WIDTH.column} x {AMPLITUDE.column}"
+    return _replaced(trial, {CHARGE.column: charge}, words)
+
+
+def _alone(trial: Trial, channel: Channel, other: Channel, size: str) -> Trial:
+    values = np.where(trial[other.column] != 0.0, trial[channel.column], 0.0)
+    words = f"the stimulus is {channel.column}; {other.column} is {size} in every pulse and left out"
+    return _replaced(trial, {channel.column: values}, words)
+
+
+def _replaced(trial: Trial, columns: Mapping[str, np.ndarray], words: str) -> Trial:
+    kept = {n: v for n, v in trial.columns.items() if n not in (WIDTH.column, AMPLITUDE.column)}
+    made = derived_trial(trial, columns={**columns, **kept}, remarks=(*trial.remarks, words))
+    if trial.as_read is not None and not trial.is_edited:
+        made = derived_trial(made, as_read=replace(trial.as_read, digest=made.digest()))
+    return made
