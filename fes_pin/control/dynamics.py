@@ -84,9 +84,8 @@ class AnkleDynamics(Tabulated):
         if not isinstance(model.rig, Ankle):
             raise InputError(f"position control needs the rig ankle, found {model.rig.name}")
         if model.rig.channel is not WIDTH:
-            low, high = WIDTH.ends
-            words = f"missing; position control commands pulse widths, and needs {low} and {high}"
-            raise InputError(words, column=f"constants.{low}")
+            words = f"missing; position control commands pulse widths, and needs {' and '.join(WIDTH.ends)}"
+            raise InputError(words, column=f"constants.{WIDTH.ends[0]}")
         if number(load_kg, "load_kg") < 0.0:
             raise InputError(f"expected a load of at least 0 kg, found {load_kg:g}")
         rig, c = model.rig, {n: float(v) for n, v in model.rig.constants.items()}

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from fes_pin.data.schema import NumberKey, not_negative, positive
 
+
 @dataclass(frozen=True)
 class Channel:
     """A quantity of the pulses that recruits.
@@ -63,5 +64,6 @@ def channel_of(constants: Collection[str]) -> Channel | None:
 
 def recruitment_ends() -> dict[str, NumberKey]:
     """The ends of recruitment that a study of a muscle may state, by key; those of one channel."""
-    pairs = {c.ends: c.unit for c in CHANNELS.values()}
-    return {k: n for (low, high), u in pairs.items() for k, n in ((low, not_negative(u, False)), (high, positive(u, False)))}
+    pairs = [(c.ends, c.unit) for c in CHANNELS.values()]
+    ends = [{low: not_negative(unit, False), high: positive(unit, False)} for (low, high), unit in pairs]
+    return {key: number for pair in ends for key, number in pair.items()}

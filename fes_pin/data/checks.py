@@ -165,11 +165,7 @@ def check_values(
         if most > LONGEST_PULSE_US:
             message = f"reaches {most:g} us, and no pulse is so long: is it in ns?"
             raise error(message, "pulse_width_us", int(width.argmax()))
-    for name, limit in LARGEST.items():
-        if name in columns and ((columns[name] < 0.0) | (columns[name] > limit)).any():
-            sample = int(np.argmax((columns[name] < 0.0) | (columns[name] > limit)))
-            expected = f"expected 0 to {limit:g} {own_unit(name)}, found {columns[name][sample]:g}"
-            raise error(expected, name, sample)
+    _check_sizes(columns, error)
     if "stim" in columns and (other := ~np.isin(columns["stim"], (0.0, 1.0))).any():
         sample = int(np.argmax(other))
         raise error(f"expected 0 or 1, found {columns['stim'][sample]:g}", "stim", sample)
@@ -186,6 +182,15 @@ def check_values(
             raise error(f"reaches {most:.4g} m; no muscle is so long: is it in mm?", "length_m", int(length.argmax()))
         if not (least := float(length.min())) > 0.0:
             raise error(f"is {least:.4g} m; expected the whole length, above 0", "length_m", int(length.argmin()))
+
+
+def _check_sizes(columns: Mapping[str, np.ndarray], error: Fault) -> None:
+    """Refuse amplitudes, charges and rates that no stimulator gives."""
+    for name, limit in LARGEST.items():
+        if name in columns and ((columns[name] < 0.0) | (columns[name] > limit)).any():
+            sample = int(np.argmax((columns[name] < 0.0) | (columns[name] > limit)))
+            expected = f"expected 0 to {limit:g} {own_unit(name)}, found {columns[name][sample]:g}"
+            raise error(expected, name, sample)
 
 
 def check_constants(schema: RigSchema, constants: Mapping[str, float], files: Collection[str], error: KeyFault) -> None:
@@ -216,7 +221,10 @@ def check_constants(schema: RigSchema, constants: Mapping[str, float], files: Co
 
 
 def check_same_inputs(
-    trials: Sequence[tuple[str, Mapping[str, np.ndarray]]], schema: RigSchema, constants: Collection[str], error: Callable
+    trials: Sequence[tuple[str, Mapping[str, np.ndarray]]],
+    schema: RigSchema,
+    constants: Collection[str],
+    error: Callable,
 ) -> None:
     """What only all trials together show: the same inputs in each, and a recruitment curve for what recruits.
 

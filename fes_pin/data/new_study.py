@@ -13,14 +13,17 @@ from typing import Any
 import numpy as np
 
 from fes_pin.data.as_read import HeldFile
+from fes_pin.data.channels import AMPLITUDE, CHANNELS, RATE, WIDTH, Channel, channel_of
 from fes_pin.data.errors import InputError, fault_at
 from fes_pin.data.files import inside, read_bytes
 from fes_pin.data.recorded.columns import INTERPOLATE
+from fes_pin.data.recorded.events import EVENTS, looking_period
 from fes_pin.data.recorded.sniff import Proposal, propose
 from fes_pin.data.recorded.text import TextForm
-from fes_pin.data.schema import NumberKey, check_known, one_of, unknown
+from fes_pin.data.schema import IMPOSED, NumberKey, check_known, one_of, unknown
+from fes_pin.data.stimulus import varying
 from fes_pin.data.study_text import HEADER, columns_text, form_in_words, source_from_option, source_in_words, toml_table
-from fes_pin.data.units import known_unit, own_unit, quantities_of
+from fes_pin.data.units import factor_of, known_unit, own_unit, quantities_of
 from fes_pin.data.wanted import Wanted, labels_of, number_set, of_files
 
 
@@ -79,12 +82,14 @@ class _Making:
         self.own = of_files(wanted.files, "--set", wanted.settings)
         self.proposals = [propose(path, self.schema, wanted.revolute) for path in wanted.files]
         self.form = self._one_form()
+        self.channel: Channel | None = None
         self.names = tuple(dict.fromkeys(n for p in self.proposals for n in p.recording.names))
         check_known(wanted.columns, self.schema.columns, fault_at("--column"))
 
     def made(self, guess: Guess) -> NewStudy:
         kinds = [self._kind(p) for p in self.proposals]
         sources = self._sources(set(kinds))
+        self.channel = self._channel(sources)
         rig, passive = self._numbers(self.schema.constants), self._numbers(self.schema.passive)
         trials = [self._trial(p, kind) for p, kind in zip(self.proposals, kinds, strict=True)]
         known, start = self._start(guess, {**rig, **passive}, sources)
@@ -94,7 +99,9 @@ class _Making:
         contents: dict[str, str | bytes] = {}
         files = self._urdf(contents)
         places = [placed(path, self.wanted.folder, contents, "trials/") for path in self.wanted.files]
-        options = {"resample_hz": self.wanted.resample_hz, "missing": INTERPOLATE if self.wanted.fill else None}
+        looked_hz = self._events(sources)
+        options = {"resample_hz": self.wanted.resample_hz or looked_hz, "rows": EVENTS if looked_hz else None}
+        options["missing"] = INTERPOLATE if self.wanted.fill else None
         text = [
             *toml_table("study", {"name": self.wanted.name, "rig": self.schema.name}),
             *toml_table("rig", {**files, **rig, **known}, "known before the trials, never fitted", self._units()),
@@ -143,13 +150,51 @@ class _Making:
         schema, order = self.schema, sorted(kinds)
         needed = ["time_s", *(schema.outputs[k] for k in order), *(c for k in order for c in schema.motion(k)[:1])]
         stimuli = dict.fromkeys(c for k in order for c in schema.stimuli(k))
-        inputs = [c for c in stimuli if c in self.wanted.columns or self._candidates(c)]
-        if not inputs and schema.inputs_required:
+        inputs = self._inputs([c for c in stimuli if c in self.wanted.columns or self._candidates(c)])
+        if not inputs and schema.inputs_required and kinds != {IMPOSED}:
             needed.append(next(iter(stimuli)))
         read = {c for k in order for c in schema.columns_of(k)}
         others = [c for c in (*schema.optional, *schema.imposed) if c in read]
-        sources = {c: self._source(c, c in needed) for c in dict.fromkeys([*needed, *inputs[:1], *others])}
+        sources = {c: self._source(c, c in needed) for c in dict.fromkeys([*needed, *inputs, *others])}
         return {column: source for column, source in sources.items() if source is not None}
+
+    def _inputs(self, found: list[str]) -> list[str]:
+        """The stimuli that are taken: those that were said, else the first; width and amplitude of pulses together."""
+        said = [c for c in found if self.wanted.columns.get(c)]
+        pulses = [c for c in (WIDTH.column, AMPLITUDE.column) if c in found and c not in ("", *said)]
+        first = said or (pulses if len(pulses) == 2 else found[:1])  # noqa: PLR2004 - both
+        return [*first, *([RATE] if RATE in found and RATE not in first and self._values(RATE).ptp() else [])]
+
+    def _values(self, column: str) -> np.ndarray:
+        """What the files hold of one of the rig's columns, as they have it; empty where that is not known."""
+        said = self.wanted.columns.get(column)
+        named = [n for n in self.names if said is not None and (said == n or said.split(":")[0].split(",")[0] == n)]
+        names = named or list(self._candidates(column) if said is None else ())
+        if len(names) != 1:
+            return np.zeros(0)
+        return np.concatenate([p.recording.columns[names[0]] for p in self.proposals if names[0] in p.recording.columns])
+
+    def _channel(self, sources: Collection[str]) -> Channel | None:
+        """What recruits, as far as it was said, or as the files show it; None where nothing is stimulated."""
+        if (stated := channel_of(self.wanted.settings)) is not None:
+            return stated
+        taken = [c for n, c in CHANNELS.items() if n in sources]
+        acting = [c for c in taken if self._values(c.column).any()]
+        if len(acting) < 2:  # noqa: PLR2004 - width and amplitude
+            return acting[0] if acting and len(taken) == len(acting) else None
+        return varying([(self._values(WIDTH.column), self._values(AMPLITUDE.column))])
+
+    def _events(self, sources: Mapping[str, Mapping[str, Any]]) -> float | None:
+        """The rate in Hz at which logs of events were written, to the three digits that rounding leaves; else None."""
+        name = sources.get("time_s", {}).get("name")
+        if name is None:
+            return None
+        factor, periods = factor_of(sources["time_s"].get("unit", "s"), "time_s"), []
+        for one in self.proposals:
+            columns = {n: v for n, v in one.recording.columns.items() if n != name}
+            periods.append(looking_period(one.recording.columns[name], columns))
+        known = [factor * p for p in periods if p is not None]
+        return 1.0 / float(f"{min(known):.3g}") if known else None
 
     def _candidates(self, column: str) -> tuple[str, ...]:
         return tuple(dict.fromkeys(n for p in self.proposals for n in p.candidates[column]))
@@ -221,11 +266,10 @@ class _Making:
 
     def _numbers(self, table: Mapping[str, NumberKey]) -> dict[str, float]:
         """Numbers of a table: those that it must have, and those that were given."""
-        width = "pulse_width_us"
-        recruits = width in self.wanted.columns or bool(width in self.schema.inputs and self._candidates(width))
+        ends = self.channel.ends if self.channel else ()
         out: dict[str, float] = {}
         for key, number in table.items():
-            needed = number.required or (recruits and key in ("threshold_us", "saturation_us"))
+            needed = number.required or key in ends
             if needed or key in self.wanted.settings:
                 out |= self._number(key, number)
         return out

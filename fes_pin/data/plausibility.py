@@ -166,7 +166,11 @@ def _inputs(study: Study | ToPredict) -> Iterable[str]:
         driven = [t for t in study.trials if name in _stimuli(study, t)]
         below = [t for t in driven if not (np.abs(t[name]) > threshold).any()]
         idle = [t.name for t in below]
-        zero = f"{name} is never above the threshold of {threshold:g} {own_unit(name)}" if threshold else f"{name} is zero throughout"
+        zero = (
+            f"{name} is never above the threshold of {threshold:g} {own_unit(name)}"
+            if threshold
+            else f"{name} is zero throughout"
+        )
         if len(idle) < len(driven):
             if idle and name in PULSES:  # a joint may swing free between driven trials
                 for trial in below:

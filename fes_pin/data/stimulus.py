@@ -37,31 +37,33 @@ def with_one_stimulus(trials: Sequence[Trial], constants: Mapping[str, float]) -
     both = [t for t in trials if WIDTH.column in t and AMPLITUDE.column in t]
     if not both:
         return tuple(trials)
-    channel = channel_of(constants) or varying(both)
+    channel = channel_of(constants) or varying([(t[WIDTH.column], t[AMPLITUDE.column]) for t in both])
     if channel is CHARGE:
         made = {t.name: _by_charge(t) for t in both}
     else:
         other = AMPLITUDE if channel is WIDTH else WIDTH
-        found = _in_pulses(both, other)
+        found = _in_pulses([(t[WIDTH.column], t[AMPLITUDE.column]) for t in both])[int(other is AMPLITUDE)]
         if len(found) and np.ptp(found) > SAME * np.max(found):
             words = f"{found.min():.4g} to {found.max():.4g} {other.unit}: a threshold in {channel.unit} is not one"
             needed = " and ".join(CHARGE.ends)
-            raise both[0].error(f"varies in {words} of all these pulses; expected {needed} of their charge", other.column)
+            raise both[0].error(
+                f"varies in {words} of all these pulses; expected {needed} of their charge", other.column
+            )
         size = f"{np.median(found):.4g} {other.unit}" if len(found) else "0"
         made = {t.name: _alone(t, channel, other, size) for t in both}
     return tuple(made.get(t.name, t) for t in trials)
 
 
-def varying(trials: Sequence[Trial]) -> Channel:
-    """The channel that recruits in trials with width and amplitude, by which of them varies between pulses."""
-    varies = [bool(len(x := _in_pulses(trials, c)) and np.ptp(x) > SAME * x.max()) for c in (WIDTH, AMPLITUDE)]
+def varying(pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> Channel:
+    """The channel that recruits where widths and amplitudes are known, by which of them varies between pulses."""
+    varies = [bool(len(x) and np.ptp(x) > SAME * x.max()) for x in _in_pulses(pairs)]
     return CHARGE if all(varies) else AMPLITUDE if varies[1] else WIDTH
 
 
-def _in_pulses(trials: Sequence[Trial], channel: Channel) -> np.ndarray:
-    """A quantity of all pulses: where neither width nor amplitude is 0."""
-    acting = [(t[WIDTH.column] != 0.0) & (t[AMPLITUDE.column] != 0.0) for t in trials]
-    return np.concatenate([t[channel.column][on] for t, on in zip(trials, acting, strict=True)])
+def _in_pulses(pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
+    """Width and amplitude of all pulses, shape (2, m): where neither is 0."""
+    both = np.concatenate([np.stack(pair) for pair in pairs], axis=1)
+    return both[:, (both != 0.0).all(axis=0)]
 
 
 def _by_charge(trial: Trial) -> Trial:

@@ -6,7 +6,7 @@ mA, by name too: `shift_us` is `shift_ma` there. Steps and bounds scale by what 
 
 import dataclasses
 from functools import cache
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -19,11 +19,18 @@ WIDEST_US = 1000.0
 _METHODS = ("apply", "rate", "update", "slack", "rest", "smallest")
 
 
-@cache
 def in_channel(kind: type[Effect], channel: Channel | None) -> type[Effect]:
-    """The class of a cause for a stimulus; the class itself where it has no pulse widths."""
+    """Return the class of a cause for a stimulus; the class itself where it has no pulse widths."""
+    return kind if channel in (None, WIDTH) else _in_channel(*_KEY(kind, channel))
+
+
+_KEY = cast(Any, lambda *key: key)  # classes are hashable, which mypy does not see of those of dataclasses
+
+
+@cache
+def _in_channel(kind: Any, channel: Channel) -> Any:
     widths = {n: one for n, one in kind.parameters().items() if one.unit.split("/")[0] == "us"}
-    if channel in (None, WIDTH) or not widths:
+    if not widths:
         return kind
     new = {n: _renamed(n, channel) if n in widths else n for n in kind.parameters()}
     fields = [
@@ -81,5 +88,6 @@ def _info(one: ParameterInfo, channel: Channel) -> ParameterInfo:
     if first != "us":
         return one
     size, grid = channel.per_us, tuple(v * channel.per_us for v in one.grid)
-    bounds = {"lower": one.lower * size, "upper": one.upper * size, "scale": one.scale * size, "grid": grid}
+    bounds: dict[str, Any] = {"lower": one.lower * size, "upper": one.upper * size, "scale": one.scale * size}
+    bounds["grid"] = grid
     return dataclasses.replace(one, unit=f"{channel.unit}{slash}{per}", **bounds)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from fes_pin.data.errors import KeyFault
+from fes_pin.data.recorded.events import EVENTS, sampled_events
 from fes_pin.data.recorded.formats import read_recording
 from fes_pin.data.recorded.regular import check_steps, filled, resampled
 from fes_pin.data.recorded.text import DECIMALS, DELIMITERS, ENCODINGS, TextForm
@@ -16,7 +17,7 @@ from fes_pin.data.schema import RigSchema, any_number, check_known, one_of, posi
 from fes_pin.data.table import Table
 from fes_pin.data.units import factor_of, unit_in_name
 
-FILE_KEYS = ("delimiter", "decimal", "header_row", "first_row", "comment", "encoding", "resample_hz", "missing")
+FILE_KEYS = ("delimiter", "decimal", "header_row", "first_row", "comment", "encoding", "resample_hz", "missing", "rows")
 SOURCE_KEYS = ("name", "unit", "scale", "zero", "edge", "rate_hz")
 INTERPOLATE = "interpolate"
 
@@ -72,6 +73,8 @@ class Columns:
         None: times must be equally spaced.
     fills
         Whether missing samples are filled in.
+    events
+        Whether there is a row only where something changes.
     """
 
     sources: Mapping[str, ColumnSource]
@@ -79,6 +82,7 @@ class Columns:
     form: TextForm = field(default_factory=TextForm)
     resample_hz: float | None = None
     fills: bool = False
+    events: bool = False
 
     def read(self, path: str | Path, schema: RigSchema, kind: str, inputs_only: bool = False) -> Table:
         """The rig's columns of one recording, in the study format's units, time first; `said` has what was done to them.
@@ -142,6 +146,8 @@ class Columns:
                 hint = f'a number, found nothing; missing = "{INTERPOLATE}" in [columns.file] fills in short gaps'
                 expected = "a time, found nothing" if name == "time_s" else hint
                 raise table.error(f"expected {expected}", name, int(np.argmax(np.isnan(values))))
+        if self.events and self.resample_hz is not None:
+            return sampled_events(table, self.resample_hz)
         if self.resample_hz is not None:
             check_steps(table)
         if self.fills:
@@ -227,7 +233,7 @@ def _with_file(columns: Columns, about: Mapping[str, Any], error: KeyFault) -> C
     check_known(about, FILE_KEYS, lambda key, message: error(f"file.{key}", message))
     for key, value in about.items():
         where = f"file.{key}"
-        known = {"delimiter": DELIMITERS, "decimal": DECIMALS, "encoding": ENCODINGS, "missing": (INTERPOLATE,)}
+        known = {"delimiter": DELIMITERS, "decimal": DECIMALS, "encoding": ENCODINGS, "missing": (INTERPOLATE,), "rows": (EVENTS,)}
         if key in known:
             form[key] = one_of(value, known[key], partial(error, where))
         elif key == "comment":
@@ -240,9 +246,11 @@ def _with_file(columns: Columns, about: Mapping[str, Any], error: KeyFault) -> C
             raise error(where, "expected the number of a line, from 1" + (" (0: no header)" * (key == "header_row")))
         else:
             form[key] = value
-    rate, missing = form.pop("resample_hz", None), form.pop("missing", None)
+    rate, missing, rows = (form.pop(key, None) for key in ("resample_hz", "missing", "rows"))
+    if rows is not None and rate is None:
+        raise error("file.rows", f'expected resample_hz as well: rows = "{EVENTS}" are held from step to step')
     form.setdefault("first_row", form.get("header_row", 1) + 1)
     text = TextForm(**form)
     if text.first_row <= text.header_row:
         raise error("file.first_row", f"expected a line below the header in line {text.header_row}")
-    return replace(columns, form=text, resample_hz=rate, fills=missing is not None)
+    return replace(columns, form=text, resample_hz=rate, fills=missing is not None, events=rows is not None)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fes_pin.data.channels import CHANNELS, RATE, recruitment_ends
+from fes_pin.data.channels import RATE, recruitment_ends
 from fes_pin.data.imposed import imposed_motion
 from fes_pin.data.schema import IMPOSED, START_S, RigSchema, any_number, not_negative, positive
 from fes_pin.data.stimulus import is_stimulated
@@ -73,7 +73,7 @@ class Ankle(Rig):
         only={"angle_rad": "isometric"},
         default_kind="motion",
         outputs={"motion": "angle_rad", "isometric": "force_n", IMPOSED: "torque_nm"},
-        inputs=(*CHANNELS, RATE),
+        inputs=("pulse_width_us", "amplitude_ma", "charge_uc", RATE),
         imposed=("angle_rad",),
     )
     needed = (*(n for n, number in schema.constants.items() if number.required), *schema.passive)

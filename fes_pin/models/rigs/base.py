@@ -189,7 +189,7 @@ class Rig(ReadOnly):
         return channel_of(self.constants)
 
     def cause(self, kind: type[Effect]) -> type[Effect]:
-        """Return the class of an effect on this rig: with sizes in the unit of its stimulus, `shift_ma` for `shift_us`."""
+        """Return the class of an effect with sizes in the unit of this rig's stimulus: `shift_ma` for `shift_us`."""
         return in_channel(kind, self.channel)
 
     def ends(self) -> tuple[str, str]:
@@ -197,7 +197,7 @@ class Rig(ReadOnly):
         return (self.channel or WIDTH).ends
 
     def driven_signals(self, signals: tuple[str, ...], inputs: tuple[str, ...]) -> tuple[str, ...]:
-        """Of the signals of a muscle those that these input columns drive: recorded pulses have no size that recruits."""
+        """Return those of a muscle's signals that these inputs drive: recorded pulses have no size that recruits."""
         has_size = self.channel is not None and self.channel.column in inputs
         absent = set() if has_size else {"pulse_width", "recruitment"}
         if not has_size and not {"stim", RATE} & set(inputs):

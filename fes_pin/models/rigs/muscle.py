@@ -41,7 +41,7 @@ class Muscle(Rig):
         conditions=START_S,
         default_kind="isometric",
         outputs={"isometric": "force_n", IMPOSED: "force_n"},
-        inputs=(*CHANNELS, "stim", RATE),
+        inputs=("pulse_width_us", "stim", "amplitude_ma", "charge_uc", RATE),
         imposed=("length_m",),
     )
     elsewhere = "record the same force with another sensor, or let the muscle move a joint"

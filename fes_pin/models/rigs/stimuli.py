@@ -56,6 +56,7 @@ def recruited_now(s: Signals, channel: Channel | None) -> Any:
         return s.u.stim * s.c.pulse_period_s / s.c.dt
     rate = getattr(s.u, RATE, None)
     recruited: Any = 0.0 if rate is None else 1.0
+    s.commanded, s.saturation, s.least = 0.0, 1.0, 1.0
     if channel is not None and hasattr(s.u, channel.column):
         s.commanded, (low, high) = getattr(s.u, channel.column), (getattr(s.c, end) for end in channel.ends)
         s.saturation, s.least = high, channel.per_us
