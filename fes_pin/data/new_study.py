@@ -162,7 +162,7 @@ class _Making:
         """The stimuli that are taken: those that were said, else the first; width and amplitude of pulses together."""
         said = [c for c in found if self.wanted.columns.get(c)]
         pulses = [c for c in (WIDTH.column, AMPLITUDE.column) if c in found and c not in ("", *said)]
-        first = said or (pulses if len(pulses) == 2 else found[:1])  # noqa: PLR2004 - both
+        first = said or (pulses if len(pulses) == 2 else found[:1])
         return [*first, *([RATE] if RATE in found and RATE not in first and self._values(RATE).ptp() else [])]
 
     def _values(self, column: str) -> np.ndarray:
@@ -172,7 +172,9 @@ class _Making:
         names = named or list(self._candidates(column) if said is None else ())
         if len(names) != 1:
             return np.zeros(0)
-        return np.concatenate([p.recording.columns[names[0]] for p in self.proposals if names[0] in p.recording.columns])
+        return np.concatenate(
+            [p.recording.columns[names[0]] for p in self.proposals if names[0] in p.recording.columns]
+        )
 
     def _channel(self, sources: Collection[str]) -> Channel | None:
         """What recruits, as far as it was said, or as the files show it; None where nothing is stimulated."""
@@ -180,7 +182,7 @@ class _Making:
             return stated
         taken = [c for n, c in CHANNELS.items() if n in sources]
         acting = [c for c in taken if self._values(c.column).any()]
-        if len(acting) < 2:  # noqa: PLR2004 - width and amplitude
+        if len(acting) < 2:
             return acting[0] if acting and len(taken) == len(acting) else None
         return varying([(self._values(WIDTH.column), self._values(AMPLITUDE.column))])
 

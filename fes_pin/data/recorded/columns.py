@@ -233,7 +233,13 @@ def _with_file(columns: Columns, about: Mapping[str, Any], error: KeyFault) -> C
     check_known(about, FILE_KEYS, lambda key, message: error(f"file.{key}", message))
     for key, value in about.items():
         where = f"file.{key}"
-        known = {"delimiter": DELIMITERS, "decimal": DECIMALS, "encoding": ENCODINGS, "missing": (INTERPOLATE,), "rows": (EVENTS,)}
+        known = {
+            "delimiter": DELIMITERS,
+            "decimal": DECIMALS,
+            "encoding": ENCODINGS,
+            "missing": (INTERPOLATE,),
+            "rows": (EVENTS,),
+        }
         if key in known:
             form[key] = one_of(value, known[key], partial(error, where))
         elif key == "comment":

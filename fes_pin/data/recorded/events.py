@@ -12,9 +12,11 @@ EVENTS = "events"
 """The value of `rows` in [columns.file] that says so."""
 FEWEST_ROWS = 20
 """Rows from which the steps of a log show how it was written."""
-LONGER, OFTEN = 1.5, 0.1
+LONGER, OFTEN = 1.5, 0.05
 """A step this many times the usual shortest one is longer; and the share of such steps in a log of events. A log that
 is sampled has equal steps but for holes, which are few."""
+FEWEST_HOLES, MORE = 3, 3.0
+"""Holes that a log of events has at least, and how many times as many as rows that are lost one by one would leave."""
 SHORTEST = 0.05
 """Quantile of the steps that is the period at which a logger looks for changes: the shortest one may be rounded."""
 
@@ -37,8 +39,10 @@ def looking_period(time: np.ndarray, columns: Mapping[str, np.ndarray]) -> float
     same = np.ones(len(steps), dtype=bool)
     for values in columns.values():
         same &= (np.diff(values) == 0.0) | np.isnan(np.diff(values))
-    holes = steps > LONGEST_GAP * float(np.median(steps))
-    is_log = float(np.mean(longer)) > OFTEN and bool(holes.any()) and float(np.mean(same)) < OFTEN
+    holes = int(np.count_nonzero(steps > LONGEST_GAP * float(np.median(steps))))
+    share = float(np.mean(longer))
+    by_loss = len(steps) * share**LONGEST_GAP  # of rows that are lost one by one
+    is_log = share > OFTEN and holes >= FEWEST_HOLES + MORE * by_loss and float(np.mean(same)) < OFTEN
     return shortest if is_log else None
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from fes_pin.data.channels import CHANNELS, RATE, recruitment_ends
+from fes_pin.data.errors import InputError
 from fes_pin.data.schema import IMPOSED, START_S, RigSchema, positive
 from fes_pin.data.stimulus import is_stimulated
 from fes_pin.data.study import Study
@@ -53,8 +54,10 @@ class Muscle(Rig):
         ends = [f(t["length_m"]) for t in study.trials if "length_m" in t for f in (np.min, np.max)]
         middle = {"length_m": 0.5 * float(min(ends) + max(ends))} if ends else {}
         start: dict[str, Any] = dict(study.start)
-        fitted = None if any(map(is_stimulated, study.trials)) else ()
-        return cls(constants={**study.constants, **period, **middle}, fitted=fitted, **start)
+        if not any(map(is_stimulated, study.trials)):
+            words = "no trial is stimulated, and this rig models what a stimulus adds; expected rig joint, on a slide"
+            raise InputError(words, file=study.folder, column="rig")
+        return cls(constants={**study.constants, **period, **middle}, **start)
 
     @classmethod
     def steered(cls, study: Study) -> str | None:
