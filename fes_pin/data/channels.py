@@ -23,7 +23,7 @@ class Channel:
     words
         The quantity in words.
     per_us
-        What stands for 1 us of pulse width: sizes, bounds and steps of causes scale with it.
+        The size that is to it what 1 us is to a pulse width: bounds and steps of causes scale with it.
     """
 
     column: str
@@ -44,7 +44,7 @@ class Channel:
 
 WIDTH = Channel("pulse_width_us", "us", "pulse width")
 AMPLITUDE = Channel("amplitude_ma", "mA", "amplitude", 0.04)
-"""The widest pulse of `RANGES` in `data.pulses`, 5000 us, stands for its largest current, 200 mA."""
+"""The widest pulse of `RANGES` in `data.pulses`, 5000 us, is as large as its largest current, 200 mA."""
 CHARGE = Channel("charge_uc", "uC", "charge", 0.04)
 """1 mA for 1000 us is 1 uC: a current of 40 mA gives 0.04 uC each us, in the middle of what electrodes at the skin get.
 Recruitment by charge: a nerve's threshold charge hardly depends on the width of pulses that are short against its

@@ -21,11 +21,14 @@ from fes_pin.data.checks import check_values
 from fes_pin.data.counts import hunts
 from fes_pin.data.errors import InputError
 from fes_pin.data.imposed import imposed_motion
+from fes_pin.data.repeats import unrepeated
 from fes_pin.data.schema import IMPOSED, RigSchema
+from fes_pin.data.stimulus import is_stimulated
 from fes_pin.data.stuck import RUN
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial, check_trial
 from fes_pin.data.units import own_unit
+from fes_pin.data.urdf import is_revolute
 
 SAMPLES_EACH = 10
 """Samples for each value that is fitted, at least: a standard deviation that is estimated from fewer is itself
@@ -229,6 +232,15 @@ def _imposed(study: Study | ToPredict) -> Iterable[str]:
     bands = [m.bandwidth_hz for m in motions]
     band = f"{min(bands):.2g} Hz" if max(bands) < 1.1 * min(bands) else f"{min(bands):.2g} to {max(bands):.2g} Hz"
     yield f"velocity and acceleration of {name} are those of smoothing splines with a bandwidth of {band}"
+    found = {t.name: unrepeated(t, study.schema) for t in trials if not is_stimulated(t)}
+    if odd := {n: one for n, one in found.items() if one is not None and one.is_no_mechanism}:
+        most = max(odd.values(), key=lambda one: one.share)
+        effort = study.schema.outputs[IMPOSED]
+        differs = (
+            f"{effort} differs by {most.size:.2g} {own_unit(effort, is_revolute(study.urdf))} between equal cycles"
+        )
+        share = f"{100.0 * most.share:.0f} % of what it does in one, in {trials_named(list(odd))}"
+        yield f"{differs} of the motion, {share}: no passive mechanism does, so that voluntary effort is likely"
 
 
 def _is_clipped(trial: Trial, name: str) -> bool:

@@ -1,7 +1,7 @@
 """Causes of a nerve in the unit of the stimulus: their classes are written for pulse widths in microseconds.
 
 A threshold may as well sit at another amplitude. The cause then has the same name, equation and code, and parameters in
-mA, by name too: `shift_us` is `shift_ma` there. Steps and bounds scale by what stands for a microsecond.
+mA, by name too: `shift_us` is `shift_ma` there. Steps and bounds scale by the size of a microsecond there.
 """
 
 import dataclasses
