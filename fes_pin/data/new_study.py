@@ -163,7 +163,10 @@ class _Making:
         said = [c for c in found if self.wanted.columns.get(c)]
         pulses = [c for c in (WIDTH.column, AMPLITUDE.column) if c in found and c not in ("", *said)]
         first = said or (pulses if len(pulses) == 2 else found[:1])
-        return [*first, *([RATE] if RATE in found and RATE not in first and self._values(RATE).ptp() else [])]
+        return [
+            *first,
+            *([RATE] if RATE in found and RATE not in first and len(np.unique(self._values(RATE))) > 1 else []),
+        ]
 
     def _values(self, column: str) -> np.ndarray:
         """What the files hold of one of the rig's columns, as they have it; empty where that is not known."""

@@ -236,9 +236,8 @@ def _imposed(study: Study | ToPredict) -> Iterable[str]:
     if odd := {n: one for n, one in found.items() if one is not None and one.is_no_mechanism}:
         most = max(odd.values(), key=lambda one: one.share)
         effort = study.schema.outputs[IMPOSED]
-        differs = (
-            f"{effort} differs by {most.size:.2g} {own_unit(effort, is_revolute(study.urdf))} between equal cycles"
-        )
+        unit = own_unit(effort, is_revolute(study.urdf))
+        differs = f"{effort} differs by {most.size:.2g} {unit} between equal cycles"
         share = f"{100.0 * most.share:.0f} % of what it does in one, in {trials_named(list(odd))}"
         yield f"{differs} of the motion, {share}: no passive mechanism does, so that voluntary effort is likely"
 

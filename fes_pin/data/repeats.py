@@ -19,7 +19,7 @@ BINS = 16
 FEWEST = 4
 """Equal cycles that show a scatter about a trend: two more than the trend takes."""
 SAME = 0.03
-"""Share of its range by which the motion of equal cycles differs, root mean square; and of the length that they have."""
+"""Share of its range by which the motion of equal cycles differs, root mean square; and of their length."""
 SHARE = 0.15
 """Share of the effort's deviation over a cycle from which a scatter between cycles is no mechanism. Motion that differs
 by `SAME` gives as much of a spring's effort, and twice that of an inertia's."""

@@ -12,11 +12,16 @@ EVENTS = "events"
 """The value of `rows` in [columns.file] that says so."""
 FEWEST_ROWS = 20
 """Rows from which the steps of a log show how it was written."""
-LONGER, OFTEN = 1.5, 0.05
+LONGER, OFTEN = 1.5, 0.01
 """A step this many times the usual shortest one is longer; and the share of such steps in a log of events. A log that
 is sampled has equal steps but for holes, which are few."""
+ALIKE = 0.1
+"""Share of rows that are equal to the one before, but for rounding none in a log of events."""
 FEWEST_HOLES, MORE = 3, 3.0
 """Holes that a log of events has at least, and how many times as many as rows that are lost one by one would leave."""
+SMOOTH, QUIET = 3.0, 1.5
+"""Deviation of a reading, in its usual steps, from which it is smooth; and how many times its largest ordinary step one
+changes over a hole at most, where nothing happened in that."""
 SHORTEST = 0.05
 """Quantile of the steps that is the period at which a logger looks for changes: the shortest one may be rounded."""
 
@@ -39,11 +44,20 @@ def looking_period(time: np.ndarray, columns: Mapping[str, np.ndarray]) -> float
     same = np.ones(len(steps), dtype=bool)
     for values in columns.values():
         same &= (np.diff(values) == 0.0) | np.isnan(np.diff(values))
-    holes = int(np.count_nonzero(steps > LONGEST_GAP * float(np.median(steps))))
-    share = float(np.mean(longer))
+    hole = steps > LONGEST_GAP * float(np.median(steps))
+    share, holes = float(np.mean(longer)), int(np.count_nonzero(hole))
     by_loss = len(steps) * share**LONGEST_GAP  # of rows that are lost one by one
-    is_log = share > OFTEN and holes >= FEWEST_HOLES + MORE * by_loss and float(np.mean(same)) < OFTEN
-    return shortest if is_log else None
+    is_log = share > OFTEN and holes >= FEWEST_HOLES + MORE * by_loss and float(np.mean(same)) < ALIKE
+    return shortest if is_log and any(_is_quiet(v, hole) for v in columns.values()) else None
+
+
+def _is_quiet(values: np.ndarray, hole: np.ndarray) -> bool:
+    """Return whether a smooth reading goes on after a hole from where it stood; one that is sampled has moved on."""
+    change = np.abs(np.diff(values))
+    ordinary = change[~hole & (change > 0.0)]
+    if len(ordinary) < FEWEST_ROWS or not np.std(values) > SMOOTH * np.median(ordinary):
+        return False
+    return bool(np.median(change[hole]) <= QUIET * np.max(ordinary))
 
 
 def sampled_events(table: Table, rate_hz: float) -> Table:
