@@ -53,7 +53,11 @@ CHANNELS = {c.column: c for c in (WIDTH, AMPLITUDE, CHARGE)}
 """By column."""
 RATE = "frequency_hz"
 """The column of a rate of pulses that varies, alone or in addition to one of the channels."""
-STIMULI = (*CHANNELS, "stim", RATE)
+EMG, ENVELOPE = "emg", "emg_envelope"
+"""Columns of a voluntary muscle: what electrodes read, in any unit, and its envelope, 1 at the largest effort."""
+EMG_KEYS = ("emg_cutoff_hz", "emg_mvc")
+"""Constants of a study with EMG: the cut-off of its envelope, and what that is in a maximal voluntary contraction."""
+STIMULI = (*CHANNELS, "stim", RATE, EMG, ENVELOPE)
 """Columns without which a muscle does not contract."""
 
 

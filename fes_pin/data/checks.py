@@ -27,7 +27,7 @@ LONGEST_MUSCLE_M = 1.0
 """Length in m that no muscle with its tendon has: the longest, sartorius, comes to about half a metre."""
 TOGETHER = ({"pulse_width_us", "amplitude_ma", "frequency_hz"}, {"charge_uc", "frequency_hz"})
 """Stimuli that one trial may hold together."""
-LARGEST = {"amplitude_ma": 500.0, "charge_uc": 1e4, "frequency_hz": 1e4}
+LARGEST = {"amplitude_ma": 500.0, "charge_uc": 1e4, "frequency_hz": 1e4, "emg_envelope": 10.0}
 """What no stimulator gives: of surface stimulators 150 mA is the most; a larger amplitude is in uA."""
 SHORTEST_PULSE_US = 2.0
 """Pulse width in us that recruits nothing: surface stimulators give 50 to 1000 us, and 2 is a long one in ms."""

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from fes_pin.data.as_read import HeldFile
-from fes_pin.data.channels import AMPLITUDE, CHANNELS, RATE, WIDTH, Channel, channel_of
+from fes_pin.data.channels import AMPLITUDE, CHANNELS, EMG, EMG_KEYS, RATE, WIDTH, Channel, channel_of
 from fes_pin.data.errors import InputError, fault_at
 from fes_pin.data.files import inside, read_bytes
 from fes_pin.data.recorded.columns import INTERPOLATE
@@ -83,13 +83,14 @@ class _Making:
         self.proposals = [propose(path, self.schema, wanted.revolute) for path in wanted.files]
         self.form = self._one_form()
         self.channel: Channel | None = None
+        self.cutoff: tuple[str, ...] = ()
         self.names = tuple(dict.fromkeys(n for p in self.proposals for n in p.recording.names))
         check_known(wanted.columns, self.schema.columns, fault_at("--column"))
 
     def made(self, guess: Guess) -> NewStudy:
         kinds = [self._kind(p) for p in self.proposals]
         sources = self._sources(set(kinds))
-        self.channel = self._channel(sources)
+        self.channel, self.cutoff = self._channel(sources), EMG_KEYS[:1] if EMG in sources else ()
         rig, passive = self._numbers(self.schema.constants), self._numbers(self.schema.passive)
         trials = [self._trial(p, kind) for p, kind in zip(self.proposals, kinds, strict=True)]
         known, start = self._start(guess, {**rig, **passive}, sources)
@@ -271,7 +272,7 @@ class _Making:
 
     def _numbers(self, table: Mapping[str, NumberKey]) -> dict[str, float]:
         """Numbers of a table: those that it must have, and those that were given."""
-        ends = self.channel.ends if self.channel else ()
+        ends = (*(self.channel.ends if self.channel else ()), *self.cutoff)
         out: dict[str, float] = {}
         for key, number in table.items():
             needed = number.required or key in ends

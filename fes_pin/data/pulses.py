@@ -99,7 +99,7 @@ def pulse_list(
     InputError
         No such column; a rate or width that is not said, or that the trial says; a pulse beyond a limit, with its time.
     """
-    if odd := [n for n in ("amplitude_ma", "charge_uc", "frequency_hz") if n in trial]:
+    if odd := [n for n in ("amplitude_ma", "charge_uc", "frequency_hz", "emg", "emg_envelope") if n in trial]:
         words = (
             "expected a trial of pulse widths or of single pulses: pulses of other amplitudes and rates are not listed"
         )

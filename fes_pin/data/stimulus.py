@@ -5,9 +5,22 @@ from dataclasses import replace
 
 import numpy as np
 
-from fes_pin.data.channels import AMPLITUDE, CHARGE, RATE, STIMULI, WIDTH, Channel, channel_of
+from fes_pin.data.channels import (
+    AMPLITUDE,
+    CHARGE,
+    EMG,
+    EMG_KEYS,
+    ENVELOPE,
+    RATE,
+    STIMULI,
+    WIDTH,
+    Channel,
+    channel_of,
+)
 from fes_pin.data.trial import Trial, derived_trial
 
+MOVES_HZ = 20.0
+"""Below it is what moves cables and electrodes, Hz: De Luca and others, J. Biomech. 43 (2010) 1573."""
 SAME = 0.01
 """Share by which a quantity of the pulses varies that a stimulator holds: a log rounds it, or reads it back."""
 
@@ -34,6 +47,8 @@ def with_one_stimulus(trials: Sequence[Trial], constants: Mapping[str, float]) -
     InputError
         Both vary, and no threshold of the charge says so.
     """
+    if any(EMG in t for t in trials):
+        return _with_envelopes(trials, constants)
     both = [t for t in trials if WIDTH.column in t and AMPLITUDE.column in t]
     if not both:
         return tuple(trials)
@@ -52,6 +67,38 @@ def with_one_stimulus(trials: Sequence[Trial], constants: Mapping[str, float]) -
         size = f"{np.median(found):.4g} {other.unit}" if len(found) else "0"
         made = {t.name: _alone(t, channel, other, size) for t in both}
     return tuple(made.get(t.name, t) for t in trials)
+
+
+def _with_envelopes(trials: Sequence[Trial], constants: Mapping[str, float]) -> tuple[Trial, ...]:
+    """Trials with the envelope of their EMG: rectified, low-passed without delay, over its maximum or that of an MVC.
+
+    Raises
+    ------
+    InputError
+        No cut-off is stated, or it is not below half of the sample rate.
+    """
+    from fes_pin.data.smooth import low_pass  # noqa: PLC0415 - SciPy, for EMG alone
+
+    cutoff, envelopes = constants.get(EMG_KEYS[0]), {}
+    for trial in (t for t in trials if EMG in t):
+        if cutoff is None or not cutoff < 0.5 / trial.dt:
+            found = "none" if cutoff is None else f"{cutoff:g} Hz at {1.0 / trial.dt:.4g} Hz"
+            message = (
+                f"expected {EMG_KEYS[0]} in [rig], the cut-off of its envelope, below half the rate; found {found}"
+            )
+            raise trial.error(message, EMG)
+        raw = trial[EMG] - np.mean(trial[EMG])
+        if 0.5 / trial.dt > 2.0 * MOVES_HZ:
+            raw = raw - low_pass(raw[:, None], trial.dt, MOVES_HZ)[:, 0]
+        envelopes[trial.name] = np.maximum(low_pass(np.abs(raw)[:, None], trial.dt, cutoff)[:, 0], 0.0)
+    largest = max(float(e.max()) for e in envelopes.values())
+    size = constants.get(EMG_KEYS[1], largest)
+    of = "that of an MVC" if EMG_KEYS[1] in constants else "its maximum in all trials"
+    words = f"emg is rectified, low-passed at {cutoff:g} Hz without delay, and divided by {of}, {size:.4g}"
+    made = {t.name: t for t in trials}
+    for name, envelope in envelopes.items():
+        made[name] = _replaced(made[name], {ENVELOPE: envelope / max(size, 1e-300)}, words)
+    return tuple(made[t.name] for t in trials)
 
 
 def varying(pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> Channel:
@@ -79,7 +126,7 @@ def _alone(trial: Trial, channel: Channel, other: Channel, size: str) -> Trial:
 
 
 def _replaced(trial: Trial, columns: Mapping[str, np.ndarray], words: str) -> Trial:
-    kept = {n: v for n, v in trial.columns.items() if n not in (WIDTH.column, AMPLITUDE.column)}
+    kept = {n: v for n, v in trial.columns.items() if n not in (WIDTH.column, AMPLITUDE.column, EMG)}
     made = derived_trial(trial, columns={**columns, **kept}, remarks=(*trial.remarks, words))
     if trial.as_read is not None and not trial.is_edited:
         made = derived_trial(made, as_read=replace(trial.as_read, digest=made.digest()))

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterable
 
-from fes_pin.data.channels import CHANNELS
+from fes_pin.data.channels import CHANNELS, EMG, EMG_KEYS, ENVELOPE
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import instance
 from fes_pin.data.trial import Trial, check_trial
@@ -12,6 +12,8 @@ from fes_pin.models.model import Model
 
 def _check_channel(model: Model, trial: Trial) -> None:
     """Require that a trial's stimulus is the one that the rig's recruitment is of, and no other."""
+    if EMG in trial:
+        raise trial.error(f"expected {ENVELOPE}: a study with {EMG_KEYS[0]} makes it of {EMG}", EMG)
     found = [n for n in CHANNELS if n in trial and trial[n].any()]
     known = model.rig.channel
     if odd := [n for n in found if known is None or n != known.column]:

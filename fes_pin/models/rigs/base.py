@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from fes_pin.data.channels import CHANNELS, RATE, WIDTH, Channel, channel_of
+from fes_pin.data.channels import CHANNELS, ENVELOPE, RATE, WIDTH, Channel, channel_of
 from fes_pin.data.errors import InputError
 from fes_pin.data.imposed import MOTION, imposed_motion, same_motion
 from fes_pin.data.read_only import ReadOnly
@@ -200,7 +200,7 @@ class Rig(ReadOnly):
         """Return those of a muscle's signals that these inputs drive: recorded pulses have no size that recruits."""
         has_size = self.channel is not None and self.channel.column in inputs
         absent = set() if has_size else {"pulse_width", "recruitment"}
-        if not has_size and not {"stim", RATE} & set(inputs):
+        if not has_size and not {"stim", RATE, ENVELOPE} & set(inputs):
             absent |= {"delay", "time_constant", "sensitivity", "activation"}
         return tuple(s for s in signals if s not in absent)
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fes_pin.data.channels import CHANNELS, RATE, recruitment_ends
+from fes_pin.data.channels import CHANNELS, EMG, EMG_KEYS, ENVELOPE, RATE, recruitment_ends
 from fes_pin.data.errors import InputError
 from fes_pin.data.schema import IMPOSED, START_S, RigSchema, positive
 from fes_pin.data.stimulus import is_stimulated
@@ -30,6 +30,8 @@ class Muscle(Rig):
     A recorded pulse (`stim`) is an impulse of area P, the usual pulse period of the study: there a train averages
     r = 1, and `gain` is the mean force that it settles to; one of twice the rate averages r = 2. Where a lever imposes
     its length the nominal force does not depend on that; causes count it from `length_m`, the middle of the study's.
+
+    The envelope of an EMG is r of a voluntary muscle: `gain` is then its force at an envelope of 1.
     """
 
     gain: float = parameter(30.0, unit="N", lower=1e-6, upper=1e5, scale=5.0)
@@ -37,12 +39,15 @@ class Muscle(Rig):
 
     name = "muscle"
     schema = RigSchema(
-        constants=recruitment_ends(),
+        constants={
+            **recruitment_ends(),
+            **dict(zip(EMG_KEYS, (positive("Hz", False), positive("", False)), strict=True)),
+        },
         start={"gain": positive(""), "time_constant_s": positive("s")},
         conditions=START_S,
         default_kind="isometric",
         outputs={"isometric": "force_n", IMPOSED: "force_n"},
-        inputs=("pulse_width_us", "stim", "amplitude_ma", "charge_uc", RATE),
+        inputs=("pulse_width_us", "stim", "amplitude_ma", "charge_uc", RATE, EMG, ENVELOPE),
         imposed=("length_m",),
     )
     elsewhere = "record the same force with another sensor, or let the muscle move a joint"
@@ -65,7 +70,8 @@ class Muscle(Rig):
 
     @classmethod
     def other_stimuli(cls, study: Study, time: np.ndarray) -> Iterator[dict[str, np.ndarray]]:
-        yield from ({"stim": train} for train in trains(time))
+        if ENVELOPE not in study.trials[0]:  # nobody steers a voluntary muscle
+            yield from ({"stim": train} for train in trains(time))
 
     def driving_sizes(self, trials: Sequence[Trial]) -> dict[str, float]:
         forces = [t["force_n"] for t in trials if "force_n" in t.columns]

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from fes_pin.data.channels import CHANNELS, RATE, Channel
+from fes_pin.data.channels import CHANNELS, ENVELOPE, RATE, Channel
 from fes_pin.data.stimulus import usual_rate
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
@@ -54,6 +54,8 @@ def recruited_now(s: Signals, channel: Channel | None) -> Any:
     """
     if hasattr(s.u, "stim"):
         return s.u.stim * s.c.pulse_period_s / s.c.dt
+    if hasattr(s.u, ENVELOPE):
+        return getattr(s.u, ENVELOPE)
     rate = getattr(s.u, RATE, None)
     recruited: Any = 0.0 if rate is None else 1.0
     s.commanded, s.saturation, s.least = 0.0, 1.0, 1.0
@@ -68,6 +70,8 @@ def recruited_in(trial: Trial, channel: Channel | None, constants: Mapping[str, 
     """Recruitment of a whole trial, as `recruited_now` has it, without causes, shape (n,)."""
     if "stim" in trial:
         return np.asarray(trial["stim"] * constants["pulse_period_s"] / trial.dt)
+    if ENVELOPE in trial:
+        return trial[ENVELOPE]
     recruited = np.full(len(trial), float(RATE in trial))
     if channel is not None and channel.column in trial:
         low, high = (float(constants[end]) for end in channel.ends)
