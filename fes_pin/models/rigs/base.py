@@ -148,7 +148,8 @@ class Rig(ReadOnly):
     @classmethod
     def steered(cls, study: Study) -> str | None:
         """The input column of a study that `driven` can give any shape; None if there is none."""
-        return next((n for n in cls.schema.inputs if n in study.trials[0]), None)
+        unknown = {n for n, c in CHANNELS.items() if c.ends[0] not in study.constants}  # of which nobody knows the ends
+        return next((n for n in cls.schema.inputs if n in study.trials[0] and n not in unknown), None)
 
     @classmethod
     def driven(cls, study: Study, shape: np.ndarray) -> np.ndarray:

@@ -66,7 +66,8 @@ class Muscle(Rig):
 
     @classmethod
     def steered(cls, study: Study) -> str | None:
-        return next((n for n in (*CHANNELS, RATE) if n in study.trials[0]), None)
+        found = super().steered(study)
+        return found if found in (*CHANNELS, RATE) else None
 
     @classmethod
     def other_stimuli(cls, study: Study, time: np.ndarray) -> Iterator[dict[str, np.ndarray]]:
