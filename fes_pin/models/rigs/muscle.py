@@ -59,7 +59,7 @@ class Muscle(Rig):
         ends = [f(t["length_m"]) for t in study.trials if "length_m" in t for f in (np.min, np.max)]
         middle = {"length_m": 0.5 * float(min(ends) + max(ends))} if ends else {}
         start: dict[str, Any] = dict(study.start)
-        if not any(map(is_stimulated, study.trials)):
+        if not any(is_stimulated(t) or t.kind != IMPOSED for t in study.trials):
             words = "no trial is stimulated, and this rig models what a stimulus adds; expected rig joint, on a slide"
             raise InputError(words, file=study.folder, column="rig")
         return cls(constants={**study.constants, **period, **middle}, **start)
