@@ -123,7 +123,7 @@ class Contrast(Result):
 
     def effect(self, name: str) -> type[Effect] | None:
         """Return the class of a cause; None of a nominal parameter and of a misread condition."""
-        return next((e for e in self.catalogue.effects if e.name == name), None)
+        return next((e for e in self.catalogue.effects_for(self.fit.grouped.rig) if e.name == name), None)
 
     def notes(self) -> list[tuple[str, str]]:
         """Return notes in addition to the changes, by topic."""

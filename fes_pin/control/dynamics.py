@@ -15,6 +15,7 @@ from functools import cached_property
 import numpy as np
 import scipy.linalg
 
+from fes_pin.data.channels import WIDTH
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import between, number, positive_number, shortened
 from fes_pin.data.show import Tabulated
@@ -82,6 +83,9 @@ class AnkleDynamics(Tabulated):
             raise InputError(message, column="model")
         if not isinstance(model.rig, Ankle):
             raise InputError(f"position control needs the rig ankle, found {model.rig.name}")
+        if model.rig.channel is not WIDTH:
+            words = f"missing; position control commands pulse widths, and needs {' and '.join(WIDTH.ends)}"
+            raise InputError(words, column=f"constants.{WIDTH.ends[0]}")
         if number(load_kg, "load_kg") < 0.0:
             raise InputError(f"expected a load of at least 0 kg, found {load_kg:g}")
         rig, c = model.rig, {n: float(v) for n, v in model.rig.constants.items()}

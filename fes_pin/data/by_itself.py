@@ -4,7 +4,7 @@ import numpy as np
 
 from fes_pin.data.trial import Trial
 
-PULSES = ("pulse_width_us", "stim")
+PULSES = ("pulse_width_us", "amplitude_ma", "charge_uc", "stim", "frequency_hz", "emg", "emg_envelope")
 """Inputs without which nothing happens: a muscle contracts where it is stimulated."""
 STILL = 0.02
 """Share of a trial's range below which a part of it stands still."""

@@ -12,10 +12,12 @@ from typing import Any
 
 import numpy as np
 
+from fes_pin.data.channels import CHANNELS
 from fes_pin.data.errors import KeyFault
 from fes_pin.data.motion import GROUND_REACTION, OPTIONAL, REQUIRED, TRANSLATIONS, knees_bend_positively
-from fes_pin.data.schema import ROLES, RigSchema, is_like, number_or_none, one_of, positive, unknown, unread
+from fes_pin.data.schema import IMPOSED, ROLES, RigSchema, is_like, number_or_none, one_of, positive, unknown, unread
 from fes_pin.data.table import Fault
+from fes_pin.data.units import own_unit
 
 LOW_PASS = "low_pass_hz"
 LABELS = {"role": None, "group": None, LOW_PASS: None, "remarks": ()}
@@ -23,6 +25,10 @@ LABELS = {"role": None, "group": None, LOW_PASS: None, "remarks": ()}
 TURN = 2.0 * math.pi
 LONGEST_MUSCLE_M = 1.0
 """Length in m that no muscle with its tendon has: the longest, sartorius, comes to about half a metre."""
+TOGETHER = ({"pulse_width_us", "amplitude_ma", "frequency_hz"}, {"charge_uc", "frequency_hz"})
+"""Stimuli that one trial may hold together."""
+LARGEST = {"amplitude_ma": 500.0, "charge_uc": 1e4, "frequency_hz": 1e4, "emg_envelope": 10.0}
+"""What no stimulator gives: of surface stimulators 150 mA is the most; a larger amplitude is in uA."""
 SHORTEST_PULSE_US = 2.0
 """Pulse width in us that recruits nothing: surface stimulators give 50 to 1000 us, and 2 is a long one in ms."""
 LONGEST_PULSE_US = 1e5
@@ -99,9 +105,9 @@ def check_columns(names: Sequence[str], schema: RigSchema, kind: str, inputs_onl
             raise error(unknown(name, absent), name, None)
     output, motion = schema.outputs[kind], schema.motion(kind)[:1]
     found = [name for name in stimuli if name in names]
-    if schema.inputs_required and not found:
+    if schema.inputs_required and not found and kind != IMPOSED:
         raise error(f"missing; this rig needs {' or '.join(stimuli)}", stimuli[0], None)
-    if len(found) > 1:
+    if not any(set(found) <= together for together in TOGETHER) and len(found) > 1:
         raise error(f"expected one of {' and '.join(found)}, found both", found[1], None)
     for name in motion:
         if name not in names:
@@ -159,6 +165,7 @@ def check_values(
         if most > LONGEST_PULSE_US:
             message = f"reaches {most:g} us, and no pulse is so long: is it in ns?"
             raise error(message, "pulse_width_us", int(width.argmax()))
+    _check_sizes(columns, error)
     if "stim" in columns and (other := ~np.isin(columns["stim"], (0.0, 1.0))).any():
         sample = int(np.argmax(other))
         raise error(f"expected 0 or 1, found {columns['stim'][sample]:g}", "stim", sample)
@@ -180,6 +187,15 @@ def check_values(
             raise error(f"is {least:.4g} m; expected the whole length, above 0", "length_m", int(length.argmin()))
 
 
+def _check_sizes(columns: Mapping[str, np.ndarray], error: Fault) -> None:
+    """Refuse amplitudes, charges and rates that no stimulator gives."""
+    for name, limit in LARGEST.items():
+        if name in columns and ((columns[name] < 0.0) | (columns[name] > limit)).any():
+            sample = int(np.argmax((columns[name] < 0.0) | (columns[name] > limit)))
+            expected = f"expected 0 to {limit:g} {own_unit(name)}, found {columns[name][sample]:g}"
+            raise error(expected, name, sample)
+
+
 def check_constants(schema: RigSchema, constants: Mapping[str, float], files: Collection[str], error: KeyFault) -> None:
     """What the numbers and files of a rig must be together: a curve with two ends, a body with its size.
 
@@ -188,13 +204,17 @@ def check_constants(schema: RigSchema, constants: Mapping[str, float], files: Co
     files
         Keys of the files that are there.
     """
-    threshold, saturation = constants.get("threshold_us"), constants.get("saturation_us")
-    if (threshold is None) != (saturation is None):
-        key = "threshold_us" if threshold is None else "saturation_us"
-        raise error(key, "missing; threshold_us and saturation_us go together")
-    if threshold is not None and saturation is not None and saturation <= threshold:
-        message = f"expected a saturation above the threshold of {threshold:g} us, found {saturation:g}"
-        raise error("saturation_us", message)
+    stated = [c for c in CHANNELS.values() if any(end in constants for end in c.ends)]
+    if len(stated) > 1:
+        one, other = (c.ends[0] for c in stated[:2])
+        raise error(other, f"expected the ends of recruitment in one unit, found {one} as well")
+    for channel in stated:
+        low, high = channel.ends
+        if low not in constants or high not in constants:
+            raise error(low if low not in constants else high, f"missing; {low} and {high} go together")
+        if constants[high] <= constants[low]:
+            message = f"expected a saturation above the threshold of {constants[low]:g} {channel.unit}"
+            raise error(high, f"{message}, found {constants[high]:g}")
     if absent := [key for key in schema.either if key not in constants and not files]:
         expected = ", or ".join((" and ".join(schema.either), *schema.files))
         raise error(absent[0], f"missing; expected {expected}")
@@ -204,9 +224,14 @@ def check_constants(schema: RigSchema, constants: Mapping[str, float], files: Co
 
 
 def check_same_inputs(
-    trials: Sequence[tuple[str, Collection[str]]], schema: RigSchema, constants: Collection[str], error: Callable
+    trials: Sequence[tuple[str, Mapping[str, np.ndarray]]],
+    schema: RigSchema,
+    constants: Collection[str],
+    error: Callable,
 ) -> None:
-    """What only all trials together show: the same inputs in each, and a recruitment curve for pulse widths.
+    """What only all trials together show: the same inputs in each, and a recruitment curve for what recruits.
+
+    A trial whose motion is imposed may be without a stimulus. What is 0 in all trials needs no curve.
 
     Parameters
     ----------
@@ -217,12 +242,20 @@ def check_same_inputs(
     error
         Makes the error of a trial's place (None: of the rig), a key and a message.
     """
-    first = {kind: columns for kind, columns in reversed(trials)}
-    for place, (kind, columns) in enumerate(trials):
+    given = [(k, kind, columns) for k, (kind, columns) in enumerate(trials) if _is_driven(kind, columns, schema)]
+    first = {kind: columns for _, kind, columns in reversed(given)}
+    for place, kind, columns in given:
         for column in schema.stimuli(kind) if len(schema.recordings) == 1 else ():
             if (column in columns) != (column in first[kind]):
                 there, others = ("has", "has not") if column in columns else ("lacks", "has it")
                 message = f"this trial {there} the column {column} and the first {others}; expected all or none"
                 raise error(place, schema.recordings[0], message)
-    if any("pulse_width_us" in columns for _, columns in trials) and "threshold_us" not in constants:
-        raise error(None, "threshold_us", "missing; trials with pulse_width_us need threshold and saturation")
+    for channel in CHANNELS.values():
+        name, low = channel.column, channel.ends[0]
+        if low not in constants and any(name in columns and np.any(columns[name]) for _, columns in trials):
+            raise error(None, low, f"missing; trials with {name} need threshold and saturation")
+
+
+def _is_driven(kind: str, columns: Collection[str], schema: RigSchema) -> bool:
+    """Return whether a trial must hold what the others do: all but an imposed motion without a stimulus."""
+    return kind != IMPOSED or any(n in columns for n in schema.stimuli(kind))

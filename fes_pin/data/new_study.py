@@ -13,14 +13,17 @@ from typing import Any
 import numpy as np
 
 from fes_pin.data.as_read import HeldFile
+from fes_pin.data.channels import AMPLITUDE, CHANNELS, EMG, EMG_KEYS, RATE, WIDTH, Channel, channel_of
 from fes_pin.data.errors import InputError, fault_at, listed
 from fes_pin.data.files import inside, read_bytes
 from fes_pin.data.new_view import APART, Recorded, free_part, recorded, view_keys
 from fes_pin.data.recorded.columns import INTERPOLATE
+from fes_pin.data.recorded.events import EVENTS, looking_period
 from fes_pin.data.recorded.sniff import Proposal, propose
 from fes_pin.data.recorded.text import TextForm
 from fes_pin.data.recorded.view import INTEGRATED
-from fes_pin.data.schema import NumberKey, any_number, check_known, one_of, unknown
+from fes_pin.data.schema import IMPOSED, NumberKey, any_number, check_known, one_of, unknown
+from fes_pin.data.stimulus import varying
 from fes_pin.data.study_text import HEADER, columns_text, form_in_words, source_from_option, source_in_words, toml_table
 from fes_pin.data.units import factor_of, known_unit, own_unit, quantities_of, stated_unit
 from fes_pin.data.wanted import Wanted, labels_of, number_set, of_files
@@ -94,6 +97,9 @@ class _Making:
         each = [propose(p, self.schema, wanted.revolute, wanted.form, chosen) for p in wanted.files]
         self.trials = recorded(each, self.schema, wanted.sources)
         self.proposals = [one.proposal for one in self.trials]
+        self.channel: Channel | None = None
+        self.cutoff: tuple[str, ...] = ()
+        self.looked_hz: float | None = None
         self.names = tuple(dict.fromkeys(n for p in self.proposals for n in p.recording.names))
         check_known(wanted.columns, self.schema.columns, fault_at("--column"))
         self.derived = {n: source for n, source in INTEGRATED.items() if self._is_integrated(n, source)}
@@ -104,6 +110,8 @@ class _Making:
         kinds = [self._kind(p) for p in self.proposals]
         columns = self._sources(set(kinds))
         times = self._times(columns)
+        self.looked_hz = self._events(columns)
+        self.channel, self.cutoff = self._channel(columns), EMG_KEYS[:1] if EMG in columns else ()
         rig, passive = self._numbers(self.schema.constants), self._numbers(self.schema.passive)
         trials = [self._trial(p, kind) for p, kind in zip(self.proposals, kinds, strict=True)]
         known, start = self._start(guess, {**rig, **passive}, [*columns, *self.derived])
@@ -208,6 +216,7 @@ class _Making:
         stated |= {k: n for k in ("from", "to") if (n := self._end(k, one.path)) is not None}
         stated |= {"offset_s": self.wanted.offsets} if self.wanted.offsets else {}
         seconds = {source: self._seconds(p, times[source]) for source, p in one.files.items()}
+        stated |= {"split": "none"} if self.looked_hz and "split" not in stated else {}  # rows come with events
         view, said = view_keys(one, seconds, self.wanted.resample_hz, stated)
         position = columns.get("position", {}).get("name")
         if not view and not self.schema.inputs_required and not set(columns) & set(self.schema.inputs) and position:
@@ -267,7 +276,8 @@ class _Making:
         self, columns: Mapping[str, Mapping[str, Any]], times: Mapping[str, Mapping[str, Any]]
     ) -> list[str]:
         """Lines of [columns], or of a table [sources.NAME] for each source."""
-        options = {"resample_hz": self.wanted.resample_hz, "missing": INTERPOLATE if self.wanted.fill else None}
+        rate_hz, events = self.wanted.resample_hz or self.looked_hz, EVENTS if self.looked_hz else None
+        options = {"resample_hz": rate_hz, "rows": events, "missing": INTERPOLATE if self.wanted.fill else None}
         if not self.trials[0].is_joined:
             is_plain = not any(p.recording.said for p in self.proposals)
             return columns_text(columns, self.names, self._one_form(""), options, is_plain=is_plain)
@@ -315,13 +325,57 @@ class _Making:
         needed = [*(schema.outputs[k] for k in order), *(c for k in order for c in schema.motion(k)[:1])]
         needed = [*["time_s"] * (not self.trials[0].is_joined), *(self.derived.get(c, c) for c in needed)]
         stimuli = dict.fromkeys(c for k in order for c in schema.stimuli(k))
-        inputs = [c for c in stimuli if c in self.wanted.columns or self._candidates(c)]
-        if not inputs and schema.inputs_required:
+        inputs = self._inputs([c for c in stimuli if c in self.wanted.columns or self._candidates(c)])
+        if not inputs and schema.inputs_required and kinds != {IMPOSED}:
             needed.append(next(iter(stimuli)))
         read = {c for k in order for c in schema.columns_of(k)}
         others = [c for c in (*schema.optional, *schema.imposed) if c in read]
-        sources = {c: self._source(c, c in needed) for c in dict.fromkeys([*needed, *inputs[:1], *others])}
+        sources = {c: self._source(c, c in needed) for c in dict.fromkeys([*needed, *inputs, *others])}
         return {column: source for column, source in sources.items() if source is not None}
+
+    def _inputs(self, found: list[str]) -> list[str]:
+        """The stimuli that are taken: those that were said, else the first; width and amplitude of pulses together."""
+        said = [c for c in found if self.wanted.columns.get(c)]
+        pulses = [c for c in (WIDTH.column, AMPLITUDE.column) if c in found and c not in ("", *said)]
+        first = said or (pulses if len(pulses) == 2 else found[:1])
+        return [
+            *first,
+            *([RATE] if RATE in found and RATE not in first and len(np.unique(self._values(RATE))) > 1 else []),
+        ]
+
+    def _values(self, column: str) -> np.ndarray:
+        """What the files hold of one of the rig's columns, as they have it; empty where that is not known."""
+        said = self.wanted.columns.get(column)
+        named = [n for n in self.names if said is not None and (said == n or said.split(":")[0].split(",")[0] == n)]
+        names = named or list(self._candidates(column) if said is None else ())
+        if len(names) != 1:
+            return np.zeros(0)
+        return np.concatenate(
+            [p.recording.columns[names[0]] for p in self.proposals if names[0] in p.recording.columns]
+        )
+
+    def _channel(self, sources: Collection[str]) -> Channel | None:
+        """What recruits, as far as it was said, or as the files show it; None where nothing is stimulated."""
+        if (stated := channel_of(self.wanted.settings)) is not None:
+            return stated
+        taken = [c for n, c in CHANNELS.items() if n in sources]
+        acting = [c for c in taken if self._values(c.column).any()]
+        if len(acting) < 2:
+            return acting[0] if acting and len(taken) == len(acting) else None
+        return varying([(self._values(WIDTH.column), self._values(AMPLITUDE.column))])
+
+    def _events(self, sources: Mapping[str, Mapping[str, Any]]) -> float | None:
+        """The rate in Hz at which logs of events were written, to the three digits that rounding leaves; else None."""
+        name = sources.get("time_s", {}).get("name")
+        if name is None:
+            return None
+        factor, periods = factor_of(sources["time_s"].get("unit", "s"), "time_s"), []
+        for one in self.proposals:
+            columns = {n: v for n, v in one.recording.columns.items() if n != name}
+            if name in one.recording.columns:  # else it is no numbers, which its reader refuses
+                periods.append(looking_period(one.recording.columns[name], columns))
+        known = [factor * p for p in periods if p is not None]
+        return 1.0 / float(f"{min(known):.3g}") if known else None
 
     def _candidates(self, column: str) -> tuple[str, ...]:
         """Columns of the files that could be this one, without those that a person named for another."""
@@ -420,11 +474,10 @@ class _Making:
 
     def _numbers(self, table: Mapping[str, NumberKey]) -> dict[str, float]:
         """Numbers of a table: those that it must have, and those that were given."""
-        width = "pulse_width_us"
-        recruits = width in self.wanted.columns or bool(width in self.schema.inputs and self._candidates(width))
+        ends = (*(self.channel.ends if self.channel else ()), *self.cutoff)
         out: dict[str, float] = {}
         for key, number in table.items():
-            needed = number.required or (recruits and key in ("threshold_us", "saturation_us"))
+            needed = number.required or key in ends
             if needed or key in self.wanted.settings:
                 out |= self._number(key, number)
         return out

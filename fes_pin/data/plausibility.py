@@ -16,15 +16,20 @@ from pathlib import Path
 import numpy as np
 
 from fes_pin.data.by_itself import PULSES
+from fes_pin.data.channels import CHANNELS, RATE, WIDTH
 from fes_pin.data.checks import check_values
 from fes_pin.data.counts import hunts
 from fes_pin.data.errors import InputError
 from fes_pin.data.imposed import imposed_motion
+from fes_pin.data.repeats import unrepeated
 from fes_pin.data.rests import MATTERS, rest_share
 from fes_pin.data.schema import IMPOSED, RigSchema
+from fes_pin.data.stimulus import is_stimulated
 from fes_pin.data.stuck import RUN
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial, check_trial
+from fes_pin.data.units import own_unit
+from fes_pin.data.urdf import is_revolute
 
 SAMPLES_EACH = 10
 """Samples for each value that is fitted, at least: a standard deviation that is estimated from fewer is itself
@@ -164,15 +169,24 @@ def _inputs(study: Study | ToPredict) -> Iterable[str]:
         yield f"fewer than {FEW} samples in {trials_named(short)}"
     alone = isinstance(study, ToPredict)  # trials that nothing drives are then no oddity, but for a muscle at rest
     names = dict.fromkeys(n for t in study.trials for n in _stimuli(study, t) if n in PULSES or not alone)
-    if not names and not alone and not any(t.kind == IMPOSED for t in study.trials):
+    is_free = not names and not alone and not any(t.kind == IMPOSED for t in study.trials)
+    if is_free and study.schema.inputs_required:
+        message = "no trial is stimulated; a muscle that is never stimulated shows nothing"
+        raise InputError(message, file=study.folder)
+    if is_free:
         column = " or ".join(study.schema.inputs)
         yield f"no trial is driven: there is no column {column}, and the motion is taken for free"
     for name in names:
-        threshold = study.constants.get("threshold_us", 0.0) if name == "pulse_width_us" else 0.0
+        channel = CHANNELS.get(name)
+        threshold = study.constants.get(channel.ends[0], 0.0) if channel else 0.0
         driven = [t for t in study.trials if name in _stimuli(study, t)]
         below = [t for t in driven if not (np.abs(t[name]) > threshold).any()]
         idle = [t.name for t in below]
-        zero = f"{name} is never above the threshold of {threshold:g} us" if threshold else f"{name} is zero throughout"
+        zero = (
+            f"{name} is never above the threshold of {threshold:g} {own_unit(name)}"
+            if threshold
+            else f"{name} is zero throughout"
+        )
         if len(idle) < len(driven):
             if idle and name in PULSES:  # a joint may swing free between driven trials
                 for trial in below:
@@ -180,10 +194,15 @@ def _inputs(study: Study | ToPredict) -> Iterable[str]:
                 yield f"{zero} in {trials_named(idle)}"
         elif name not in PULSES:
             yield f"no trial is driven: {zero}"
+        elif name == RATE and len(names) > 1:
+            continue
+        elif all(t.kind == IMPOSED for t in study.trials) and not any(t[name].any() for t in driven):
+            yield f"{zero} in all trials: the muscle is passive"
         else:
             most = max(float(np.abs(t[name]).max()) for t in study.trials if name in t)
             unit = "ms" if threshold < 1e3 * most else "s"
-            hint = f" (it reaches {most:.4g}: is it in {unit}?)" if 0.0 < most < SHORTEST_US else ""
+            is_short = name == WIDTH.column and 0.0 < most < SHORTEST_US
+            hint = f" (it reaches {most:.4g}: is it in {unit}?)" if is_short else ""
             if alone and not hint:
                 yield f"{zero}: nothing is stimulated"
                 continue
@@ -226,6 +245,14 @@ def _imposed(study: Study | ToPredict) -> Iterable[str]:
     bands = [m.bandwidth_hz for m in motions]
     band = f"{min(bands):.2g} Hz" if max(bands) < 1.1 * min(bands) else f"{min(bands):.2g} to {max(bands):.2g} Hz"
     yield f"velocity and acceleration of {name} are those of smoothing splines with a bandwidth of {band}"
+    found = {t.name: unrepeated(t, study.schema) for t in trials if not is_stimulated(t)}
+    if odd := {n: one for n, one in found.items() if one is not None and one.is_no_mechanism}:
+        most = max(odd.values(), key=lambda one: one.share)
+        effort = study.schema.outputs[IMPOSED]
+        unit = own_unit(effort, is_revolute(study.urdf))
+        differs = f"{effort} differs by {most.size:.2g} {unit} between equal cycles"
+        share = f"{100.0 * most.share:.0f} % of what it does in one, in {trials_named(list(odd))}"
+        yield f"{differs} of the motion, {share}: no passive mechanism does, so that voluntary effort is likely"
 
 
 def _is_clipped(trial: Trial, name: str) -> bool:

@@ -99,6 +99,11 @@ def pulse_list(
     InputError
         No such column; a rate or width that is not said, or that the trial says; a pulse beyond a limit, with its time.
     """
+    if odd := [n for n in ("amplitude_ma", "charge_uc", "frequency_hz", "emg", "emg_envelope") if n in trial]:
+        words = (
+            "expected a trial of pulse widths or of single pulses: pulses of other amplitudes and rates are not listed"
+        )
+        raise InputError(words, column=odd[0])
     if "pulse_width_us" in trial:
         if rate_hz is None or not 0.0 < rate_hz <= MOST["rate_hz"]:
             words = f"expected the rate of the pulses, whose widths the trial says, at most {MOST['rate_hz']:g} Hz"

@@ -25,7 +25,7 @@ IMPOSED = "imposed"
 UNITS = (
     *("per_rad", "per_deg", "kgm2", "gm2", "nms", "nmm", "nm", "mps", "kmh", "rad", "deg", "degrees", "degree"),
     *("kg", "mg", "lb", "mm", "cm", "km", "m", "kn", "mn", "n", "ms", "us", "ns", "min", "s", "khz", "hz"),
-    *("ma", "ua", "mv", "v", "g"),
+    *("ma", "ua", "uc", "nc", "mv", "v", "g"),
 )
 
 
@@ -98,7 +98,8 @@ class RigSchema(ReadOnly):
     outputs
         The measured column, by kind of trial.
     inputs
-        Columns of which a trial holds one; for a joint none is needed.
+        Columns of which a trial holds one; for a joint none is needed, and for an imposed motion. A width and an
+        amplitude of pulses may both be there, and their rate in addition: see `data.stimulus`.
     optional
         Other columns that have a meaning. A column that has none is an error.
     imposed

@@ -35,6 +35,7 @@ from fes_pin.data.schema import (
     schema_of,
 )
 from fes_pin.data.show import DataFrame, by_columns, frame, table_html
+from fes_pin.data.stimulus import with_one_stimulus
 from fes_pin.data.study_text import HORIZON, StudyTables, check_files, checked_horizon
 from fes_pin.data.table import format_csv
 from fes_pin.data.toml import Document, document_of, read_toml
@@ -128,7 +129,7 @@ class Study(ReadOnly):
             check_files(schema, files)
         trials = tuple(self.trials) if isinstance(self.trials, Iterable) else (self.trials,)
         if all(isinstance(t, Trial) for t in trials):
-            trials = with_kinds(with_whole_turns(trials, files), schema)
+            trials = with_one_stimulus(with_kinds(with_whole_turns(trials, files), schema), numbers["constants"])
         self._check_trials(trials, schema)
         if schema.inputs_required:  # else a trial without an input is one that nothing drives
             check_same_inputs([(t.kind, t.columns) for t in trials], schema, numbers["constants"], _fault_of(trials))
@@ -390,7 +391,7 @@ class _Reader(StudyTables):
         read = [self._trials(f"trial[{i}]", table, view, name) for i, (table, view, name) in each]
         self._places = [i for i, some in enumerate(read) for _ in some]
         every = [one for some in read for one in some]
-        trials = with_kinds(with_whole_turns(every, files), self.schema)
+        trials = with_one_stimulus(with_kinds(with_whole_turns(every, files), self.schema), constants)
         check_same_inputs([(t.kind, t.columns) for t in trials], self.schema, constants, self._fault_of)
         horizon = checked_horizon(self.document.table("study").get(HORIZON), self.document.under("study"))
         folder = self.folder.absolute()

@@ -1,6 +1,6 @@
 """Units that recordings come in, and what they are in the study format's own.
 
-A table and no units library: a study holds eight quantities, every factor of `units.csv` is exact by definition, and
+A table and no units library: a study holds a dozen quantities, every factor of `units.csv` is exact by definition, and
 headers write units as no library reads them: `Torque_Nm` is a newton metre, which a units library takes for a
 nanometre.
 """
@@ -36,6 +36,7 @@ _IN_NAMES = tuple(q for q in UNITS if q not in ("pressure", "power", "temperatur
 
 _BY_SUFFIX = {"s": "time", "us": "pulse width", "rad": "angle", "m": "length", "n": "force", "nm": "torque"}
 _HELD = {*_BY_SUFFIX.values(), "angular rate", "speed", "pulses"}
+_BY_SUFFIX |= {"ma": "current", "uc": "charge", "hz": "frequency"}
 _OF_A_JOINT = {"position": ("angle", "length"), "velocity": ("angular rate", "speed"), "effort": ("torque", "force")}
 
 
@@ -81,6 +82,16 @@ def known_unit(unit: str, quantities: tuple[str, ...]) -> tuple[str, str] | None
         return None
     plain = _plain(unit)
     return next(((q, _KNOWN[q][plain]) for q in quantities if plain in _KNOWN[q]), None)
+
+
+def is_another(unit: str, column: str, revolute: bool | None = None) -> bool:
+    """Return whether a unit is known, and of a quantity that a rig's column cannot hold.
+
+    A motor's current is an effort up to the motor's constant.
+    """
+    scaled = ("current",) if column == "effort" else ()
+    is_own = known_unit(unit, (*quantities_of(column, revolute), *scaled)) is not None
+    return bool(unit) and not is_own and known_unit(unit, tuple(UNITS)) is not None
 
 
 def factor_of(

@@ -120,7 +120,7 @@ class Diagnosis(ModelResult):
 
     def effect(self, name: str) -> type[Effect] | None:
         """Return the class of a cause; None of a misread condition."""
-        return next((e for e in self.catalogue.effects if e.name == name), None)
+        return next((e for e in self.catalogue.effects_for(self.model.rig) if e.name == name), None)
 
     def notes(self) -> list[tuple[str, str]]:
         """Return notes in addition to the table, by topic."""

@@ -10,7 +10,7 @@ WHOLE = 100.0
 LARGE, DIGITS = 1e5, 6
 """Larger values, and values with more decimals, are printed with a power of ten."""
 
-UNIT_IN_NAME = re.compile(r"(?<=.)(_(kgm2|nms|nm|us|s2?|hz|n|kg|rad|m))?(_per_(rad[23]?|s))?$")
+UNIT_IN_NAME = re.compile(r"(?<=.)(_(kgm2|nms|nm|us|ma|uc|s2?|hz|n|kg|rad|m))?(_per_(rad[23]?|s))?$")
 """Unit in a parameter's name; for a slide it is another than the parameter has."""
 ON_A_SLIDE = {"torque": "force", "angle": "position"}
 """Words for quantities of a joint that turns, and for those of a slide."""

@@ -3,10 +3,24 @@
 import math
 from collections.abc import Iterable
 
+from fes_pin.data.channels import CHANNELS, EMG, EMG_KEYS, ENVELOPE
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import instance
 from fes_pin.data.trial import Trial, check_trial
 from fes_pin.models.model import Model
+
+
+def _check_channel(model: Model, trial: Trial) -> None:
+    """Require that a trial's stimulus is the one that the rig's recruitment is of, and no other."""
+    if EMG in trial:
+        raise trial.error(f"expected {ENVELOPE}: a study with {EMG_KEYS[0]} makes it of {EMG}", EMG)
+    found = [n for n in CHANNELS if n in trial and trial[n].any()]
+    known = model.rig.channel
+    if odd := [n for n in found if known is None or n != known.column]:
+        low, high = CHANNELS[odd[0]].ends
+        if known is None:
+            raise trial.error(f"missing; trials with {odd[0]} need {low} and {high} of the rig", f"constants.{low}")
+        raise trial.error(f"expected {known.column}, of which the model has the threshold, found {odd[0]}", odd[0])
 
 
 def accepted_trials(model: Model, trials: Trial | Iterable[Trial], inputs_only: bool = True) -> tuple[Trial, ...]:
@@ -35,8 +49,6 @@ def accepted_trials(model: Model, trials: Trial | Iterable[Trial], inputs_only: 
         if not isinstance(trial, Trial):
             raise InputError(f"expected trials, found a {type(trial).__name__}", column="trials")
         check_trial(trial, schema, inputs_only=inputs_only, threshold_us=threshold_us, also=also)
-        if "pulse_width_us" in trial and "threshold_us" not in model.rig.constants:
-            message = "missing; trials with pulse_width_us need threshold_us and saturation_us of the rig"
-            raise trial.error(message, "constants.threshold_us")
+        _check_channel(model, trial)
         model.rig.check_prediction(trial)
     return given

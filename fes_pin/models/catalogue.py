@@ -11,6 +11,7 @@ from typing import Any
 from fes_pin.data.errors import InputError
 from fes_pin.data.schema import RigSchema
 from fes_pin.models import effects, rigs
+from fes_pin.models.in_channel import in_channel
 from fes_pin.models.outside import check_effect, check_rig, classes_of, in_one_line, load_module, origin
 from fes_pin.models.rigs.base import Rig
 from fes_pin.models.stage import Effect, by_name, in_order
@@ -46,11 +47,15 @@ class Catalogue:
         return by_name(self.effects, name)
 
     def effects_for(self, rig: Rig | type[Rig]) -> tuple[type[Effect], ...]:
-        """The effects that a rig can have; of a rig with its constants those that it determines, in their variants."""
+        """The effects that a rig can have; of a rig with its constants those that it determines, in their variants.
+
+        Of a rig with a stimulus they are in the unit of that.
+        """
         if not isinstance(rig, Rig):
             return tuple(e for e in self.effects if rig.takes(e))
         unknown = rig.undetermined()
-        return tuple(e.on(rig.constants) for e in self.effects if rig.takes(e) and e.name not in unknown)
+        known = (e for e in self.effects if rig.takes(e) and e.name not in unknown)
+        return tuple(in_channel(e.on(rig.constants), rig.channel) for e in known)
 
     def schemas(self) -> dict[str, RigSchema]:
         """What a study of each rig must and may hold, by the rig's name; see `read_study`."""

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from fes_pin.data.channels import STIMULI
 from fes_pin.data.trial import Trial
 from fes_pin.models.maths import cos, sin, sqrt, tanh
 from fes_pin.models.parameters import parameter
@@ -103,7 +104,7 @@ class _Features(Effect):
 
     def scaled(self, s: Any) -> SimpleNamespace:
         """Return angle, rate, drive, activation and time, each from about -1 to 1."""
-        drive = next((getattr(s.u, n) for n in ("effort", "pulse_width_us", "stim") if hasattr(s.u, n)), 0.0)
+        drive = next((getattr(s.u, n) for n in ("effort", *STIMULI) if hasattr(s.u, n)), 0.0)
         centre, reach, speed, most, duration = (getattr(self, n) for n in SCALES)
         return SimpleNamespace(
             q=(getattr(s.x, "q", getattr(s, "q", 0.0)) - centre) / reach,

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from fes_pin.data.channels import CHANNELS, WIDTH
 from fes_pin.data.errors import InputError, fault_at
 from fes_pin.data.numbers import instance, shortened
 from fes_pin.data.schema import check_known
@@ -13,6 +14,13 @@ from fes_pin.data.trial import Trial
 from fes_pin.models.parameters import ParameterInfo
 from fes_pin.models.rigs.base import Rig
 from fes_pin.models.stage import Effect, in_order
+
+
+def _other_unit(effect: Effect, rig: Rig) -> str:
+    """The unit of a stimulus that an effect has and the rig has not; "" for none."""
+    stimuli = {c.unit for c in CHANNELS.values()} - {(rig.channel or WIDTH).unit}
+    units = (one.unit.partition("/")[0] for one in effect.parameters().values())
+    return next((u for u in units if u in stimuli), "")
 
 
 @dataclass(frozen=True, repr=False)
@@ -44,6 +52,9 @@ class Model:
                 raise InputError(f"the model has {effect.name} already")
             if hasattr(effect, "rigs") and not self.rig.takes(effect):  # a probe of the residual is for any rig
                 raise InputError(f"{effect.name} is not for the rig {self.rig.name}")
+            if unit := _other_unit(effect, self.rig):
+                expected = f"its class of this rig: model.rig.cause(effects.{type(effect).__name__})"
+                raise InputError(f"{effect.name} has sizes in {unit}, and the stimulus has not; expected {expected}")
         object.__setattr__(self, "effects", in_order(self.effects))
 
     def __add__(self, effect: Effect) -> "Model":

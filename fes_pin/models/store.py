@@ -12,6 +12,7 @@ from fes_pin.data.outputs import written_by
 from fes_pin.data.schema import NumberKey, one_of
 from fes_pin.data.toml import Document, read_toml
 from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
+from fes_pin.models.in_channel import in_channel
 from fes_pin.models.model import Model
 from fes_pin.models.outside import origin
 from fes_pin.models.rigs.base import Rig
@@ -125,7 +126,7 @@ def _missing(document: Document, name: object, otherwise: str) -> str:
 def _effect(document: Document, catalogue: Catalogue, name: str, listed: dict[str, Any], rig: Rig) -> Effect:
     key = f"effects.{name}"
     try:
-        kind = catalogue.effect(name).on(rig.constants)
+        kind = in_channel(catalogue.effect(name).on(rig.constants), rig.channel)
     except InputError as problem:
         raise document.error(key, _missing(document, name, problem.message)) from None
     each_trial = document.table(key, listed).pop(EACH_TRIAL, False)

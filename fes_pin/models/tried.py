@@ -13,6 +13,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from fes_pin.data.channels import CHANNELS, EMG, ENVELOPE, RATE, WIDTH
 from fes_pin.data.errors import InputError
 from fes_pin.data.imposed import MOTION
 from fes_pin.data.numbers import shortened
@@ -37,6 +38,8 @@ EQUATIONS = ("apply", "rate", "update", "rest", "rates", "sample", "readings", "
 """Methods that return numbers or expressions."""
 FINITE = "finite numbers, by fes_pin.models.maths.sin and its like in place of math.sin"
 """What is expected of them: of an expression `math` gives NaN."""
+OTHER_UNITS = (*(n for n in CHANNELS if n != WIDTH.column), RATE, EMG, ENVELOPE)
+"""Stimuli of which a rig is not tried: its equations are those of a pulse width."""
 POINTS = 16
 """Combinations of signals at which all must be finite."""
 SIGNED = ("q", "v", "effort", "imposed_rate", "imposed_acceleration")
@@ -183,13 +186,14 @@ def _try_on(rig: type[Rig], one: type[Effect], model: Model) -> None:
 
 
 def _rig(rig: type[Rig]) -> Rig:
-    return rig(constants={n: k + 1.0 for k, n in enumerate(rig.needed)})
+    ends = [n for n in WIDTH.ends if n in rig.schema.constants]
+    return rig(constants={n: k + 1.0 for k, n in enumerate(dict.fromkeys((*rig.needed, *ends)))})
 
 
 def _kinds(rig: type[Rig]) -> Iterator[tuple[str, tuple[str, ...]]]:
     """Every kind of trial, with each stimulus."""
     for kind in rig.schema.outputs:
-        for stimulus in rig.schema.stimuli(kind) or ("",):
+        for stimulus in [n for n in rig.schema.stimuli(kind) if n not in OTHER_UNITS] or ("",):
             yield kind, (*filter(None, [stimulus]), *(MOTION if rig.schema.motion(kind) else ()))
 
 

@@ -1,7 +1,7 @@
 """The table `[columns]` of a study: which column of the recordings is which of the rig's, in which unit."""
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from fes_pin.data.errors import KeyFault, listed
+from fes_pin.data.recorded.events import EVENTS, sampled_events
 from fes_pin.data.recorded.formats import read_recording
 from fes_pin.data.recorded.regular import check_steps, filled, resampled
 from fes_pin.data.recorded.text import DECIMALS, DELIMITERS, ENCODINGS, TextForm
@@ -20,7 +21,7 @@ from fes_pin.data.units import factor_of, known_unit, quantities_of, stated_unit
 
 FILE_KEYS = (
     *("delimiter", "decimal", "header_row", "first_row", "comment", "encoding", "names", "transposed"),
-    *("resample_hz", "missing"),
+    *("resample_hz", "missing", "rows"),
 )
 SOURCE_KEYS = ("name", "unit", "scale", "zero", "edge", "rate_hz")
 INTERPOLATE = "interpolate"
@@ -84,6 +85,8 @@ class Columns:
         Whether the rig's joint turns; None if it has none, or that is not known.
     scaled
         Columns whose scale is stated.
+    events
+        Whether there is a row only where something changes.
     """
 
     sources: Mapping[str, ColumnSource]
@@ -93,6 +96,7 @@ class Columns:
     fills: bool = False
     revolute: bool | None = None
     scaled: frozenset[str] = frozenset()
+    events: bool = False
 
     def factors(self) -> dict[str, float]:
         """What numbers are multiplied by as their unit is stated, by column; NaN where a scale is stated."""
@@ -193,6 +197,8 @@ class Columns:
                 hint = f'a number, found nothing; missing = "{INTERPOLATE}" in [columns.file] fills in short gaps'
                 expected = "a time, found nothing" if name == "time_s" else hint
                 raise table.error(f"expected {expected}", name, int(np.argmax(np.isnan(values))))
+        if self.events and self.resample_hz is not None:
+            return sampled_events(table, self.resample_hz)
         if self.resample_hz is not None:
             said += check_steps(table, self.resample_hz)
         if self.fills:
@@ -296,34 +302,43 @@ def _unsaid(column: str, name: str, unit: str, revolute: bool | None = None) -> 
 
 def _with_file(columns: Columns, about: Mapping[str, Any], error: KeyFault) -> Columns:
     """With what `[columns.file]` says of how the files are written."""
-    form: dict[str, Any] = {}
     check_known(about, FILE_KEYS, lambda key, message: error(f"file.{key}", message))
-    for key, value in about.items():
-        where = f"file.{key}"
-        known = {"delimiter": DELIMITERS, "decimal": DECIMALS, "encoding": ENCODINGS, "missing": (INTERPOLATE,)}
-        if key in known:
-            form[key] = one_of(value, known[key], partial(error, where))
-        elif key == "comment":
-            if not isinstance(value, str) or not value.strip():
-                raise error(where, "expected what a comment begins with")
-            form[key] = value.strip()
-        elif key == "resample_hz":
-            form[key] = positive("Hz").check(value, partial(error, where))
-        elif key == "names":
-            if not isinstance(value, list) or not value or not all(isinstance(one, str) for one in value):
-                raise error(where, "expected a list of names, one for each column of the files")
-            form[key] = tuple(value)
-        elif key == "transposed":
-            if not isinstance(value, bool):
-                raise error(where, "expected true or false")
-            form[key] = value
-        elif isinstance(value, bool) or not isinstance(value, int) or value < (key == "first_row"):
-            raise error(where, "expected the number of a line, from 1" + (" (0: no header)" * (key == "header_row")))
-        else:
-            form[key] = value
-    rate, missing = form.pop("resample_hz", None), form.pop("missing", None)
+    form = {key: _of_file(key, value, partial(error, f"file.{key}")) for key, value in about.items()}
+    rate, missing, rows = (form.pop(key, None) for key in ("resample_hz", "missing", "rows"))
+    if rows is not None and rate is None:
+        raise error("file.rows", f'expected resample_hz as well: rows = "{EVENTS}" are held from step to step')
     form.setdefault("first_row", form.get("header_row", 1) + 1)
     text = TextForm(**form)
     if text.first_row <= text.header_row:
         raise error("file.first_row", f"expected a line below the header in line {text.header_row}")
-    return replace(columns, form=text, resample_hz=rate, fills=missing is not None)
+    return replace(columns, form=text, resample_hz=rate, fills=missing is not None, events=rows is not None)
+
+
+WORDS = {
+    **{"delimiter": DELIMITERS, "decimal": DECIMALS, "encoding": ENCODINGS},
+    **{"missing": (INTERPOLATE,), "rows": (EVENTS,)},
+}
+"""Keys of `[columns.file]` that have one of some words."""
+
+
+def _of_file(key: str, value: Any, error: Callable[[str], Exception]) -> Any:
+    """The value of a key of `[columns.file]`, checked."""
+    if key in WORDS:
+        return one_of(value, WORDS[key], error)
+    if key == "resample_hz":
+        return positive("Hz").check(value, error)
+    if key == "comment":
+        if not isinstance(value, str) or not value.strip():
+            raise error("expected what a comment begins with")
+        return value.strip()
+    if key == "names":
+        if not isinstance(value, list) or not value or not all(isinstance(one, str) for one in value):
+            raise error("expected a list of names, one for each column of the files")
+        return tuple(value)
+    if key == "transposed":
+        if not isinstance(value, bool):
+            raise error("expected true or false")
+        return value
+    if isinstance(value, bool) or not isinstance(value, int) or value < (key == "first_row"):
+        raise error("expected the number of a line, from 1" + (" (0: no header)" * (key == "header_row")))
+    return value

@@ -38,5 +38,5 @@ class AntagonistSpillover(Effect):
         return {"act": lag(s.own.recruited, s.own.act, self.lag_s, s.step)[1]}
 
     def update(self, s: Signals) -> ByName:
-        room = maximum(s.c.saturation_us - self.onset_us, 1.0)
-        return {"recruited": clip((s.u.pulse_width_us - self.onset_us) / room, 0.0, 1.0)}
+        room = maximum(s.saturation - self.onset_us, s.least)
+        return {"recruited": clip((s.commanded - self.onset_us) / room, 0.0, 1.0)}

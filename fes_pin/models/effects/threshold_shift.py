@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fes_pin.data.channels import CHANNELS
 from fes_pin.models.stage import Bounds, Effect, Measured, Scalar, Signals, Stage, parameter
 
 
@@ -24,7 +25,7 @@ class ThresholdShift(Effect):
 
     def limits(self, measured: Measured) -> Bounds:
         """Beyond the widest pulse no stimulus acts, or each does fully."""
-        widest = float(np.max(measured.get("pulse_width_us", np.zeros(1))))
+        widest = max((float(np.max(measured[n])) for n in CHANNELS if n in measured), default=0.0)
         return {"shift_us": (-widest, widest)} if widest > 0.0 else {}
 
     def apply(self, value: Scalar, s: Signals) -> Scalar:

@@ -8,15 +8,17 @@ from typing import Any
 
 import numpy as np
 
+from fes_pin.data.channels import RATE, recruitment_ends
 from fes_pin.data.imposed import imposed_motion
 from fes_pin.data.schema import IMPOSED, START_S, RigSchema, any_number, not_negative, positive
+from fes_pin.data.stimulus import is_stimulated
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.models.least_squares import least_squares
 from fes_pin.models.maths import cos, exp, ramp, sin, where
 from fes_pin.models.rigs.base import GRAVITY, IMPOSED_STOPPING, Rig, imposed_now
 from fes_pin.models.rigs.rigid import gravity_coefficients, point_foot
-from fes_pin.models.rigs.stimuli import recruited_now, recruitment_of
+from fes_pin.models.rigs.stimuli import recruited_in, recruited_now, usual_period
 from fes_pin.models.stage import Signals, parameter
 
 UPRIGHT = 1.5707963267948966
@@ -54,8 +56,7 @@ class Ankle(Rig):
             "com_distance_m": positive("m"),
             "moment_arm_m": positive("m"),
             "force_scale_n": positive("N"),
-            "threshold_us": not_negative("us"),
-            "saturation_us": positive("us"),
+            **recruitment_ends(),
         },
         passive={"f0_n": not_negative("N"), "f1_per_rad": not_negative("1/rad"), "theta_r_rad": any_number("rad")},
         start={
@@ -72,10 +73,10 @@ class Ankle(Rig):
         only={"angle_rad": "isometric"},
         default_kind="motion",
         outputs={"motion": "angle_rad", "isometric": "force_n", IMPOSED: "torque_nm"},
-        inputs=("pulse_width_us",),
+        inputs=("pulse_width_us", "amplitude_ma", "charge_uc", RATE),
         imposed=("angle_rad",),
     )
-    needed = (*schema.constants, *schema.passive)
+    needed = (*(n for n, number in schema.constants.items() if number.required), *schema.passive)
 
     def decay_s(self) -> float:
         return self.inertia_kgm2 / self.damping_nms if self.damping_nms > 0.0 else math.inf
@@ -83,11 +84,13 @@ class Ankle(Rig):
     @classmethod
     def of_study(cls, study: Study) -> "Ankle":
         start: dict[str, Any] = dict(study.start)
-        plain = cls(constants=dict(study.constants), **start)
+        acting = [t for t in study.trials if is_stimulated(t)]
+        fitted = None if acting else ("inertia_kgm2", "damping_nms")
+        plain = cls(constants={**study.constants, **usual_period(study.trials)}, fitted=fitted, **start)
         measured = [t for t in study.trials if t.kind == IMPOSED and "torque_nm" in t]
-        if not measured or plain.pull_in(measured) >= 0.0:
+        if not measured or not acting or plain.pull_in(measured) >= 0.0:
             return plain
-        return cls(constants={**study.constants, "torque_sign": -1.0}, **start)
+        return cls(constants={**plain.constants, "torque_sign": -1.0}, fitted=fitted, **start)
 
     @classmethod
     def conditions_to_try(cls, study: Study) -> set[tuple[str, tuple[tuple[str, float], ...]]]:
@@ -111,6 +114,9 @@ class Ankle(Rig):
         moved = {"motion": (*joint, "driving", "acceleration", "reading"), IMPOSED: (*joint, "reading")}
         return (*muscle, *moved.get(kind, ()))
 
+    def changeable(self, kind: str, inputs: tuple[str, ...]) -> tuple[str, ...]:
+        return self.driven_signals(self.signals(kind), inputs)
+
     def states(self, kind: str) -> tuple[str, ...]:
         return ("act", "q", "v") if kind == "motion" else ("act",)
 
@@ -119,17 +125,19 @@ class Ankle(Rig):
 
     def constant_names(self, kind: str) -> tuple[str, ...]:
         own = {"motion": ("load_kg",), "isometric": ("angle_rad",), IMPOSED: ("load_kg", "torque_sign")}
-        return (*self.needed, "gravity_cos", "gravity_sin", *own[kind])
+        period = ("pulse_period_s",) if "pulse_period_s" in self.constants else ()
+        known = (*(n for n in self.needed if n not in self.schema.passive), *self.ends(), *self.schema.passive)
+        return (*known, *period, "gravity_cos", "gravity_sin", *own[kind])
 
     def trial_constants(self, trial: Trial) -> dict[str, float]:
         a, b = _foot_gravity(float(self.constants["foot_mass_kg"]), float(self.constants["com_distance_m"]))
-        unstated = {"load_kg": 0.0, "torque_sign": 1.0} if trial.kind == IMPOSED else {}
+        low, high = self.ends()
+        unstated = {low: 0.0, high: 1.0, **({"load_kg": 0.0, "torque_sign": 1.0} if trial.kind == IMPOSED else {})}
         known = {**unstated, **self.constants, **trial.conditions, "gravity_cos": a, "gravity_sin": b}
         return {name: float(known[name]) for name in self.constant_names(trial.kind)}
 
     def recruited(self, trial: Trial) -> np.ndarray:
-        known = (float(self.constants[n]) for n in ("threshold_us", "saturation_us"))
-        return np.asarray(recruitment_of(trial["pulse_width_us"], *known))
+        return recruited_in(trial, self.channel, self.constants)
 
     def driving_sizes(self, trials: Sequence[Trial]) -> dict[str, float]:
         """Return the torque of the cable in a free motion at the start values."""
@@ -172,7 +180,7 @@ class Ankle(Rig):
         return s.torque if s.kind == "motion" else z
 
     def sample(self, s: Signals) -> dict[str, Any]:
-        return {"r": s.through("recruitment", recruited_now(s)), "r_before": s.m.r}
+        return {"r": s.through("recruitment", recruited_now(s, self.channel)), "r_before": s.m.r}
 
     def rates(self, s: Signals) -> dict[str, Any]:
         c = s.c

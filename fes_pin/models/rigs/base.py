@@ -7,12 +7,14 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from fes_pin.data.channels import CHANNELS, ENVELOPE, RATE, WIDTH, Channel, channel_of
 from fes_pin.data.errors import InputError
 from fes_pin.data.imposed import MOTION, imposed_motion, same_motion
 from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.schema import IMPOSED, START_S, RigSchema
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial, derived_trial
+from fes_pin.models.in_channel import in_channel
 from fes_pin.models.parameters import ANY_NUMBER, ROTARY, ParameterInfo, check_parameters, checked_number, parameters_of
 from fes_pin.models.rigs.stimuli import shaped
 from fes_pin.models.session import Session, checked_session, past_of
@@ -76,9 +78,9 @@ class Rig(ReadOnly):
         known = {**schema.constants, **schema.passive, **schema.start}
         given = {n: (v, known.get(n, ANY_NUMBER)) for n, v in self.constants.items()}
         constants = {n: checked_number(v, f"constants.{n}", key) for n, (v, key) in given.items()}
-        if "threshold_us" in constants and constants.get("saturation_us", math.inf) <= constants["threshold_us"]:
-            message = f"expected more than {constants['threshold_us']:g}"
-            raise InputError(message, column="constants.saturation_us")
+        for low, high in (channel.ends for channel in CHANNELS.values()):
+            if low in constants and constants.get(high, math.inf) <= constants[low]:
+                raise InputError(f"expected more than {constants[low]:g}", column=f"constants.{high}")
         vars(self).update(constants=constants, fitted=tuple(listed), session=checked_session(self.session))
         self._freeze()
 
@@ -146,7 +148,8 @@ class Rig(ReadOnly):
     @classmethod
     def steered(cls, study: Study) -> str | None:
         """The input column of a study that `driven` can give any shape; None if there is none."""
-        return next((n for n in cls.schema.inputs if n in study.trials[0]), None)
+        unknown = {n for n, c in CHANNELS.items() if c.ends[0] not in study.constants}  # of which nobody knows the ends
+        return next((n for n in cls.schema.inputs if n in study.trials[0] and n not in unknown), None)
 
     @classmethod
     def driven(cls, study: Study, shape: np.ndarray) -> np.ndarray:
@@ -180,6 +183,27 @@ class Rig(ReadOnly):
     def changeable(self, kind: str, inputs: tuple[str, ...]) -> tuple[str, ...]:
         """The signals that trials with these input columns have."""
         return self.signals(kind)
+
+    @property
+    def channel(self) -> Channel | None:
+        """The quantity of the pulses that recruits, by the threshold that is known; None where none is."""
+        return channel_of(self.constants)
+
+    def cause(self, kind: type[Effect]) -> type[Effect]:
+        """Return the class of an effect with sizes in the unit of this rig's stimulus: `shift_ma` for `shift_us`."""
+        return in_channel(kind, self.channel)
+
+    def ends(self) -> tuple[str, str]:
+        """Names of the constants between which it recruits."""
+        return (self.channel or WIDTH).ends
+
+    def driven_signals(self, signals: tuple[str, ...], inputs: tuple[str, ...]) -> tuple[str, ...]:
+        """Return those of a muscle's signals that these inputs drive: recorded pulses have no size that recruits."""
+        has_size = self.channel is not None and self.channel.column in inputs
+        absent = set() if has_size else {"pulse_width", "recruitment"}
+        if not has_size and not {"stim", RATE, ENVELOPE} & set(inputs):
+            absent |= {"delay", "time_constant", "sensitivity", "activation"}
+        return tuple(s for s in signals if s not in absent)
 
     def states(self, kind: str) -> tuple[str, ...]:
         """Names of the continuous states."""

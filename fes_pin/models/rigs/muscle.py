@@ -7,18 +7,21 @@ from typing import Any
 
 import numpy as np
 
-from fes_pin.data.schema import IMPOSED, START_S, RigSchema, not_negative, positive
+from fes_pin.data.channels import CHANNELS, EMG, EMG_KEYS, ENVELOPE, RATE, recruitment_ends
+from fes_pin.data.errors import InputError
+from fes_pin.data.schema import IMPOSED, START_S, RigSchema, positive
+from fes_pin.data.stimulus import is_stimulated
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.models.parameters import HELD, parameter
 from fes_pin.models.rigs.base import Rig, imposed_now
-from fes_pin.models.rigs.stimuli import recruited_now, recruitment_of, trains
+from fes_pin.models.rigs.stimuli import recruited_in, recruited_now, trains, usual_period
 from fes_pin.models.stage import Signals
 
 
 @dataclass(frozen=True)
 class Muscle(Rig):
-    """A muscle: recruitment by pulse width, or by the pulses themselves, and a first-order lag.
+    """A muscle: recruitment by pulse width, amplitude or charge, or by the pulses themselves, and a first-order lag.
 
         r         = clip((w - threshold) / (saturation - threshold), 0, 1), or the recorded pulses
         tau da/dt = r - a
@@ -27,6 +30,8 @@ class Muscle(Rig):
     A recorded pulse (`stim`) is an impulse of area P, the usual pulse period of the study: there a train averages
     r = 1, and `gain` is the mean force that it settles to; one of twice the rate averages r = 2. Where a lever imposes
     its length the nominal force does not depend on that; causes count it from `length_m`, the middle of the study's.
+
+    The envelope of an EMG is r of a voluntary muscle: `gain` is then its force at an envelope of 1.
     """
 
     gain: float = parameter(30.0, unit="N", lower=1e-6, upper=1e5, scale=5.0)
@@ -34,12 +39,15 @@ class Muscle(Rig):
 
     name = "muscle"
     schema = RigSchema(
-        constants={"threshold_us": not_negative("us", False), "saturation_us": positive("us", False)},
+        constants={
+            **recruitment_ends(),
+            **dict(zip(EMG_KEYS, (positive("Hz", False), positive("", False)), strict=True)),
+        },
         start={"gain": positive(""), "time_constant_s": positive("s")},
         conditions=START_S,
         default_kind="isometric",
         outputs={"isometric": "force_n", IMPOSED: "force_n"},
-        inputs=("pulse_width_us", "stim"),
+        inputs=("pulse_width_us", "stim", "amplitude_ma", "charge_uc", RATE, EMG, ENVELOPE),
         imposed=("length_m",),
     )
     elsewhere = "record the same force with another sensor, or let the muscle move a joint"
@@ -47,19 +55,24 @@ class Muscle(Rig):
     @classmethod
     def of_study(cls, study: Study) -> "Muscle":
         pulsed = [t for t in study.trials if "stim" in t.columns]
-        period = {"pulse_period_s": pulse_period(pulsed)} if pulsed else {}
+        period = {"pulse_period_s": pulse_period(pulsed)} if pulsed else usual_period(study.trials)
         ends = [f(t["length_m"]) for t in study.trials if "length_m" in t for f in (np.min, np.max)]
         middle = {"length_m": 0.5 * float(min(ends) + max(ends))} if ends else {}
         start: dict[str, Any] = dict(study.start)
+        if not any(is_stimulated(t) or t.kind != IMPOSED for t in study.trials):
+            words = "no trial is stimulated, and this rig models what a stimulus adds; expected rig joint, on a slide"
+            raise InputError(words, file=study.folder, column="rig")
         return cls(constants={**study.constants, **period, **middle}, **start)
 
     @classmethod
     def steered(cls, study: Study) -> str | None:
-        return "pulse_width_us" if "pulse_width_us" in study.trials[0] else None
+        found = super().steered(study)
+        return found if found in (*CHANNELS, RATE) else None
 
     @classmethod
     def other_stimuli(cls, study: Study, time: np.ndarray) -> Iterator[dict[str, np.ndarray]]:
-        yield from ({"stim": train} for train in trains(time))
+        if ENVELOPE not in study.trials[0]:  # nobody steers a voluntary muscle
+            yield from ({"stim": train} for train in trains(time))
 
     def driving_sizes(self, trials: Sequence[Trial]) -> dict[str, float]:
         forces = [t["force_n"] for t in trials if "force_n" in t.columns]
@@ -75,8 +88,7 @@ class Muscle(Rig):
         return (*nerve, "activation", "force", "pull", "reading")
 
     def changeable(self, kind: str, inputs: tuple[str, ...]) -> tuple[str, ...]:
-        without_width = {"pulse_width", "recruitment"} if "stim" in inputs else set()
-        return tuple(s for s in self.signals(kind) if s not in without_width)
+        return self.driven_signals(self.signals(kind), inputs)
 
     def states(self, kind: str) -> tuple[str, ...]:
         return ("act",)
@@ -85,26 +97,23 @@ class Muscle(Rig):
         return ("r", "r_before")
 
     def constant_names(self, kind: str) -> tuple[str, ...]:
-        return ("threshold_us", "saturation_us", "pulse_period_s", "length_m")
+        return (*self.ends(), "pulse_period_s", "length_m")
 
     def trial_constants(self, trial: Trial) -> dict[str, float]:
         period = pulse_period([trial] if "stim" in trial.columns else [])
-        known = {"threshold_us": 0.0, "saturation_us": 1.0, "length_m": 0.0, "pulse_period_s": period}
+        low, high = self.ends()
+        known = {low: 0.0, high: 1.0, "length_m": 0.0, "pulse_period_s": period}
         return {name: float(self.constants.get(name, value)) for name, value in known.items()}
 
     def recruited(self, trial: Trial) -> np.ndarray:
-        known = self.trial_constants(trial)
-        if "stim" in trial.columns:
-            return trial["stim"] * known["pulse_period_s"] / trial.dt
-        return np.asarray(recruitment_of(trial["pulse_width_us"], known["threshold_us"], known["saturation_us"]))
+        return recruited_in(trial, self.channel, self.trial_constants(trial))
 
     def set_rest(self, s: Signals, z: Any) -> None:
         s.x.act = s.m.r = s.m.r_before = 0.0
         s.q = s.sensed = 0.0
 
     def sample(self, s: Signals) -> dict[str, Any]:
-        r = s.u.stim * s.c.pulse_period_s / s.c.dt if hasattr(s.u, "stim") else recruited_now(s)
-        return {"r": s.through("recruitment", r), "r_before": s.m.r}
+        return {"r": s.through("recruitment", recruited_now(s, self.channel)), "r_before": s.m.r}
 
     def rates(self, s: Signals) -> dict[str, Any]:
         s.r = s.delayed(s.m.r, s.m.r_before)

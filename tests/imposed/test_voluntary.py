@@ -1,0 +1,86 @@
+"""Effort of a subject who does not relax: it differs between equal cycles, and no passive limb's does."""
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+import fes_pin as fp
+from fes_pin.data.plausibility import implausible
+from fes_pin.data.repeats import unrepeated
+from fes_pin.data.schema import schema_of
+from fes_pin.data.templates import rod
+
+DT = 0.005
+JOINT = schema_of("joint")
+
+
+def wandering(rng, count, time_constant, size):
+    """A first-order random effort of a time constant, s, and a standard deviation."""
+    pole = np.exp(-DT / time_constant)
+    return size * lfilter([np.sqrt(1.0 - pole**2)], [1.0, -pole], rng.standard_normal(count + 2000))[2000:]
+
+
+def moved(rng, voluntary=0.0):
+    """A limb that a dynamometer moves to and fro; its effort, and an irregular one of so much of its deviation."""
+    seconds, hz = rng.uniform(10.0, 30.0), rng.uniform(0.3, 1.5)
+    t = DT * np.arange(round(max(seconds, 8.0 / hz) / DT))
+    w, second, phase = 2.0 * np.pi * hz, rng.uniform(0.0, 0.3), rng.uniform(0.0, 6.0)
+    reach, wave = rng.uniform(0.1, 0.6), [(1.0, 0.0), (second, phase)]
+    q = reach * sum(a * np.sin((k + 1) * w * t + p) for k, (a, p) in enumerate(wave))
+    v, bend = np.gradient(q, DT), np.gradient(np.gradient(q, DT), DT)
+    parts = [
+        rng.uniform(0.0, 2.0) * q / np.std(q) + rng.uniform(0.0, 1.0) * (q / np.std(q)) ** 3 / 3.0,
+        rng.uniform(0.1, 1.0) * v / np.std(v),
+        rng.uniform(0.0, 1.0) * bend / np.std(bend),
+        rng.uniform(0.0, 1.0) * np.tanh(v / (0.05 * np.std(v))),
+    ]
+    memory = lfilter([0.02], [1.0, -0.98], q - q[0])  # a spring that relaxes
+    passive = sum(parts) + rng.uniform(0.0, 1.0) * (q - memory) / np.std(q)
+    passive = passive / np.std(passive)
+    drift = rng.uniform(-0.3, 0.3) * t / t[-1] + 0.05 * rng.random() * np.sin(2.0 * np.pi * 50.0 * t)
+    noise = rng.uniform(0.002, 0.1) * rng.standard_normal(len(t)) + wandering(rng, len(t), 0.2, rng.uniform(0.0, 0.02))
+    own = wandering(rng, len(t), rng.uniform(0.2, 1.5), voluntary) + 1.5 * voluntary
+    size = rng.uniform(0.5, 30.0)
+    columns = {
+        "position": q + reach * 1e-4 * rng.standard_normal(len(t)),
+        "effort": size * (passive + drift + noise + own),
+    }
+    return fp.Trial("a", "imposed", columns, t)
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_a_passive_limb_repeats_itself(seed):
+    found = unrepeated(moved(np.random.default_rng(seed)), JOINT)
+    assert found is not None
+    assert not found.is_no_mechanism
+
+
+def test_voluntary_effort_is_found():
+    found = [unrepeated(moved(np.random.default_rng([7, k]), 0.4), JOINT) for k in range(30)]
+    assert np.mean([one is not None and one.is_no_mechanism for one in found]) >= 0.95
+    weak = [unrepeated(moved(np.random.default_rng([8, k]), 0.05), JOINT) for k in range(15)]
+    assert not any(one is not None and one.is_no_mechanism for one in weak)  # less than passive limbs may differ by
+
+
+def test_a_motion_that_never_repeats_is_not_judged():
+    rng = np.random.default_rng(3)
+    t = DT * np.arange(4000)
+    q = wandering(rng, len(t), 0.5, 0.2)
+    q = np.convolve(q, np.hanning(101) / 50.0, "same")
+    trial = fp.Trial("a", "imposed", {"position": q, "effort": rng.standard_normal(len(t))}, t)
+    assert unrepeated(trial, JOINT) is None
+
+
+def test_a_check_says_it(tmp_path):
+    (tmp_path / "rod.urdf").write_text(rod(0.4, 1.0, False))
+    for voluntary, says in ((0.0, False), (0.5, True)):
+        trials = [fp.Trial(f"t{k}", *astuple(moved(np.random.default_rng([9, k]), voluntary))) for k in range(2)]
+        study = fp.Study(
+            "a", "joint", {}, {"inertia_scale": 1.0, "damping": 0.1}, trials, files={"urdf": tmp_path / "rod.urdf"}
+        )
+        assert any("voluntary effort" in line for line in implausible(study)) == says
+
+
+def astuple(trial):
+    """Kind, columns and time."""
+    return trial.kind, trial.columns, trial.time
