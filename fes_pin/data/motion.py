@@ -128,7 +128,9 @@ def read_coordinates(path: str | Path) -> tuple[np.ndarray, dict[str, np.ndarray
 
 def coordinates_of(table: Table, in_degrees: bool | None) -> dict[str, np.ndarray]:
     """The coordinates that a table holds, in rad and m, by themselves; see `read_coordinates`."""
-    return _knees_as_gait2354(unwrapped(in_radians(named_coordinates(table), stated_degrees(table, in_degrees)))[0])
+    return _knees_as_gait2354(
+        coordinates_unwrapped(in_radians(named_coordinates(table), stated_degrees(table, in_degrees)))[0]
+    )
 
 
 def stated_degrees(table: Table, in_degrees: bool | None) -> bool:
@@ -168,7 +170,7 @@ def in_radians(columns: Mapping[str, np.ndarray], in_degrees: bool) -> dict[str,
     return {n: v * (np.pi / 180.0 if in_degrees and is_angle(n) else 1.0) for n, v in columns.items()}
 
 
-def unwrapped(columns: Mapping[str, np.ndarray]) -> tuple[dict[str, np.ndarray], list[str]]:
+def coordinates_unwrapped(columns: Mapping[str, np.ndarray]) -> tuple[dict[str, np.ndarray], list[str]]:
     """Coordinates whose angles, rad, do not jump by a turn, and the names of those that did.
 
     What wraps stays within one turn.

@@ -16,7 +16,7 @@ from fes_pin.data.as_read import HeldFile
 from fes_pin.data.channels import AMPLITUDE, CHANNELS, EMG, EMG_KEYS, RATE, WIDTH, Channel, channel_of
 from fes_pin.data.errors import InputError, fault_at, listed
 from fes_pin.data.files import inside, read_bytes
-from fes_pin.data.new_view import APART, Recorded, free_part, recorded, view_keys
+from fes_pin.data.new_view import APART, FilesOfTrial, free_part, grouped_files, view_keys
 from fes_pin.data.recorded.columns import INTERPOLATE
 from fes_pin.data.recorded.events import EVENTS, looking_period
 from fes_pin.data.recorded.sniff import Proposal, propose
@@ -95,7 +95,7 @@ class _Making:
         self.own = of_files(wanted.files, "--set", wanted.settings)
         chosen = tuple(wanted.columns.values())
         each = [propose(p, self.schema, wanted.revolute, wanted.form, chosen) for p in wanted.files]
-        self.trials = recorded(each, self.schema, wanted.sources)
+        self.trials = grouped_files(each, self.schema, wanted.sources)
         self.proposals = [one.proposal for one in self.trials]
         self.channel: Channel | None = None
         self.cutoff: tuple[str, ...] = ()
@@ -204,7 +204,7 @@ class _Making:
 
     def _trial_keys(
         self,
-        one: Recorded,
+        one: FilesOfTrial,
         places: Mapping[Path, str],
         kind: Mapping[str, str],
         columns: Mapping[str, Mapping[str, Any]],
@@ -246,9 +246,13 @@ class _Making:
 
     def _is_integrated(self, column: str, source: str) -> bool:
         """Return whether no file has a column and one from which it can be integrated is there."""
-        missing = self.wanted.columns.get(column, "") == "" and not self._candidates(column)
-        has = {*self.schema.optional, *self.schema.imposed}
-        return missing and source in has and bool(self.wanted.columns.get(source) or self._candidates(source))
+        if (
+            not {column, source} <= set(self.schema.columns)
+            or self.wanted.columns.get(column)
+            or self._candidates(column)
+        ):
+            return False
+        return bool(self.wanted.columns.get(source) or self._candidates(source))
 
     def _times(self, columns: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
         """For each source of the trials what its table says of `time_s`, with the file's own name of the column."""

@@ -26,7 +26,7 @@ APART = "."
 
 
 @dataclass(frozen=True)
-class Recorded:
+class FilesOfTrial:
     """The files that make one trial, and what they seem to hold together.
 
     Attributes
@@ -51,11 +51,11 @@ class Recorded:
         return "" not in self.files
 
 
-def recorded(proposals: Sequence[Proposal], schema: RigSchema, stated: Mapping[str, str]) -> list[Recorded]:
+def grouped_files(proposals: Sequence[Proposal], schema: RigSchema, stated: Mapping[str, str]) -> list[FilesOfTrial]:
     """Which files make a trial together: those that `--source` says, else those that their names show; else each alone.
 
-    Files are sources of one trial where their names differ in one word alone, each trial has a file of each word, and
-    one of them is no trial by itself.
+    Files are sources of one trial where their names differ in one word alone, each trial has a file of each word,
+    files hold different quantities, and one of them is no trial by itself.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def recorded(proposals: Sequence[Proposal], schema: RigSchema, stated: Mapping[s
     by_path = {one.recording.path: one for one in proposals}
     groups = _stated(tuple(by_path), stated) if stated else _by_name(proposals, schema)
     if not groups:
-        return [Recorded({"": one}, one) for one in proposals]
+        return [FilesOfTrial({"": one}, one) for one in proposals]
     return [_joined({source: by_path[path] for source, path in files.items()}, schema) for files in groups]
 
 
@@ -110,8 +110,9 @@ def _by_name(proposals: Sequence[Proposal], schema: RigSchema) -> list[dict[str,
     """Files by trial and source, as their names show; none where each is a trial of its own."""
     paths = [one.recording.path for one in proposals]
     words = [re.findall(r"[a-z]+|\d+|[^a-z\d]+", path.stem.lower()) for path in paths]
-    each = zip(proposals, words, strict=True)
-    if len({len(some) for some in words}) > 1 or not any(_needs_another(one, some, schema) for one, some in each):
+    found = {_quantities(one, some, schema) for one, some in zip(proposals, words, strict=True)}
+    alike = len(found) == 1 or all(_is_whole(one, schema) for one in found)
+    if alike or len({len(some) for some in words}) > 1:
         return []
     for place in range(len(words[0])):
         trials: dict[tuple[str, ...], dict[str, Path]] = defaultdict(dict)
@@ -124,17 +125,21 @@ def _by_name(proposals: Sequence[Proposal], schema: RigSchema) -> list[dict[str,
     return []
 
 
-def _needs_another(proposal: Proposal, of_name: Sequence[str], schema: RigSchema) -> bool:
-    """Return whether a file is no trial by itself: its columns, or where they have no names its own, are too few."""
+def _quantities(proposal: Proposal, of_name: Sequence[str], schema: RigSchema) -> frozenset[str]:
+    """The rig's columns that a file seems to hold, by the names of its columns, else by its own."""
     found = {n for n, names in proposal.candidates.items() if names and n != "time_s"}
-    found = found or {n for n in schema.columns if MEANT.get(n, frozenset()) & set(of_name)}
+    return frozenset(found or {n for n in schema.columns if MEANT.get(n, frozenset()) & set(of_name)})
+
+
+def _is_whole(found: frozenset[str], schema: RigSchema) -> bool:
+    """Return whether a file with these columns is a trial by itself."""
     found |= {n for n, source in INTEGRATED.items() if source in found}
     kinds = ({schema.outputs[kind], *schema.motion(kind)[:1]} for kind in schema.outputs)
     is_moved = not schema.inputs_required or bool(found & set(schema.inputs))
-    return not (is_moved and any(needed <= found for needed in kinds))
+    return is_moved and any(needed <= found for needed in kinds)
 
 
-def _joined(files: Mapping[str, Proposal], schema: RigSchema) -> Recorded:
+def _joined(files: Mapping[str, Proposal], schema: RigSchema) -> FilesOfTrial:
     columns: dict[str, np.ndarray] = {}
     units: dict[str, str] = {}
     candidates: dict[str, tuple[str, ...]] = dict.fromkeys(schema.columns, ())
@@ -147,7 +152,7 @@ def _joined(files: Mapping[str, Proposal], schema: RigSchema) -> Recorded:
     first = next(iter(files.values())).recording
     names = tuple(f"{source}{APART}{n}" for source, one in files.items() for n in one.recording.names)
     whole = replace(first, names=names, columns=columns)
-    return Recorded(files, Proposal(whole, None, candidates, units))
+    return FilesOfTrial(files, Proposal(whole, None, candidates, units))
 
 
 def _meant(source: str, one: Proposal, schema: RigSchema) -> dict[str, tuple[str, ...]]:
@@ -160,7 +165,7 @@ def _meant(source: str, one: Proposal, schema: RigSchema) -> dict[str, tuple[str
 
 
 def view_keys(
-    files: Recorded, time: Mapping[str, np.ndarray], rate_hz: float | None, stated: Mapping[str, Any]
+    files: FilesOfTrial, time: Mapping[str, np.ndarray], rate_hz: float | None, stated: Mapping[str, Any]
 ) -> tuple[dict[str, Any], list[str]]:
     """Keys of the `[[trial]]` of some files that say which part of them it is, and what is odd about their times.
 
@@ -180,16 +185,10 @@ def view_keys(
     keys: dict[str, Any] = {k: v for k, v in stated.items() if v not in ("none", {})}
     name, said = files.path.name, list[str]()
     main = next(iter(time.values()))
-    if len(anew := restarts(main)):
-        said.append(f"{name}: {len(anew) + 1} recordings in one file: time starts anew in row {_row(files, anew[0])}")
-        if "split" not in stated:
-            keys["split"] = RESTARTS
-    elif len(found := holes(main, 1.0 / rate_hz if rate_hz else None)):
-        longest = 1e3 * float(np.diff(main).max())
-        count = f"{len(found)} hole{'s' * (len(found) > 1)}"
-        said.append(f"{name}: {count}, the longest {longest:.4g} ms: {len(found) + 1} trials")
-        if "split" not in stated and "from" not in stated:
-            keys["split"] = HOLES
+    if not {"split", "from", "to"} & set(stated):
+        split, sentence = _split(files, main, rate_hz)
+        keys |= {"split": split} if split else {}
+        said += [f"{name}: {sentence}"] if split else []
     if files.is_joined:
         said.append(f"{' and '.join(one.recording.path.name for one in files.files.values())} are one trial")
         first, *others = time
@@ -202,8 +201,15 @@ def view_keys(
     return keys, said
 
 
-def _row(files: Recorded, sample: int) -> int:
-    return int(next(iter(files.files.values())).recording.rows[sample])
+def _split(files: FilesOfTrial, time: np.ndarray, rate_hz: float | None) -> tuple[str, str]:
+    """At what a recording must be split, and why; "" of one that is one trial."""
+    rows = next(iter(files.files.values())).recording.rows
+    if len(again := restarts(time)):
+        return RESTARTS, f"{len(again) + 1} recordings in one file: time starts again in row {rows[again[0]]}"
+    if len(found := holes(time, 1.0 / rate_hz if rate_hz else None)):
+        count, longest = f"{len(found)} hole{'s' * (len(found) > 1)}", 1e3 * float(np.diff(time).max())
+        return HOLES, f"{count}, the longest {longest:.4g} ms: {len(found) + 1} trials"
+    return "", ""
 
 
 def free_part(name: str, time: np.ndarray, position: np.ndarray) -> tuple[dict[str, float], list[str]]:

@@ -21,7 +21,7 @@ from fes_pin.data.checks import check_values
 from fes_pin.data.counts import hunts
 from fes_pin.data.errors import InputError
 from fes_pin.data.imposed import imposed_motion
-from fes_pin.data.repeats import unrepeated
+from fes_pin.data.repeats import effort_of_repeats
 from fes_pin.data.rests import MATTERS, rest_share
 from fes_pin.data.schema import IMPOSED, RigSchema
 from fes_pin.data.stimulus import is_stimulated
@@ -245,7 +245,7 @@ def _imposed(study: Study | ToPredict) -> Iterable[str]:
     bands = [m.bandwidth_hz for m in motions]
     band = f"{min(bands):.2g} Hz" if max(bands) < 1.1 * min(bands) else f"{min(bands):.2g} to {max(bands):.2g} Hz"
     yield f"velocity and acceleration of {name} are those of smoothing splines with a bandwidth of {band}"
-    found = {t.name: unrepeated(t, study.schema) for t in trials if not is_stimulated(t)}
+    found = {t.name: effort_of_repeats(t, study.schema) for t in trials if not is_stimulated(t)}
     if odd := {n: one for n, one in found.items() if one is not None and one.is_no_mechanism}:
         most = max(odd.values(), key=lambda one: one.share)
         effort = study.schema.outputs[IMPOSED]

@@ -54,7 +54,7 @@ class Unrepeated:
         return self.share > SHARE and self.size > ABOVE_NOISE * self.noise
 
 
-def unrepeated(trial: Trial, schema: RigSchema) -> Unrepeated | None:
+def effort_of_repeats(trial: Trial, schema: RigSchema) -> Unrepeated | None:
     """Compare the effort of a trial between equal cycles of its motion, without a trend from cycle to cycle.
 
     The first cycle is left out: a limb that was still relaxes in it.

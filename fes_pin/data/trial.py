@@ -491,9 +491,9 @@ def _checked_columns(
     if table.names[0] != "time_s":
         raise table.error(f"expected time_s as the first column, found {table.names[0][:40]!r}; {NEW_STUDY}", "time_s")
     check_columns(table.names[1:], schema, kind, inputs_only, table.error)
-    if len(anew := restarts(table.time)):
-        hint = f'split = "{RESTARTS}" in its [[trial]] makes {len(anew) + 1} trials of it'
-        raise table.error(f"expected time to increase, it starts anew; {hint}", "time_s", int(anew[0]))
+    if len(again := restarts(table.time)):
+        hint = f'split = "{RESTARTS}" in its [[trial]] makes {len(again) + 1} trials of it'
+        raise table.error(f"expected time to increase, it starts again; {hint}", "time_s", int(again[0]))
     if len(gaps := holes(table.time)) and (np.diff(table.time) > 0.0).all():
         step, found = float(np.median(np.diff(table.time))), float(table.time[gaps[0]] - table.time[gaps[0] - 1])
         hint = f'split = "{HOLES}" in its [[trial]] makes {len(gaps) + 1} trials of it, and rate bridges short ones'

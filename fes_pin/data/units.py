@@ -211,9 +211,9 @@ def split_header(header: str) -> tuple[str, str]:
                 return before, f"{per}/{unit}"
         if at and name and _ends_a_name(unit):
             return name.strip(), unit
+    if len(text) > SPELT_OUT and _ends_a_name(text):  # Microseconds
+        return text, text
     camel = re.match(r"^(.*[a-z])([A-Z][A-Za-z]+)$", text)  # CurrentKG, angleDeg
     if camel and _ends_a_name(camel[2]):
         return camel[1], camel[2]
-    if len(text) > SPELT_OUT and _ends_a_name(text):  # Microseconds
-        return text, text
     return text, ""

@@ -14,7 +14,7 @@ import numpy as np
 
 from fes_pin.data.errors import InputError, KeyFault
 from fes_pin.data.legs import Leg, leg_of, origin_of, pelvis_of
-from fes_pin.data.motion import PLATE, in_radians, is_angle, knees_bend_positively, unwrapped
+from fes_pin.data.motion import PLATE, coordinates_unwrapped, in_radians, is_angle, knees_bend_positively
 from fes_pin.data.schema import check_known, one_of
 
 Arrays = dict[str, np.ndarray]
@@ -322,7 +322,7 @@ class _Walk:
         elif self._is_other_unit(in_degrees):
             in_degrees, words = other, ("degrees", "rad") if other else ("rad", "degrees")
             self.said.append(f"angles are taken as {words[0]}: as {words[1]} its legs do not reach its feet")
-        self.moves, jumped = unwrapped(in_radians(self.moves, in_degrees))
+        self.moves, jumped = coordinates_unwrapped(in_radians(self.moves, in_degrees))
         if jumped:
             names = ", ".join(n.removeprefix("q_") for n in jumped)
             self.said.append(f"{names} jumps by a turn of 360 degrees: it is unwrapped")
@@ -339,7 +339,7 @@ class _Walk:
 
     def _wandering(self, moves: Arrays) -> float:
         """How far centres of pressure wander from an ankle in a step, m, in the mean: the least of both feet's."""
-        moves = unwrapped(moves)[0]
+        moves = coordinates_unwrapped(moves)[0]
         heading = _heading(pelvis_of(moves))
         legs = [leg_of(moves, self.time, side, knee) for side in SIDES for knee in (1.0, -1.0)]
         steps = [(self.plate(label, "cop"), on) for label in self.plates for on in self.steps(label)]

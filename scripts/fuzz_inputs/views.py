@@ -1,4 +1,4 @@
-"""Views of recordings, right and odd: keys of a `[[trial]]`, times that start anew or have holes, files that join."""
+"""Views of recordings, right and odd: keys of a `[[trial]]`, times that start again or have holes, files that join."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ KEYS = {
 
 
 def with_views(study: Path, rng: np.random.Generator) -> None:
-    """Give the trials of a study views of their files, of which some start anew or have holes."""
+    """Give the trials of a study views of their files, of which some start again or have holes."""
     place = study / "study.toml"
     head, *tables = re.split(r"(?=^\[\[trial\]\]$)", place.read_text(encoding="utf-8"), flags=re.M)
     for k in range(len(tables)):

@@ -30,7 +30,7 @@ def trials(folder):
 def test_two_recordings_in_one_file(monkeypatch, capsys, tmp_path):
     twice = write(tmp_path / "a.csv", time_s=np.r_[TIME, TIME], position=np.r_[swing(TIME), swing(TIME, 1.0)])
     assert run(monkeypatch, "new-study", twice, *ROD) == 0
-    assert "a.csv: 2 recordings in one file: time starts anew in row 602" in capsys.readouterr().out
+    assert "a.csv: 2 recordings in one file: time starts again in row 602" in capsys.readouterr().out
     assert trials(tmp_path)[0]["split"] == "restarts"
     assert len(read_study(tmp_path)) == 2
 

@@ -77,13 +77,13 @@ def test_two_views_of_a_file_must_not_overlap(tmp_path):
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_times_that_start_anew_make_trials(tmp_path, seed):
+def test_times_that_start_again_make_trials(tmp_path, seed):
     random = np.random.default_rng(seed)
     lengths, begin = random.integers(30, 400, random.integers(2, 6)), random.uniform(0.0, 100.0)
     times = [begin + np.arange(n) * DT for n in lengths]
     position = np.concatenate([swing(t, i) for i, t in enumerate(times)])
     files = {"a.csv": {"time_s": np.concatenate(times), "position": position}}
-    assert "it starts anew" in refused(tmp_path, '[[trial]]\nfile = "a.csv"\n', files)
+    assert "it starts again" in refused(tmp_path, '[[trial]]\nfile = "a.csv"\n', files)
     found = study(tmp_path, '[[trial]]\nfile = "a.csv"\nsplit = "restarts"\nstart_s = 3.0\nposition0 = 0.4\n', files)
     assert [len(t) for t in found] == list(lengths)
     assert [t.name for t in found] == [f"a-{k + 1}" for k in range(len(lengths))]

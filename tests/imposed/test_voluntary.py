@@ -6,7 +6,7 @@ from scipy.signal import lfilter
 
 import fes_pin as fp
 from fes_pin.data.plausibility import implausible
-from fes_pin.data.repeats import unrepeated
+from fes_pin.data.repeats import effort_of_repeats
 from fes_pin.data.schema import schema_of
 from fes_pin.data.templates import rod
 
@@ -50,15 +50,15 @@ def moved(rng, voluntary=0.0):
 
 @pytest.mark.parametrize("seed", range(60))
 def test_a_passive_limb_repeats_itself(seed):
-    found = unrepeated(moved(np.random.default_rng(seed)), JOINT)
+    found = effort_of_repeats(moved(np.random.default_rng(seed)), JOINT)
     assert found is not None
     assert not found.is_no_mechanism
 
 
 def test_voluntary_effort_is_found():
-    found = [unrepeated(moved(np.random.default_rng([7, k]), 0.4), JOINT) for k in range(30)]
+    found = [effort_of_repeats(moved(np.random.default_rng([7, k]), 0.4), JOINT) for k in range(30)]
     assert np.mean([one is not None and one.is_no_mechanism for one in found]) >= 0.95
-    weak = [unrepeated(moved(np.random.default_rng([8, k]), 0.05), JOINT) for k in range(15)]
+    weak = [effort_of_repeats(moved(np.random.default_rng([8, k]), 0.05), JOINT) for k in range(15)]
     assert not any(one is not None and one.is_no_mechanism for one in weak)  # less than passive limbs may differ by
 
 
@@ -68,7 +68,7 @@ def test_a_motion_that_never_repeats_is_not_judged():
     q = wandering(rng, len(t), 0.5, 0.2)
     q = np.convolve(q, np.hanning(101) / 50.0, "same")
     trial = fp.Trial("a", "imposed", {"position": q, "effort": rng.standard_normal(len(t))}, t)
-    assert unrepeated(trial, JOINT) is None
+    assert effort_of_repeats(trial, JOINT) is None
 
 
 def test_a_check_says_it(tmp_path):

@@ -19,7 +19,7 @@ OF_THE_RECORD = 0.1
 EXPLAINED = 0.5
 """Least share of the effort that the motion explains at the best offset; else the recordings do not show it."""
 SHARPER = 0.9
-"""Largest ratio of what is left at the best offset to what is left on average: else no offset is the best."""
+"""Largest ratio of the unexplained share at the best offset to its mean over all: else no offset is the best."""
 OF_POWER, TIMES = 0.99, 3.0
 """The band reaches to so many times the frequency below which this share of the motion's power lies."""
 
@@ -52,7 +52,7 @@ def clock_offset(leading: Table, other: Table) -> tuple[float, str]:
 
 
 def _best_lag(moves: Table, motion: str, pushes: Table) -> tuple[float, float, float]:
-    """The time that added to an effort's clock leaves least of it, s; what is left there, and on average, as shares."""
+    """The time that added to an effort's clock explains most of it, s; the unexplained shares there and on average."""
     from fes_pin.data.smooth import low_pass  # noqa: PLC0415 - half a second of SciPy, for two clocks alone
 
     dt = float(np.median(np.diff(moves.time)))

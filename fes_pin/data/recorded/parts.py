@@ -1,4 +1,4 @@
-"""Where a recording is cut: at a time that starts anew, at holes, at rests, where a column changes, at marks."""
+"""Where a recording is cut: at a time that starts again, at holes, at rests, where a column changes, at marks."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ STILL = 0.01
 
 
 def restarts(time: np.ndarray) -> np.ndarray:
-    """Rows at which time starts anew: it falls back by more than half of what has passed. Shape (k,)."""
+    """Rows at which time starts again: it falls back by more than half of what has passed. Shape (k,)."""
     found, begin = [], 0
     for row in np.flatnonzero(np.diff(time) < 0.0) + 1:
         passed = time[begin:row].max() - time[begin]

@@ -73,7 +73,7 @@ class View:
         Parameters
         ----------
         table
-            As recorded; times may start anew and have holes.
+            As recorded; times may start again and have holes.
         readings
             Columns that rest where the rig does.
 
@@ -98,7 +98,7 @@ class View:
     def _words(self) -> str:
         if self.at:
             return f"marks: {', '.join(f'{t:g}' for t in self.at[:4])}{' ...' * (len(self.at) > 4)} s"
-        known = {RESTARTS: "times that start anew", HOLES: "holes in time", RESTS: "rests"}
+        known = {RESTARTS: "times that start again", HOLES: "holes in time", RESTS: "rests"}
         return known.get(self.split, f"changes of {self.split}")
 
     def _window(self, table: Table) -> Table:
