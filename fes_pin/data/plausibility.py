@@ -116,7 +116,8 @@ def _rests(study: Study | ToPredict) -> Iterable[str]:
         return
     read = study.schema.outputs
     measured = [t for t in study.trials if read.get(t.kind) in t]
-    share = rest_share([(t, (read[t.kind],), _stimuli(study, t)) for t in measured])
+    moved = {t.name: [n for n in study.schema.motion(t.kind) if n in t] for t in measured}
+    share = rest_share([(t, (read[t.kind], *moved[t.name]), _stimuli(study, t)) for t in measured])
     if share > MATTERS:
         little = "what moves is known from the others alone"
         yield f"these trials rest for {share:.0%} of the time: neither reading nor input changes, and {little}"

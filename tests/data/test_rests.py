@@ -3,7 +3,10 @@
 import numpy as np
 import pytest
 
+from fes_pin.data.plausibility import implausible
 from fes_pin.data.rests import MATTERS, rest_share
+from fes_pin.data.study import Study
+from fes_pin.data.templates import rod
 from fes_pin.data.trial import Trial
 
 STEP, SAMPLES = 0.005, 8000
@@ -64,3 +67,14 @@ def test_an_input_that_goes_on_is_no_rest():
     rng = np.random.default_rng(0)
     position, _ = swung(0.9, 1, rng)
     assert share_of(position, np.sin(np.arange(SAMPLES) / 50.0)) < 0.1
+
+
+def test_an_imposed_motion_is_no_rest_where_its_effort_is_constant(tmp_path):
+    time = np.arange(0.0, 8.0, 0.01)
+    effort = 0.3 * np.sign(np.cos(1.5 * time)) + 0.01 * np.random.default_rng(0).standard_normal(len(time))
+    columns = {"position": np.sin(1.5 * time), "effort": effort}
+    (tmp_path / "rod.urdf").write_text(rod(0.4, 1.0))
+    known = {"name": "a", "rig": "joint", "constants": {}, "files": {"urdf": tmp_path / "rod.urdf"}}
+    start = {"inertia_scale": 1.0, "damping": 0.1}
+    study = Study(trials=(Trial("a", "imposed", columns, time),), start=start, **known)
+    assert not any("rest for" in said for said in implausible(study))
