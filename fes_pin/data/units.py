@@ -32,7 +32,7 @@ LONGEST = 12
 SPELT_OUT = 4
 """Characters that a name has more of which is itself a unit: `Microseconds`, but not `in` or `rev`."""
 _IN_NAMES = tuple(q for q in UNITS if q not in ("pressure", "power", "temperature", "counts", "pulses"))
-"""Quantities whose units are looked for at the end of names; the others' are words or numbers, as `bar` and channel `1`."""
+"""Quantities whose units are looked for at the end of names; the others are words or numbers: `bar`, channel `1`."""
 
 _BY_SUFFIX = {"s": "time", "us": "pulse width", "rad": "angle", "m": "length", "n": "force", "nm": "torque"}
 _HELD = {*_BY_SUFFIX.values(), "angular rate", "speed", "pulses"}

@@ -1,4 +1,4 @@
-"""Joints whose columns are in another convention than is stated: `python -m harness.convention`.
+"""Joints whose columns are in another convention than is stated: `scripts/recorded conventions`.
 
 Every study is drawn once, and read as it is and in each wrong convention. What `check` says of it is counted.
 """

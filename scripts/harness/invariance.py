@@ -1,4 +1,4 @@
-"""Whether an answer depends on how a study is recorded: `python -m harness.invariance GENERATOR...`.
+"""Whether an answer depends on how a study is recorded: `scripts/recorded invariance GENERATOR...`.
 
 Every study is drawn once and written in twelve ways that mean the same: other units, signs, names, orders of columns,
 times, files, an angle that wraps. The trials that are read must be the same, and with `--diagnose` the verdicts too.
