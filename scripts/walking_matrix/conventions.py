@@ -1,6 +1,6 @@
 """Walks whose files follow other conventions on purpose, or other ways of the laboratory; how often each is said.
 
-PYTHONPATH=.:analysis:scripts python -m walking_matrix.conventions --count 20
+scripts/recorded walks --count 20
 """
 
 from __future__ import annotations
