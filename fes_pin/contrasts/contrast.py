@@ -21,6 +21,7 @@ from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.faults.conditions import Restated
 from fes_pin.faults.effort_noise import EffortNoise
+from fes_pin.faults.log_faults import said_of
 from fes_pin.identify.correlation_time import words_of_reading
 from fes_pin.identify.feedback import is_fed_back
 from fes_pin.infer.corrected import Correction
@@ -144,7 +145,7 @@ class _Work:
                 answer, test = fault.decided(answer, self._logged, lambda one: one.found.best, comparable)
                 tests.append(test)
         self.tell(0.9, "held-out evidence")
-        said = [one.words for one in reversed(tests) if one.is_named]
+        said = said_of(tests, self.study.trials)
         return self._judged(answer, [*answer.said, *said], (*tests, *answer.tests))
 
     def _logged(self, log: Log) -> _Answer:

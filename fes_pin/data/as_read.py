@@ -40,6 +40,8 @@ class AsRead(ReadOnly):
         Of a walk: time and columns of the coordinates and of the ground reaction, each at its own rate.
     factors
         What numbers of a column were multiplied by, as their unit was stated; NaN where a scale was stated.
+    interpolated
+        Whether samples were interpolated to equal steps.
     stated
         Of a walk: keys of the conventions that its study states, which are not tested.
     """
@@ -49,6 +51,7 @@ class AsRead(ReadOnly):
     half_digit: float | None = None
     recordings: tuple[tuple[np.ndarray, Mapping[str, np.ndarray]], ...] = field(default=(), repr=False)
     factors: Mapping[str, float] = field(default_factory=dict)
+    interpolated: bool = False
     stated: frozenset[str] = frozenset()
 
 

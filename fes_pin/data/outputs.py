@@ -1,6 +1,6 @@
 """What a command writes: never over what was read, and only over what it wrote itself and nobody has changed.
 
-Which that is, is noted in each folder by the SHA-256 of its files, and once more at the end of an answer in JSON: a
+Which that is, is noted in each folder by the SHA-256 of its files, and once more at the end of its page: a
 copy without the hidden file is known by that. Functions of Python that write do the same under their own names.
 """
 
@@ -31,8 +31,8 @@ from fes_pin.settings import while_set
 
 RECORD = ".fes_pin.json"
 """In each folder that a command writes into: by name of a file which command wrote it, and its SHA-256."""
-WRITTEN = "written"
-"""Last key of an answer in JSON: the same of the files that were written with it, and of the text before the key."""
+WRITTEN = "<!-- written: "
+"""At the end of a page, in a comment: the same of the files that were written with it, and of the text before."""
 HTML, URDF_ENDINGS = (".html", ".htm"), (".urdf", ".xml")
 """How the names of pages and of rigs end."""
 BUSY = f"{SCRATCH}busy"
@@ -165,12 +165,13 @@ class Outputs:
         return (folder / name).is_file() and record.get(name) == self._note((folder / name).read_bytes())
 
     def _signed(self, contents: Mapping[str, str | bytes]) -> dict[str, str | bytes]:
-        """Contents of which each answer in JSON ends with notes of itself and the others."""
+        """Contents of which each page ends with notes of itself and the others, in a comment."""
         signed = dict(contents)
         for name, text in contents.items():
-            if name.endswith(".json") and isinstance(text, str) and text.startswith("{\n") and text.endswith("\n}\n"):
+            if name.endswith(HTML) and isinstance(text, str):
                 notes = json.dumps({n: self._note(content) for n, content in contents.items()})
-                signed[name] = f'{text[:-3]},\n "{WRITTEN}": {notes}\n}}\n'
+                notes = notes.replace("--", "-\\u002d")  # which would end the comment
+                signed[name] = f"{text}{WRITTEN}{notes} -->\n"
         return signed
 
     def _note(self, content: str | bytes) -> str:
@@ -225,23 +226,25 @@ def _called(command: str) -> str:
 
 
 def _record(folder: Path) -> dict[str, str]:
-    """By name of a file who wrote it and its SHA-256, as the folder says; else as its answers in JSON do."""
+    """By name of a file who wrote it and its SHA-256, as the folder says; else as its pages do."""
     found = own_json(folder / RECORD)
-    for path in sorted(folder.glob("*.json")) if folder.is_dir() else ():
+    for path in sorted(folder.glob("*.htm*")) if folder.is_dir() else ():
         if path.name not in found:
             found = {**_signature(path), **found}
     return {n: note for n, note in found.items() if isinstance(note, str)}
 
 
 def _signature(path: Path) -> dict[str, str]:
-    """The notes at the end of an answer that nobody has changed; its own becomes that of the whole file."""
+    """The notes at the end of a page that nobody has changed; its own becomes that of the whole file."""
     whole = path.read_bytes() if path.is_file() else b""
-    text, mark, _ = whole.rpartition(f',\n "{WRITTEN}": '.encode())
-    notes = own_json(path).get(WRITTEN) if mark else None
+    text, mark, end = whole.rpartition(WRITTEN.encode())
+    notes: object = None
+    with suppress(ValueError):
+        notes = json.loads(end.removesuffix(b" -->\n")) if mark else None
     if not isinstance(notes, dict):
         return {}
     by, _, known = str(notes.get(path.name)).rpartition(" ")
-    if known != hashlib.sha256(text + b"\n}\n").hexdigest():
+    if known != hashlib.sha256(text).hexdigest():
         return {}
     return {**notes, path.name: f"{by} {hashlib.sha256(whole).hexdigest()}"}
 

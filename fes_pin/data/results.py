@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Self
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import read_json
-from fes_pin.data.outputs import WRITTEN, written_by
+from fes_pin.data.outputs import written_by
 from fes_pin.data.provenance import Provenance
 from fes_pin.data.read_only import ReadOnly, as_dicts
 from fes_pin.data.show import DataFrame, by_columns, frame, table_html, table_text
@@ -463,7 +463,7 @@ def load_result(path: str | Path) -> SavedResult:
     """
     found = read_json(path)
     found = found if isinstance(found, dict) else {}
-    kind, lines, table, _ = (found.pop(n, None) for n in (RESULT, TEXT, TABLE, WRITTEN))
+    kind, lines, table = (found.pop(n, None) for n in (RESULT, TEXT, TABLE))
     whole = isinstance(kind, str) and isinstance(lines, list) and isinstance(table, dict)
     if not whole or not all(isinstance(column, list) for column in table.values()):
         raise InputError(f"expected a result that fes-pin saved, with {RESULT}, {TEXT} and {TABLE}", file=path)

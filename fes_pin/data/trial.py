@@ -13,7 +13,7 @@ import numpy as np
 
 from fes_pin.data.as_read import AsRead, digest_of, hashing
 from fes_pin.data.checks import check_columns, check_values, checked_label, checked_labels, checked_mapping
-from fes_pin.data.errors import InputError, errors_of, fault_at
+from fes_pin.data.errors import InputError, as_text, errors_of, fault_at
 from fes_pin.data.files import as_path
 from fes_pin.data.motion import (
     GROUND_REACTION,
@@ -400,7 +400,7 @@ def read_trial(
     schema = schema_of(rig, partial(error, "rig"))
     kind = schema.kind_of(kind, error)
     told = {"role": role, "group": group, "remarks": remarks, "low_pass_hz": low_pass_hz}
-    labels = checked_labels(path.stem if name is None else name, told, error)
+    labels = checked_labels(as_text(path.stem) if name is None else name, told, error)
     given = {} if conditions is None else checked_mapping(conditions, error, "conditions")
     labels |= {"kind": kind, "conditions": check_conditions(schema, kind, given, error)}
     if own is not None:
@@ -454,7 +454,8 @@ def read_view(
         if len(parts) > 1:
             fields_of["name"] = f"{labels['name']}-{place + 1}"
             fields_of["conditions"] = _conditions_of(place, time[0] - table.time[0], labels["conditions"], view)
-        trials.append(_made(columns, time, AsRead(sha256, b"", regular.half_digit, factors=factors), **fields_of))
+        as_read = AsRead(sha256, b"", regular.half_digit, factors=factors, interpolated=own.resample_hz is not None)
+        trials.append(_made(columns, time, as_read, **fields_of))
     return trials
 
 

@@ -156,7 +156,8 @@ class _Work:
                 again = partial(self._logged, study)
                 answer, test = fault.decided(answer, again, lambda one: one.extended, comparable)
                 tests.append(test)
-        return with_warnings(with_tests(faults.with_timing(answer) if logged else answer, tests), tests)
+        timed = faults.with_timing(answer) if logged else answer
+        return with_warnings(with_tests(timed, tests), tests, study.trials)
 
     def _logged(self, study: Study, log: Log) -> Diagnosis:
         """Return the diagnosis of a study with the given faults of its log corrected."""

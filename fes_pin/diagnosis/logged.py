@@ -4,10 +4,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from fes_pin.data.log import Log
+from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.decide.rivals import estimates
 from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.faults.effort_noise import EffortNoise, words_of_noise
-from fes_pin.faults.log_faults import EFFORT_NOISE, LATE_EFFORT, LOW_PASS, LogFault
+from fes_pin.faults.log_faults import EFFORT_NOISE, LATE_EFFORT, LOW_PASS, LogFault, said_of
 from fes_pin.faults.misread import NAME as MISREAD
 from fes_pin.identify.effort_timing import (
     Lateness,
@@ -145,6 +146,6 @@ def with_tests(answer: Diagnosis, tests: Sequence[Correction]) -> Diagnosis:
     return replace(answer, why=answer.why and replace(answer.why, corrections=tuple(known.values())))
 
 
-def with_warnings(answer: Diagnosis, tests: Sequence[Correction]) -> Diagnosis:
+def with_warnings(answer: Diagnosis, tests: Sequence[Correction], trials: Sequence[Trial]) -> Diagnosis:
     """Return an answer with a warning about each fault of the log that is corrected."""
-    return replace(answer, warnings=(*(one.words for one in tests if one.is_named), *answer.warnings))
+    return replace(answer, warnings=(*reversed(said_of(tests, trials)), *answer.warnings))

@@ -5,11 +5,12 @@ rule for all faults of a record (`infer.corrected`).
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
 from fes_pin.data.log import Log
+from fes_pin.data.trial import Trial
 from fes_pin.infer.corrected import Answer, Correction, lead_of
 from fes_pin.infer.distributions import chi2_tail
 from fes_pin.infer.levels import CERTAIN_LEVEL
@@ -73,3 +74,16 @@ class LogFault(Generic[A]):
         lead, least = lead_of(*both, degrees=1) if both else (-math.inf, 0.0)
         test = replace(self.test, lead=lead, least=least)
         return (other if test.is_named else answer), test
+
+
+INTERPOLATED = (
+    "samples were interpolated to equal steps, which acts as a late, noisy or smoothed record: it was corrected"
+)
+"""What is said of a log in the place of its faults where its samples were interpolated: they may be none of the log."""
+
+
+def said_of(tests: Sequence[Correction], trials: Sequence[Trial]) -> list[str]:
+    """The faults of a log that were corrected, in words, the last one first."""
+    named = [one.words for one in reversed(tests) if one.is_named]
+    is_interpolated = any(t.as_read is not None and t.as_read.interpolated for t in trials)
+    return [INTERPOLATED] if named and is_interpolated else named

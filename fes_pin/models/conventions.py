@@ -37,7 +37,7 @@ SURELY = 5.0
 """Standard deviations by which an inertia differs from 0."""
 EXPLAINED, OF_ACCELERATION = 0.8, 0.5
 """Least share of the variance of efforts that the motion explains; and of what position and velocity leave of it, the
-acceleration. Of 45 driven rigs (`scripts/accuracy driven`, `large`) 0.89 and 0.57 are the least."""
+acceleration. Of 36 driven rigs (`scripts/accuracy driven`, `large`) 0.88 and 0.56 are the least."""
 BELIEVED = 0.35
 """Deviation of the logarithm of an inertia or a weight that is believed: a factor of 2 is two deviations."""
 MARGIN, SURE = 4.0, 16.0
