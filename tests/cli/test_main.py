@@ -202,7 +202,7 @@ def test_a_prediction_over_a_horizon_goes_on_from_what_was_measured(made, monkey
         errors[horizon] = np.std(np.genfromtxt(out, delimiter=",", names=True)["angle_rad"] - trial["angle_rad"])
     assert errors["0"] < errors["0.05"] < errors["0.3"] < errors["1e3"]
     assert errors["1e3"] == pytest.approx(np.std(trial["angle_rad"] - simulate(nominal, trial)["angle_rad"]), rel=1e-6)
-    save_model(nominal, tmp_path / "model.toml")
+    save_model(nominal, tmp_path / "model.toml", overwrite=True)
     assert "[random]" in fails(monkeypatch, capsys, *given, "--horizon", "0.3")
 
 
