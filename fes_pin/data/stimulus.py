@@ -1,6 +1,6 @@
 """Trials of a muscle with the one quantity of their pulses that recruits."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -36,18 +36,25 @@ def is_stimulated(trial: Trial) -> bool:
     return any(n in trial and bool(trial[n].any()) for n in STIMULI)
 
 
-def with_one_stimulus(trials: Sequence[Trial], constants: Mapping[str, float]) -> tuple[Trial, ...]:
+def with_one_stimulus(
+    trials: Sequence[Trial], constants: Mapping[str, float], inputs: Collection[str]
+) -> tuple[Trial, ...]:
     """Trials with the one channel that recruits, of those that hold width and amplitude; each says what was done.
 
     Where a threshold in mA or us is known, the other quantity must be the same in all pulses; where one in uC is, the
     charge of a pulse is the product of both. Without any the one that varies is taken, if one alone does.
+
+    Parameters
+    ----------
+    inputs
+        Columns that the rig takes as inputs.
 
     Raises
     ------
     InputError
         Both vary, and no threshold of the charge says so.
     """
-    if any(EMG in t for t in trials):
+    if EMG in inputs and any(EMG in t for t in trials):
         return _with_envelopes(trials, constants)
     both = [t for t in trials if WIDTH.column in t and AMPLITUDE.column in t]
     if not both:

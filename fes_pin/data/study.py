@@ -129,7 +129,9 @@ class Study(ReadOnly):
             check_files(schema, files)
         trials = tuple(self.trials) if isinstance(self.trials, Iterable) else (self.trials,)
         if all(isinstance(t, Trial) for t in trials):
-            trials = with_one_stimulus(with_kinds(with_whole_turns(trials, files), schema), numbers["constants"])
+            trials = with_one_stimulus(
+                with_kinds(with_whole_turns(trials, files), schema), numbers["constants"], schema.inputs
+            )
         self._check_trials(trials, schema)
         if schema.inputs_required:  # else a trial without an input is one that nothing drives
             check_same_inputs([(t.kind, t.columns) for t in trials], schema, numbers["constants"], _fault_of(trials))
@@ -391,7 +393,9 @@ class _Reader(StudyTables):
         read = [self._trials(f"trial[{i}]", table, view, name) for i, (table, view, name) in each]
         self._places = [i for i, some in enumerate(read) for _ in some]
         every = [one for some in read for one in some]
-        trials = with_one_stimulus(with_kinds(with_whole_turns(every, files), self.schema), constants)
+        trials = with_one_stimulus(
+            with_kinds(with_whole_turns(every, files), self.schema), constants, self.schema.inputs
+        )
         check_same_inputs([(t.kind, t.columns) for t in trials], self.schema, constants, self._fault_of)
         horizon = checked_horizon(self.document.table("study").get(HORIZON), self.document.under("study"))
         folder = self.folder.absolute()
