@@ -12,6 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import fes_pin as fp
+from fes_pin.data.channels import CHANNELS, EMG, EMG_KEYS, ENVELOPE, RATE, WIDTH
 from fes_pin.data.motion import GROUND_REACTION, OPTIONAL, REQUIRED
 from fes_pin.data.outputs import RECORD
 from fes_pin.data.schema import known_rigs
@@ -24,7 +25,8 @@ lines = st.text(string.printable + "äß°µ√ 日本😀\xa0", min_size=1, max
 )
 URDF = Path(tempfile.mkdtemp(prefix="round")) / "rig.urdf"
 URDF.write_text(studies.URDF)
-LIMITS = {"pulse_width_us": (3.0, 1e3), "angle_rad": (-6.0, 6.0), "length_m": (1e-3, 1.0), "position0": (-9.0, 9.0)}
+LIMITS = {"amplitude_ma": (0.0, 100.0), "charge_uc": (0.0, 50.0), "emg_envelope": (0.0, 1.0)}
+LIMITS |= {"pulse_width_us": (3.0, 1e3), "angle_rad": (-6.0, 6.0), "length_m": (1e-3, 1.0), "position0": (-9.0, 9.0)}
 
 
 def series(draw, name, count):
@@ -69,11 +71,14 @@ def whole_studies(draw):
     rig = draw(st.sampled_from(["ankle", "muscle", "joint", "body"]))
     schema = known_rigs()[rig]
     names = draw(st.lists(lines, min_size=1, max_size=3, unique=True))
-    stimulus = draw(st.sampled_from(schema.inputs))
+    stimulus = draw(st.sampled_from([n for n in schema.inputs if n not in (EMG, RATE)]))  # which others replace
     measured = tuple(draw(trials(schema, name, stimulus)) for name in names)
-    constants = {n: draw(positive) for n in (*schema.constants, *schema.passive)}
-    if "threshold_us" in constants:
-        constants["saturation_us"] = constants["threshold_us"] + draw(positive)
+    ends = {n for c in CHANNELS.values() for n in c.ends}
+    constants = {n: draw(positive) for n in (*schema.constants, *schema.passive) if n not in (*ends, *EMG_KEYS)}
+    if ends & set(schema.constants) and stimulus != ENVELOPE:
+        low, high = CHANNELS.get(stimulus, WIDTH).ends
+        constants[low] = draw(positive)
+        constants[high] = constants[low] + draw(positive)
     return fp.Study(
         name=draw(lines),
         rig=rig,

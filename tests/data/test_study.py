@@ -11,6 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from fes_pin.data.errors import InputError
+from fes_pin.data.outputs import RECORD
 from fes_pin.data.study import Study, read_study, write_study
 from fes_pin.data.trial import Trial, read_trial, write_trial
 from fes_pin.models.rigs.rigid import load_urdf
@@ -146,7 +147,7 @@ def test_write_read_and_pickle(tmp_path, rig):
     assert_same(read_study(tmp_path / "b"), study)
     assert_same(pickle.loads(pickle.dumps(study)), study)
     write_study(study, tmp_path / "b")
-    assert not [p for p in (tmp_path / "b").rglob("*") if p.name.startswith(".")]
+    assert {p.name for p in (tmp_path / "b").rglob(".*")} == {RECORD}
 
 
 def test_clean_files_read_fast(tmp_path):
