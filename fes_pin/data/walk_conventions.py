@@ -8,6 +8,7 @@ said.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -92,7 +93,7 @@ def checked_conventions(table: Mapping[str, Any], error: KeyFault) -> dict[str, 
     out: dict[str, Any] = {}
     for key, value in table.items():
         if key in WORDS:
-            out[key] = one_of(value, tuple(WORDS[key]), lambda message, key=key: error(key, message))  # type: ignore[misc]
+            out[key] = one_of(value, tuple(WORDS[key]), partial(error, key))
         elif isinstance(value, list) and all(isinstance(v, str | int) and len(str(v)) == 1 for v in value):
             out[key] = [str(v) for v in value]
         else:

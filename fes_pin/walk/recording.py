@@ -152,11 +152,11 @@ def _recording(trial: Trial, body: Body, hip: np.ndarray, cutoff_hz: float) -> W
     made = WalkTrial(trial.name, *parts, time, dict(columns), moved, read, session)
     if trial.as_read is not None and MOMENTS_ON in trial.as_read.stated:
         return made
-    moments = {n: v if n[1:3] == "_T" else 0.0 * v for n, v in raw.items()}
+    moments = {n: v if n[1:].startswith("_T") else 0.0 * v for n, v in raw.items()}
     twist = plates_of(raw_time, moments, made.motion.time, session).total[:, 5]
     if not _is_other_sign(twist, made.residual[:, 5]):
         return made
-    turned = {n: -v if n[1:3] == "_T" else v for n, v in raw.items()}
+    turned = {n: -v if n[1:].startswith("_T") else v for n, v in raw.items()}
     read = partial(plates_of, raw_time, turned, session=session)
     words = f"moments of the plates of trial {trial.name} are taken with the other sign: its motion requires them so"
     return replace(made, plates=read(motion.time).part(rows), read=read, said=(words,))

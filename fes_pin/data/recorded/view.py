@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from fes_pin.data.errors import KeyFault
-from fes_pin.data.recorded.clocks import clock_offset
+from fes_pin.data.recorded.clock_offset import clock_offset
 from fes_pin.data.recorded.parts import HOLES, RESTARTS, RESTS, changes, cut, holes, moving, restarts, rows_of
 from fes_pin.data.recorded.regular import at_times
 from fes_pin.data.schema import OF_A_VIEW, any_number, check_known, one_of, positive
