@@ -76,12 +76,12 @@ def grouped_files(proposals: Sequence[Proposal], schema: RigSchema, stated: Mapp
 
 
 def _with_time(proposal: Proposal) -> Proposal:
-    """The time of a file without names is its first column that rises in equal steps."""
-    recording = proposal.recording
-    if proposal.form is None or proposal.form.header_row or proposal.candidates.get("time_s"):
+    """The time of columns without names is the first of them that rises in equal steps."""
+    recording, form = proposal.recording, proposal.form
+    if (form is not None and form.header_row) or proposal.candidates.get("time_s"):
         return proposal
-    rising = (n for n, v in recording.columns.items() if _rises(v))
-    found = next(rising, None)
+    nameless = recording.columns if form else [n for n in recording.columns if re.search(r"\.\d+$", n)]
+    found = next((n for n in nameless if _rises(recording.columns[n])), None)
     return replace(proposal, candidates={**proposal.candidates, "time_s": (found,)}) if found else proposal
 
 

@@ -31,8 +31,9 @@ LONGEST = 12
 """Characters of the longest unit in a row that also has known ones; `revolutions` has 11."""
 SPELT_OUT = 4
 """Characters that a name has more of which is itself a unit: `Microseconds`, but not `in` or `rev`."""
-_IN_NAMES = tuple(q for q in UNITS if q not in ("pressure", "power", "temperature", "counts"))
-"""Quantities whose units are looked for at the end of names; the others' are words, as the `bar` of a linkage."""
+_IN_NAMES = tuple(q for q in UNITS if q not in ("pressure", "power", "temperature", "counts", "pulses"))
+"""Quantities whose units are looked for at the end of names; the others' are words, as the `bar` of a linkage, or an
+index, as in `data.1`."""
 
 _BY_SUFFIX = {"s": "time", "us": "pulse width", "rad": "angle", "m": "length", "n": "force", "nm": "torque"}
 _HELD = {*_BY_SUFFIX.values(), "angular rate", "speed", "pulses"}
