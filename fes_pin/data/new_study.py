@@ -419,6 +419,8 @@ class _Making:
             if not is_needed and len(candidates) < 2:
                 return None
             could = listed(candidates, " or ") if candidates else f"one of {listed(self._with_units())}"
+            if not candidates and (rate := INTEGRATED.get(column)) in self.schema.columns:
+                could += f"; without one --column {rate}=NAME:UNIT is integrated"
             what = f"--column {column}=NAME:UNIT ({could}"
             return self._asked(column, f"{what}; or nothing: --column {column}=)" if not is_needed else f"{what})")
         return self._with_unit(column, candidates[0], is_needed)

@@ -171,7 +171,9 @@ def test_steps_between_recordings_of_one_file_do_not_count(monkeypatch, tmp_path
 def test_files_with_more_or_fewer_comments_are_one_study(monkeypatch, tmp_path, sign):
     for name, count in (("a", 1), ("b", 4), ("c", 0)):
         lines = [f"{sign} note {k}" for k in range(count)]
-        (tmp_path / f"{name}.csv").write_text("\n".join([*lines, format_csv({"time_s": TIME, "position": swing(TIME)})]))
+        (tmp_path / f"{name}.csv").write_text(
+            "\n".join([*lines, format_csv({"time_s": TIME, "position": swing(TIME)})])
+        )
     files = [tmp_path / f"{name}.csv" for name in "ab"]
     assert run(monkeypatch, "new-study", *files, *ROD) == 0
     about = tomllib.loads((tmp_path / "study.toml").read_text())["columns"]["file"]
@@ -187,3 +189,12 @@ def test_a_balanced_wheel_may_turn_on(monkeypatch, capsys, tmp_path):
     assert "degrees" not in capsys.readouterr().out
     assert run(monkeypatch, "new-study", path, *ROD, "--force") == 0
     assert "turns: is it in degrees?" in capsys.readouterr().out
+
+
+def test_a_file_without_a_position_is_asked_for_a_speed(monkeypatch, capsys, tmp_path):
+    path = write(tmp_path / "a.csv", **{"time_s": TIME, "measured [Hz]": swing(TIME), "shaft [Hz]": swing(TIME, 1.0)})
+    said = fails(monkeypatch, capsys, "new-study", path, *ROD)
+    assert "--column position=NAME:UNIT (one of " in said
+    assert said.rstrip().endswith("; without one --column velocity=NAME:UNIT is integrated)")
+    assert run(monkeypatch, "new-study", path, *ROD, "--column", "velocity=shaft [Hz]:rev/s") == 0
+    assert trials(tmp_path)[0]["derive"] == {"position": "velocity"}

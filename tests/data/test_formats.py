@@ -97,7 +97,10 @@ def storage(path):
 
 
 def records(path):
-    rows = [{"t_ms": 1e3 * t, "angle_deg": a, "torque_mNm": u, "on": True} for t, a, u in zip(TIME, ANGLE, TORQUE, strict=True)]
+    rows = [
+        {"t_ms": 1e3 * t, "angle_deg": a, "torque_mNm": u, "on": True}
+        for t, a, u in zip(TIME, ANGLE, TORQUE, strict=True)
+    ]
     path.write_text(json.dumps({"mass": 0.5, "entries": rows, "gains": [1, 2, 3, 4]}))
 
 

@@ -333,8 +333,6 @@ def _of_file(key: str, value: Any, error: Callable[[str], Exception]) -> Any:
     """The value of a key of `[columns.file]`, checked."""
     if key in WORDS:
         return one_of(value, WORDS[key], error)
-    if key == "header_row" and value == AFTER:
-        return AFTER_COMMENTS
     if key == "resample_hz":
         return positive("Hz").check(value, error)
     if key == "comment":
@@ -349,6 +347,7 @@ def _of_file(key: str, value: Any, error: Callable[[str], Exception]) -> Any:
         if not isinstance(value, bool):
             raise error("expected true or false")
         return value
-    if isinstance(value, bool) or not isinstance(value, int) or value < (key == "first_row"):
+    is_after = key == "header_row" and value == AFTER
+    if not is_after and (isinstance(value, bool) or not isinstance(value, int) or value < (key == "first_row")):
         raise error("expected the number of a line, from 1" + (" (0: no header)" * (key == "header_row")))
-    return value
+    return AFTER_COMMENTS if is_after else value
