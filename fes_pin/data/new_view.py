@@ -228,13 +228,14 @@ def rate_of(time: np.ndarray, split: str, half_digit: float) -> float | None:
     """
     places = {RESTARTS: restarts, HOLES: holes}.get(split, lambda _: np.zeros(0, dtype=int))(time)
     parts = [one for one in np.split(time, places) if len(one) >= MIN_ROWS]
-    if not parts or any((np.diff(one) <= 0.0).any() for one in parts):  # which its reader refuses
+    if not parts or not all((np.diff(one) > 0.0).all() for one in parts):  # which its reader refuses, NaN too
         return None
     try:
         for one in parts:
             check_times(one, lambda *_: InputError("uneven"), half_digit=half_digit)
     except InputError:
-        return float(f"{1.0 / float(np.median(np.concatenate([np.diff(one) for one in parts]))):.3g}")
+        steps = np.diff(time)
+        return float(f"{1.0 / float(np.median(steps[steps > 0.0])):.3g}")
     return None
 
 

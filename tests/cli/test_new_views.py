@@ -198,3 +198,25 @@ def test_a_file_without_a_position_is_asked_for_a_speed(monkeypatch, capsys, tmp
     assert said.rstrip().endswith("; without one --column velocity=NAME:UNIT is integrated)")
     assert run(monkeypatch, "new-study", path, *ROD, "--column", "velocity=shaft [Hz]:rev/s") == 0
     assert trials(tmp_path)[0]["derive"] == {"position": "velocity"}
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_what_is_no_hole_of_a_recording_is_none_of_its_parts(monkeypatch, tmp_path, seed):
+    """Steps that grow: a part before a hole has a shorter usual step than the whole."""
+    rng = np.random.default_rng(seed)
+    steps = np.sort(rng.uniform(0.01, 0.012, 400))
+    steps[rng.choice(400, 3, replace=False)] *= rng.uniform(4.4, 4.95, 3)
+    steps[200] = 6.0 * np.median(steps)
+    time = np.cumsum(steps)
+    path = write(tmp_path / "a.csv", time_s=time, position=swing(time))
+    assert run(monkeypatch, "new-study", path, *ROD) == 0
+    assert len(read_study(tmp_path)) >= 2
+
+
+@pytest.mark.parametrize("bad", ["", "nan", "back"])
+def test_times_that_do_not_increase_get_no_rate(monkeypatch, capsys, tmp_path, bad):
+    lines = format_csv({"time_s": TIME, "position": swing(TIME)}).splitlines()
+    lines[40] = {"back": lines[30]}.get(bad, f"{bad},0.1")
+    (tmp_path / "a.csv").write_text("\n".join(lines))
+    said = fails(monkeypatch, capsys, "new-study", tmp_path / "a.csv", *ROD)
+    assert "row 41, column time_s" in said and not (tmp_path / "study.toml").exists()
