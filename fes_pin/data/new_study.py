@@ -466,7 +466,11 @@ class _Making:
             odd = "".join(f"; {sentence}" for sentence in self.said({}))
             raise InputError(f"{error.message}{odd}", column=error.column) from None
         if source is not None and "unit" in source:
-            factor_of(source["unit"], column, self.wanted.revolute, partial(InputError, column=f"--column {column}"))
+            own, place = own_unit(column, self.wanted.revolute), f"--column {column}"
+            hint = f"; of another quantity NAME,scale=NUMBER ({own} for each)" if own else ""
+            factor_of(
+                source["unit"], column, self.wanted.revolute, lambda why: InputError(f"{why}{hint}", column=place)
+            )
         if source is None or source.keys() & {"unit", "rate_hz", "edge"}:
             return source
         quantities = quantities_of(column, self.wanted.revolute)

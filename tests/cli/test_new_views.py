@@ -220,3 +220,12 @@ def test_times_that_do_not_increase_get_no_rate(monkeypatch, capsys, tmp_path, b
     (tmp_path / "a.csv").write_text("\n".join(lines))
     said = fails(monkeypatch, capsys, "new-study", tmp_path / "a.csv", *ROD)
     assert "row 41, column time_s" in said and not (tmp_path / "study.toml").exists()
+
+
+@pytest.mark.parametrize("unit", ["rpm", "A", "V", "deg/s"])
+def test_a_unit_of_another_quantity_wants_a_scale(monkeypatch, capsys, tmp_path, unit):
+    path = write(tmp_path / "a.csv", time_s=TIME, speed=swing(TIME))
+    words = ("new-study", path, "--slide", "2", "--column")
+    said = fails(monkeypatch, capsys, *words, f"velocity=speed:{unit}")
+    assert f"found {unit!r}; of another quantity NAME,scale=NUMBER (m/s for each)" in said
+    assert run(monkeypatch, *words, "velocity=speed,scale=0.02") == 0
