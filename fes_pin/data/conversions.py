@@ -2,6 +2,7 @@
 
 Each function takes the folder that holds the upstream files and their paths in the repository, as `datasets.json` lists
 them, and gives the files of a study. The steps are those that the data set's description names; nothing is filtered.
+Recordings that a study reads as they are have no function: `as_published` takes their study from `datasets.json`.
 """
 
 import re
@@ -124,6 +125,20 @@ def free_pendulum(folder: Path, places: Iterable[str]) -> Files:
     files["pendulum.urdf"] = arm_urdf("free_pendulum", what, 0.14758, 0.14775, 1.0912e-4, 1e-6)
     start = {"inertia_scale": 1.0, "gravity_scale": 1.0, "damping": 2.2394e-4}
     return {**files, "study.toml": _study("free-pendulum", {"urdf": "pendulum.urdf"}, start, trials)}
+
+
+def as_published(folder: Path, published: Mapping[str, Any]) -> Files:
+    """Text recordings as they are, and the study of them that `datasets.json` states.
+
+    Parameters
+    ----------
+    published
+        "tables" of study.toml, "files" by path in the study their path in the repository, and "arm", what `arm_urdf`
+        takes.
+    """
+    files = {ours: (folder / theirs).read_bytes().decode() for ours, theirs in published["files"].items()}
+    urdf = arm_urdf(**published["arm"])
+    return {**files, published["tables"]["rig"]["urdf"]: urdf, "study.toml": tomli_w.dumps(published["tables"])}
 
 
 CONVERTERS: Mapping[str, Callable[[Path, Iterable[str]], Files]] = {

@@ -12,9 +12,10 @@ import tempfile
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 from urllib.parse import quote
 
-from fes_pin.data.conversions import CONVERTERS, Files
+from fes_pin.data.conversions import CONVERTERS, Files, as_published
 from fes_pin.data.errors import InputError, fault_at, optional_library
 from fes_pin.data.outputs import Outputs
 from fes_pin.data.schema import check_known
@@ -50,6 +51,8 @@ class Dataset:
         Publication, if there is one.
     by_hand
         Why it cannot be fetched, and what to do instead; "" where it can.
+    published
+        Of recordings that a study reads as they are, what `as_published` takes; else empty.
     """
 
     name: str
@@ -62,6 +65,7 @@ class Dataset:
     converted: Mapping[str, str] = field(default_factory=dict)
     reference: str = ""
     by_hand: str = ""
+    published: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def origin(self) -> str:
@@ -156,12 +160,15 @@ def download_all(
 def _fetched(name: str, target: Path, unverified: bool, outputs: Outputs) -> Files:
     """The files of a data set's study."""
     dataset = _known(name)
-    if dataset.by_hand or name not in CONVERTERS:
+    if dataset.by_hand or not (dataset.published or name in CONVERTERS):
         raise InputError(f"{dataset.by_hand}; it is at {dataset.origin} ({dataset.licence})", column=name)
-    outputs.claim(target, ("study.toml", *dataset.converted))
+    outputs.claim(target, ("study.toml", *dataset.converted, *dataset.published.get("files", ())))
     with tempfile.TemporaryDirectory(prefix="fes-pin-") as scratch:
         _retrieve(dataset, Path(scratch))
-        made = CONVERTERS[name](Path(scratch), dataset.upstream)
+        if dataset.published:
+            made = as_published(Path(scratch), dataset.published)
+        else:
+            made = CONVERTERS[name](Path(scratch), dataset.upstream)
     trusted = all(dataset.upstream.values())
     found = {place: hashlib.sha256(text.encode()).hexdigest() for place, text in made.items()}
     other = [place for place, known in dataset.converted.items() if found.get(place) != known]
@@ -170,7 +177,8 @@ def _fetched(name: str, target: Path, unverified: bool, outputs: Outputs) -> Fil
         hint = "unverified=True keeps them all the same"
         message = f"{differ} with ({other[0]} is one), and no checksum of its origin is known; {hint}"
         raise InputError(message, column=name)
-    about = f"# From {dataset.origin}\n# {dataset.licence}; converted by fes-pin datasets. {dataset.reference}".rstrip()
+    how = "as they are" if dataset.published else "converted by fes-pin datasets"
+    about = f"# From {dataset.origin}\n# {dataset.licence}; {how}. {dataset.reference}".rstrip()
     made["study.toml"] = f"{about}\n{made['study.toml']}"
     return made
 

@@ -16,11 +16,11 @@ from fes_pin.data.as_read import HeldFile
 from fes_pin.data.channels import AMPLITUDE, CHANNELS, EMG, EMG_KEYS, RATE, WIDTH, Channel, channel_of
 from fes_pin.data.errors import InputError, fault_at, listed
 from fes_pin.data.files import inside, read_bytes
-from fes_pin.data.new_view import APART, FilesOfTrial, free_part, grouped_files, view_keys
+from fes_pin.data.new_view import APART, FilesOfTrial, free_part, grouped_files, rate_of, view_keys
 from fes_pin.data.recorded.columns import INTERPOLATE
 from fes_pin.data.recorded.events import EVENTS, looking_period
 from fes_pin.data.recorded.sniff import Proposal, propose
-from fes_pin.data.recorded.text import TextForm
+from fes_pin.data.recorded.text import TextForm, after_comments
 from fes_pin.data.recorded.view import INTEGRATED
 from fes_pin.data.schema import IMPOSED, NumberKey, any_number, check_known, one_of, unknown
 from fes_pin.data.stimulus import varying
@@ -226,9 +226,28 @@ class _Making:
             said += more
         self.of_views += said
         view |= {"derive": self.derived} if self.derived else {}
+        view |= self._rate(one, seconds, times, view)
         whole = {"sources": files} if one.is_joined else {"file": files[""]}
         paths = [p.recording.path for p in one.files.values()]
         return {**whole, **kind, **view, **labels_of(self.wanted, *paths)}
+
+    def _rate(
+        self,
+        one: FilesOfTrial,
+        seconds: Mapping[str, np.ndarray],
+        times: Mapping[str, Mapping[str, Any]],
+        view: Mapping[str, Any],
+    ) -> dict[str, float]:
+        """The rate of a trial whose times are not equally spaced, where nobody said one."""
+        source, time = next(iter(seconds.items()))
+        time = time[(time >= view.get("from", -np.inf)) & (time <= view.get("to", np.inf))]
+        if self.wanted.resample_hz or self.looked_hz or "rate_hz" in times[source] or not len(time):
+            return {}
+        recording, about = one.files[source].recording, times[source]
+        factor = factor_of(about["unit"], "time_s") if "unit" in about else 1.0
+        half_digit = factor * abs(float(about.get("scale", 1.0))) * recording.half_digit_of(about["name"])
+        rate_hz = rate_of(time, str(view.get("split", "")), half_digit)
+        return {} if rate_hz is None else {"rate": rate_hz}
 
     def _end(self, key: str, path: Path) -> float | None:
         """When a trial begins or ends in its recording, s, as `--set` says of its file or of all."""
@@ -298,6 +317,8 @@ class _Making:
 
     def _one_form(self, source: str) -> TextForm | None:
         forms = {p.form: p for p in (one.files[source] for one in self.trials)}
+        if len(forms) > 1:
+            forms = {after_comments(p.recording.path, form): p for form, p in forms.items()}
         if len(forms) > 1:
             one, other = list(forms.items())[:2]
             forms_found = " and ".join(f"{p.recording.path.name} has {form_in_words(form)}" for form, p in (one, other))
@@ -398,6 +419,8 @@ class _Making:
             if not is_needed and len(candidates) < 2:
                 return None
             could = listed(candidates, " or ") if candidates else f"one of {listed(self._with_units())}"
+            if not candidates and (rate := INTEGRATED.get(column)) in self.schema.columns:
+                could += f"; without one --column {rate}=NAME:UNIT is integrated"
             what = f"--column {column}=NAME:UNIT ({could}"
             return self._asked(column, f"{what}; or nothing: --column {column}=)" if not is_needed else f"{what})")
         return self._with_unit(column, candidates[0], is_needed)
@@ -443,7 +466,11 @@ class _Making:
             odd = "".join(f"; {sentence}" for sentence in self.said({}))
             raise InputError(f"{error.message}{odd}", column=error.column) from None
         if source is not None and "unit" in source:
-            factor_of(source["unit"], column, self.wanted.revolute, partial(InputError, column=f"--column {column}"))
+            own, place = own_unit(column, self.wanted.revolute), f"--column {column}"
+            hint = f"; of another quantity NAME,scale=NUMBER ({own} for each)" if own else ""
+            factor_of(
+                source["unit"], column, self.wanted.revolute, lambda why: InputError(f"{why}{hint}", column=place)
+            )
         if source is None or source.keys() & {"unit", "rate_hz", "edge"}:
             return source
         quantities = quantities_of(column, self.wanted.revolute)

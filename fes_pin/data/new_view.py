@@ -19,7 +19,7 @@ from fes_pin.data.recorded.parts import HOLES, RESTARTS, holes, restarts
 from fes_pin.data.recorded.sniff import Proposal
 from fes_pin.data.recorded.view import FITTED, INTEGRATED
 from fes_pin.data.schema import MEANT, RigSchema
-from fes_pin.data.table import STEP_TOLERANCE
+from fes_pin.data.table import MIN_ROWS, STEP_TOLERANCE, check_times
 
 APART = "."
 """Between the name of a source and that of its column."""
@@ -76,12 +76,12 @@ def grouped_files(proposals: Sequence[Proposal], schema: RigSchema, stated: Mapp
 
 
 def _with_time(proposal: Proposal) -> Proposal:
-    """The time of a file without names is its first column that rises in equal steps."""
-    recording = proposal.recording
-    if proposal.form is None or proposal.form.header_row or proposal.candidates.get("time_s"):
+    """The time of columns without names is the first of them that rises in equal steps."""
+    recording, form = proposal.recording, proposal.form
+    if (form is not None and form.header_row) or proposal.candidates.get("time_s"):
         return proposal
-    rising = (n for n, v in recording.columns.items() if _rises(v))
-    found = next(rising, None)
+    nameless = recording.columns if form else [n for n in recording.columns if re.search(r"\.\d+$", n)]
+    found = next((n for n in nameless if _rises(recording.columns[n])), None)
     return replace(proposal, candidates={**proposal.candidates, "time_s": (found,)}) if found else proposal
 
 
@@ -210,6 +210,33 @@ def _split(files: FilesOfTrial, time: np.ndarray, rate_hz: float | None) -> tupl
         count, longest = f"{len(found)} hole{'s' * (len(found) > 1)}", 1e3 * float(np.diff(time).max())
         return HOLES, f"{count}, the longest {longest:.4g} ms: {len(found) + 1} trials"
     return "", ""
+
+
+def rate_of(time: np.ndarray, split: str, half_digit: float) -> float | None:
+    """The rate at which a recording is resampled as its times are not equally spaced, Hz; None where they are.
+
+    It is that of the usual step, to the three digits that jitter leaves.
+
+    Parameters
+    ----------
+    time
+        Of what the trial takes of its recording, s, shape (n,).
+    split
+        At what it is cut into trials: a step from one to the next is none of either.
+    half_digit
+        Half of the last digit that times were printed with, s.
+    """
+    places = {RESTARTS: restarts, HOLES: holes}.get(split, lambda _: np.zeros(0, dtype=int))(time)
+    parts = [one for one in np.split(time, places) if len(one) >= MIN_ROWS]
+    if not parts or not all((np.diff(one) > 0.0).all() for one in parts):  # which its reader refuses, NaN too
+        return None
+    try:
+        for one in parts:
+            check_times(one, lambda *_: InputError("uneven"), half_digit=half_digit)
+    except InputError:
+        steps = np.diff(time)
+        return float(f"{1.0 / float(np.median(steps[steps > 0.0])):.3g}")
+    return None
 
 
 def free_part(name: str, time: np.ndarray, position: np.ndarray) -> tuple[dict[str, float], list[str]]:

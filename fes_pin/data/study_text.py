@@ -16,7 +16,7 @@ from fes_pin.data.errors import InputError, KeyFault, listed
 from fes_pin.data.files import hold, read_json
 from fes_pin.data.numbers import in_full, number_in
 from fes_pin.data.recorded.columns import SOURCE_KEYS, Columns, columns_of
-from fes_pin.data.recorded.text import TextForm
+from fes_pin.data.recorded.text import AFTER, AFTER_COMMENTS, TextForm
 from fes_pin.data.schema import Rigs, RigSchema, check_known, number_or_none, one_of, positive
 from fes_pin.data.toml import Document
 from fes_pin.data.units import own_unit
@@ -200,6 +200,9 @@ def columns_text(
     about |= {k: v for k, v in asdict(form).items() if v != getattr(TextForm(), k)}
     if form.first_row != form.header_row + 1:
         about["first_row"] = form.first_row
+    if form.header_row == AFTER_COMMENTS:
+        about |= {"header_row": AFTER}
+        about.pop("first_row", None)
     return out + toml_table(f"{where}.file", about, "how the recordings are written")
 
 

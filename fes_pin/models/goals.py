@@ -98,7 +98,7 @@ def stiffness_of_goal(trials: Sequence[Trial], constants: Mapping[str, float]) -
         return None
     weights = np.linalg.lstsq(columns, effort, rcond=None)[0]
     missed = effort - columns @ weights
-    spread = np.sqrt(np.diag(np.linalg.inv(columns.T @ columns)) * float(missed @ missed) / len(effort))
+    spread = np.linalg.norm(np.linalg.pinv(columns), axis=1) * math.sqrt(float(missed @ missed) / len(effort))
     of_torque = float(weights[1] + SURELY * spread[1])
     is_goal = abs(weights[0] - 1.0) < CLOSE and 0.0 < of_torque < LESS
     if not is_goal or float(np.var(missed)) > (1.0 - EXPLAINED) * float(np.var(effort)):

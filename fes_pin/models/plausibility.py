@@ -153,17 +153,21 @@ def _range(study: Study | ToPredict, model: Model) -> Iterable[str]:
         return
     most = max((float(np.abs(t["position"]).max()) for t in study.trials if "position" in t), default=0.0)
     most = max(most, *(abs(t.conditions.get("position0", 0.0)) for t in study.trials))
-    if model.rig.constants["revolute"] and most > TURNS * 2.0 * math.pi:
+    if model.rig.constants["revolute"] and _weight(model) > 0.0 and most > TURNS * 2.0 * math.pi:  # a wheel may turn on
         yield f"position reaches {most:.4g} rad, {most / (2.0 * math.pi):.1f} turns: is it in degrees?"
     if not model.rig.constants["revolute"] and most > LONGEST_M:
         yield f"position reaches {most:.4g} m: is it in mm?"
 
 
+def _weight(model: Model) -> float:
+    """Greatest moment of the weight of what a joint carries, N m; 0 of a balanced wheel."""
+    return math.hypot(model.rig.constants.get("gravity_cos", 0.0), model.rig.constants.get("gravity_sin", 0.0))
+
+
 def _swings(study: Study | ToPredict, model: Model) -> Iterable[str]:
     """Yield warnings for motion that no pendulum has by itself: wide swings, or rest off hanging."""
     c = model.rig.constants
-    weight = math.hypot(c.get("gravity_cos", 0.0), c.get("gravity_sin", 0.0))
-    if not c.get("revolute") or not weight > 0.0 or model.parameters().get("gravity_scale", 1.0) == 0.0:
+    if not c.get("revolute") or not _weight(model) > 0.0 or model.parameters().get("gravity_scale", 1.0) == 0.0:
         return
     free = [t for t in study.trials if "position" in t and ("effort" not in t or not t["effort"].any())]
     if wide := [t.name for t in free if _widest_swing(t["position"]) > SWING]:
@@ -175,7 +179,7 @@ def _swings(study: Study | ToPredict, model: Model) -> Iterable[str]:
         said = f"position comes to rest at {_ends(off)} rad, and by the URDF it hangs at {hangs + 0.0:.4g}, in"
         yield f"{said} {trials_named([*off])}: is its zero elsewhere (zero in [columns]), or its sign another?"
         return
-    length = c["inertia"] * 9.81 / weight
+    length = c["inertia"] * 9.81 / _weight(model)
     if length > LONGEST_M:
         yield f"by its URDF the rig swings like a pendulum of {length:.4g} m: is the URDF in mm?"
 

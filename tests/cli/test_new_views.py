@@ -131,3 +131,101 @@ def test_a_speed_alone_is_a_rig(monkeypatch, capsys, tmp_path):
     assert trials(tmp_path)[0]["derive"] == {"position": "velocity"}
     (trial,) = read_study(tmp_path)
     assert np.allclose(trial["position"], np.pi * (1.0 - np.cos(TIME)), atol=1e-4)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_times_that_jitter_are_resampled_at_the_usual_step_and_said(monkeypatch, capsys, tmp_path, seed):
+    rng = np.random.default_rng(seed)
+    step = rng.choice([0.002, 0.005, 0.01, 0.05])
+    time = step * np.arange(400) + rng.uniform(0.0, 0.3 * step, 400)
+    jittered = write(tmp_path / "a.csv", time_s=time, position=swing(time))
+    even = write(tmp_path / "b.csv", time_s=TIME, position=swing(TIME, 1.0))
+    assert run(monkeypatch, "new-study", jittered, even, *ROD) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    rate, none = [one.get("rate") for one in trials(tmp_path)]
+    assert rate == pytest.approx(1 / step, rel=0.02) and none is None
+    assert f"ms are interpolated to {rate:g} Hz, without a filter in trial a" in said
+    first, second = read_study(tmp_path)
+    assert np.allclose(np.diff(first.time), 1 / rate) and len(second.time) == len(TIME)
+    assert run(monkeypatch, "new-study", jittered, even, *ROD, "--resample", "20", "--force") == 0
+    assert not any("rate" in one for one in trials(tmp_path))
+
+
+@pytest.mark.parametrize("digits", [2, 3, 4])
+def test_equal_steps_that_were_rounded_are_not_resampled(monkeypatch, tmp_path, digits):
+    time = np.round(np.arange(300) / 60.0, digits)
+    write(tmp_path / "a.csv", time_s=time, position=swing(time))
+    assert run(monkeypatch, "new-study", tmp_path / "a.csv", *ROD) == 0
+    assert "rate" not in trials(tmp_path)[0]
+
+
+def test_steps_between_recordings_of_one_file_do_not_count(monkeypatch, tmp_path):
+    kept = (TIME < 2.0) | (TIME > 2.2)
+    for name, time in (("a", TIME[kept]), ("b", np.r_[TIME, TIME])):
+        path = write(tmp_path / name / "a.csv", time_s=time, position=swing(time))
+        assert run(monkeypatch, "new-study", path, *ROD) == 0
+        assert "rate" not in trials(path.parent)[0]
+
+
+@pytest.mark.parametrize("sign", ["#", "%", "//"])
+def test_files_with_more_or_fewer_comments_are_one_study(monkeypatch, tmp_path, sign):
+    for name, count in (("a", 1), ("b", 4), ("c", 0)):
+        lines = [f"{sign} note {k}" for k in range(count)]
+        (tmp_path / f"{name}.csv").write_text(
+            "\n".join([*lines, format_csv({"time_s": TIME, "position": swing(TIME)})])
+        )
+    files = [tmp_path / f"{name}.csv" for name in "ab"]
+    assert run(monkeypatch, "new-study", *files, *ROD) == 0
+    about = tomllib.loads((tmp_path / "study.toml").read_text())["columns"]["file"]
+    assert about == {"header_row": "after comments", "comment": sign}
+    assert [len(t.time) for t in read_study(tmp_path)] == [len(TIME)] * 2
+
+
+def test_a_balanced_wheel_may_turn_on(monkeypatch, capsys, tmp_path):
+    rng = np.random.default_rng(1)
+    speed = np.minimum(15.0 * TIME, 40.0)
+    path = write(tmp_path / "a.csv", time_s=TIME, position=np.cumsum(speed) * 0.01, effort=np.exp(rng.normal(size=600)))
+    assert run(monkeypatch, "new-study", path, "--wheel", "0.001") == 0
+    assert "degrees" not in capsys.readouterr().out
+    assert run(monkeypatch, "new-study", path, *ROD, "--force") == 0
+    assert "turns: is it in degrees?" in capsys.readouterr().out
+
+
+def test_a_file_without_a_position_is_asked_for_a_speed(monkeypatch, capsys, tmp_path):
+    path = write(tmp_path / "a.csv", **{"time_s": TIME, "measured [Hz]": swing(TIME), "shaft [Hz]": swing(TIME, 1.0)})
+    said = fails(monkeypatch, capsys, "new-study", path, *ROD)
+    assert "--column position=NAME:UNIT (one of " in said
+    assert said.rstrip().endswith("; without one --column velocity=NAME:UNIT is integrated)")
+    assert run(monkeypatch, "new-study", path, *ROD, "--column", "velocity=shaft [Hz]:rev/s") == 0
+    assert trials(tmp_path)[0]["derive"] == {"position": "velocity"}
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_what_is_no_hole_of_a_recording_is_none_of_its_parts(monkeypatch, tmp_path, seed):
+    """Steps that grow: a part before a hole has a shorter usual step than the whole."""
+    rng = np.random.default_rng(seed)
+    steps = np.sort(rng.uniform(0.01, 0.012, 400))
+    steps[rng.choice(400, 3, replace=False)] *= rng.uniform(4.4, 4.95, 3)
+    steps[200] = 6.0 * np.median(steps)
+    time = np.cumsum(steps)
+    path = write(tmp_path / "a.csv", time_s=time, position=swing(time))
+    assert run(monkeypatch, "new-study", path, *ROD) == 0
+    assert len(read_study(tmp_path)) >= 2
+
+
+@pytest.mark.parametrize("bad", ["", "nan", "back"])
+def test_times_that_do_not_increase_get_no_rate(monkeypatch, capsys, tmp_path, bad):
+    lines = format_csv({"time_s": TIME, "position": swing(TIME)}).splitlines()
+    lines[40] = {"back": lines[30]}.get(bad, f"{bad},0.1")
+    (tmp_path / "a.csv").write_text("\n".join(lines))
+    said = fails(monkeypatch, capsys, "new-study", tmp_path / "a.csv", *ROD)
+    assert "row 41, column time_s" in said and not (tmp_path / "study.toml").exists()
+
+
+@pytest.mark.parametrize("unit", ["rpm", "A", "V", "deg/s"])
+def test_a_unit_of_another_quantity_wants_a_scale(monkeypatch, capsys, tmp_path, unit):
+    path = write(tmp_path / "a.csv", time_s=TIME, speed=swing(TIME))
+    words = ("new-study", path, "--slide", "2", "--column")
+    said = fails(monkeypatch, capsys, *words, f"velocity=speed:{unit}")
+    assert f"found {unit!r}; of another quantity NAME,scale=NUMBER (m/s for each)" in said
+    assert run(monkeypatch, *words, "velocity=speed,scale=0.02") == 0

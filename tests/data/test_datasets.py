@@ -24,7 +24,7 @@ def _fetched(name, **more):
 
 pytest.importorskip("pooch")
 TIME = np.arange(0.0, 2.0, 1.0 / 1024)
-PUT = {"servo_pendulum", "friction_damper", "free_pendulum"}
+PUT = {"servo_pendulum", "friction_damper", "free_pendulum", "torque_limited_pendulum"}
 SERVO_LOGS = tuple(DATASETS["servo_pendulum"].upstream)
 
 
@@ -72,6 +72,11 @@ def pendulum(path):
     savemat(path, {**made, "dt": 1e-3})
 
 
+def swing(path):
+    rows = [f"{x:.6f},{np.sin(3.0 * x):.6f},{3.0 * np.cos(3.0 * x):.6f},{0.1 * np.cos(x):.6f}" for x in TIME.tolist()]
+    path.write_text("\n".join(["time,position,velocity,torque", *rows]) + "\n")
+
+
 @pytest.fixture(scope="module")
 def server(tmp_path_factory):
     pytest.importorskip("pymatreader")
@@ -81,9 +86,8 @@ def server(tmp_path_factory):
         for number, place in enumerate(one.upstream):
             path = root / one.repository / one.commit / place
             path.parent.mkdir(parents=True, exist_ok=True)
-            {"servo_pendulum": lambda p, k=number: servo(p, k), "friction_damper": damper, "free_pendulum": pendulum}[
-                name
-            ](path)
+            put = {"friction_damper": damper, "free_pendulum": pendulum, "torque_limited_pendulum": swing}
+            {"servo_pendulum": lambda p, k=number: servo(p, k), **put}[name](path)
     serving = ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Quiet, directory=root))
     thread = threading.Thread(target=serving.serve_forever)
     thread.start()
@@ -112,7 +116,7 @@ def test_a_data_set_with_its_checksums_becomes_a_study(server, here, monkeypatch
     with_checksums(monkeypatch, server[0], name)
     assert _fetched(name) == here / name == fetch(name)
     study = read_study(here / name)
-    assert len(study.trials) == {"servo_pendulum": 16, "free_pendulum": 5}[name]
+    assert len(study.trials) == {"servo_pendulum": 16, "free_pendulum": 5, "torque_limited_pendulum": 6}[name]
     assert {t.role for t in study.trials} == {"fit", "held_out"}
 
 
@@ -138,6 +142,19 @@ def test_the_steps_of_each_conversion(server):
     rows = np.genfromtxt(files["trials/held_1.csv"].splitlines(), delimiter=",", names=True)
     assert rows["time_s"][:2].tolist() == [0.0, 0.001]
     assert np.allclose(rows["velocity"], -np.sin(TIME + 1), atol=1e-6)
+
+
+def test_recordings_that_are_read_as_they_are_stay_so(server, here, monkeypatch):
+    with_checksums(monkeypatch, server[0], "torque_limited_pendulum")
+    one = DATASETS["torque_limited_pendulum"]
+    folder = _fetched(one.name)
+    for ours, theirs in one.published["files"].items():
+        assert (folder / ours).read_bytes() == (server[0] / one.repository / one.commit / theirs).read_bytes()
+    assert (folder / "study.toml").read_text().startswith(f"# From {one.origin}\n# {one.licence}; as they are. ")
+    assert set(one.published["files"].values()) == set(one.upstream)
+    rates = {t.name: 1.0 / t.dt for t in read_study(folder)}
+    stated = {row["file"][9:-4]: row["rate"] for row in one.published["tables"]["trial"] if "rate" in row}
+    assert stated and {n: rates[n] for n in stated} == pytest.approx(stated)
 
 
 def test_a_wrong_checksum_keeps_nothing(server, here, monkeypatch):
@@ -211,6 +228,9 @@ def test_the_command(server, here, monkeypatch, capsys):
 @pytest.mark.shared
 def test_the_registry_is_what_the_descriptions_say(shared):
     for name, one in DATASETS.items():
+        if one.published:  # described by its study
+            assert one.upstream and all(one.upstream.values())
+            continue
         text = (shared / "data" / name / "SOURCE.md").read_text()
         assert one.repository in text and one.commit[:7] in text and text.startswith(f"# {one.what}")
         for place, known in one.converted.items():

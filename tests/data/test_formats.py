@@ -1,5 +1,6 @@
 """Recordings in Parquet, MATLAB, C3D, XDF and OpenSim's files, as their programs write them, made a study."""
 
+import json
 import struct
 
 import numpy as np
@@ -95,7 +96,22 @@ def storage(path):
     )
 
 
+def records(path):
+    rows = [
+        {"t_ms": 1e3 * t, "angle_deg": a, "torque_mNm": u, "on": True}
+        for t, a, u in zip(TIME, ANGLE, TORQUE, strict=True)
+    ]
+    path.write_text(json.dumps({"mass": 0.5, "entries": rows, "gains": [1, 2, 3, 4]}))
+
+
+def vectors(path):
+    log = {"t_ms": 1e3 * TIME, "angle_deg": ANGLE, "torque_mNm": TORQUE}
+    path.write_text(json.dumps([{"kind": "swing", "log": {n: v.tolist() for n, v in log.items()}}]))
+
+
 WRITERS = {
+    "a.json": records,
+    "b.json": vectors,
     "a.parquet": parquet,
     "a.mat": matlab_5,
     "b.mat": matlab_73,
@@ -120,7 +136,7 @@ def test_a_recording_of_each_format_becomes_a_study(tmp_path, name):
     assert np.allclose(trial["position"], np.radians(ANGLE), atol=single)
     assert np.allclose(trial["effort"], 1e-3 * TORQUE, atol=single)
     path.write_bytes(b"no such thing, but long enough to be looked at")
-    with pytest.raises(InputError, match=r"cannot be read as|expected a line endheader") as caught:
+    with pytest.raises(InputError, match=r"cannot be read as|expected a line endheader|expected JSON") as caught:
         read_study(tmp_path)
     assert len(str(caught.value).splitlines()) == 1
 
@@ -129,6 +145,24 @@ def test_columns_of_other_lengths_are_refused(tmp_path):
     matlab_5(tmp_path / "a.mat")
     with pytest.raises(InputError, match=r"expected columns of one length, found log.t_ms 80, log.gains 5"):
         read_recording(tmp_path / "a.mat", wanted=("log.t_ms", "log.gains"))
+
+
+def test_null_in_json_is_a_missing_sample(tmp_path):
+    angle = [None if k == 7 else a for k, a in enumerate(ANGLE.tolist())]
+    (tmp_path / "a.json").write_text(json.dumps({"t": TIME.tolist(), "angle": angle}))
+    read = read_recording(tmp_path / "a.json")
+    assert np.flatnonzero(np.isnan(read.columns["angle"])).tolist() == [7]
+
+
+def test_the_time_of_a_table_without_names_is_its_column_of_equal_steps(tmp_path):
+    from scipy.io import savemat
+
+    savemat(tmp_path / "a.mat", {"data": np.stack([ANGLE, TIME, TORQUE])})
+    believed = HeldFile.holding("p.urdf", pendulum(0.3, 0.5).encode())
+    said = {"position": "data.1:deg", "effort": "data.3:mNm"}
+    wanted = Wanted((tmp_path / "a.mat",), known_rigs()["joint"], tmp_path, "own", believed, said)
+    with pytest.raises(InputError, match=r"please add --column time_s=data.2:UNIT \(0 to 0.395: s, or which unit\?\)$"):
+        new_study(wanted, lambda *_: {"inertia_scale": 1.0, "damping": 0.01})
 
 
 def test_points_of_a_c3d_file_are_read_where_they_are_named(tmp_path):

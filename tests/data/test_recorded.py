@@ -159,7 +159,7 @@ def test_jitter_and_missing_samples_are_filled_in_where_the_study_says_so(tmp_pa
     held = np.searchsorted(time, trial.time + 1e-9, side="right") - 1
     assert np.array_equal(trial["effort"], held // 10)  # an input keeps its value until the next sample
     assert trial.remarks[0] == "3 missing samples are filled in"
-    assert trial.remarks[1].startswith("time steps of 9")
+    assert trial.remarks[1].startswith("time steps of about 9.98 ms are interpolated to 100 Hz")
 
 
 def test_gaps_are_not_filled_in(tmp_path):

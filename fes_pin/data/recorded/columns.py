@@ -13,7 +13,7 @@ from fes_pin.data.errors import KeyFault, listed
 from fes_pin.data.recorded.events import EVENTS, sampled_events
 from fes_pin.data.recorded.formats import read_recording
 from fes_pin.data.recorded.regular import check_steps, filled, resampled
-from fes_pin.data.recorded.text import DECIMALS, DELIMITERS, ENCODINGS, TextForm
+from fes_pin.data.recorded.text import AFTER, AFTER_COMMENTS, DECIMALS, DELIMITERS, ENCODINGS, TextForm
 from fes_pin.data.recorded.wraps import table_without_wraps
 from fes_pin.data.schema import RigSchema, any_number, check_known, one_of, positive, unknown
 from fes_pin.data.table import Table
@@ -207,9 +207,15 @@ class Columns:
         if self.resample_hz is not None:
             steps = np.diff(table.time)
             table = resampled(table, held, self.resample_hz)
-            was = f"{1e3 * steps.min():.4g} to {1e3 * steps.max():.4g} ms"
-            said.append(f"time steps of {was} are interpolated to {self.resample_hz:g} Hz, without a filter")
+            said.append(f"{_steps_in_words(steps)} are interpolated to {self.resample_hz:g} Hz, without a filter")
         return replace(table, said=tuple(said))
+
+
+def _steps_in_words(steps: np.ndarray) -> str:
+    """What time steps were, s: alike for trials of one log, so that it is said once of them."""
+    usual, most = float(np.median(steps)), round(float(steps.max() / np.median(steps)))
+    longest = f", the longest {most} of them," if most > 1 else ""
+    return f"time steps of about {1e3 * usual:.3g} ms{longest}"
 
 
 def columns_of(table: Mapping[str, Any], schema: RigSchema, revolute: bool | None, error: KeyFault) -> Columns:
@@ -308,6 +314,8 @@ def _with_file(columns: Columns, about: Mapping[str, Any], error: KeyFault) -> C
     if rows is not None and rate is None:
         raise error("file.rows", f'expected resample_hz as well: rows = "{EVENTS}" are held from step to step')
     form.setdefault("first_row", form.get("header_row", 1) + 1)
+    if form.get("header_row") == AFTER_COMMENTS and ("comment" not in form or "first_row" in about):
+        raise error("file.header_row", f'"{AFTER}" wants comment to say what begins one, and no first_row')
     text = TextForm(**form)
     if text.first_row <= text.header_row:
         raise error("file.first_row", f"expected a line below the header in line {text.header_row}")
@@ -339,6 +347,7 @@ def _of_file(key: str, value: Any, error: Callable[[str], Exception]) -> Any:
         if not isinstance(value, bool):
             raise error("expected true or false")
         return value
-    if isinstance(value, bool) or not isinstance(value, int) or value < (key == "first_row"):
+    is_after = key == "header_row" and value == AFTER
+    if not is_after and (isinstance(value, bool) or not isinstance(value, int) or value < (key == "first_row")):
         raise error("expected the number of a line, from 1" + (" (0: no header)" * (key == "header_row")))
-    return value
+    return AFTER_COMMENTS if is_after else value

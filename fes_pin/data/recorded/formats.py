@@ -6,9 +6,10 @@
 | `.mat` | pymatreader (scipy and h5py) | `matlab` |
 | `.c3d` | ezc3d | `c3d` |
 | `.xdf`, `.xdfz` | pyxdf | `xdf` |
-| `.mot`, `.sto`, `.trc` | none | |
+| `.mot`, `.sto`, `.trc`, `.json` | none | |
 """
 
+import warnings
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -19,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from fes_pin.data.errors import MOST_LISTED, InputError, listed, optional_library
-from fes_pin.data.files import as_path, read_bytes
+from fes_pin.data.files import as_path, read_bytes, read_json
 from fes_pin.data.markers import TIME, c3d_points, trc_points
 from fes_pin.data.motion import STORAGE, is_rotation, read_motion
 from fes_pin.data.recorded.clock import since_first
@@ -133,16 +134,56 @@ def matlab_vectors(path: Path) -> dict[str, np.ndarray]:
     Raises
     ------
     InputError
-        Not a MATLAB file, or pymatreader is not installed.
+        Not a MATLAB file, hardly more than objects of a class, or pymatreader is not installed.
     """
     reader = _library("pymatreader", "matlab", path)
-    with _reading(path, "a MATLAB file"):
-        content = reader.read_mat(str(path))
-    return dict(_vectors(content))
+    with _reading(path, "a MATLAB file"), warnings.catch_warnings(record=True) as objects:
+        warnings.simplefilter("always")
+        content = {key: one for key, one in reader.read_mat(str(path)).items() if not str(key).startswith("#")}
+    found = dict(_vectors(content))
+    if objects and len(found) < 2:  # no time with a quantity
+        words = "expected arrays of numbers; objects of a class, as timeseries and table, are not read"
+        raise InputError(f"{words}: save their times and data as arrays", file=path)
+    return found
 
 
-def _matlab(path: Path, wanted: Sequence[str] | None) -> Table:
-    columns = matlab_vectors(path)
+def json_vectors(path: Path) -> dict[str, np.ndarray]:
+    """Every vector of numbers in a JSON file, by dotted names; a list of records has a vector of each key.
+
+    A null among numbers is a missing sample.
+
+    Raises
+    ------
+    InputError
+        Not a JSON file.
+    """
+    return dict(_vectors(_of_records(read_json(path))))
+
+
+def _of_records(content: Any) -> Any:
+    """JSON with its lists of records as tables of lists, and null among numbers as NaN."""
+    if isinstance(content, dict):
+        return {key: _of_records(value) for key, value in content.items()}
+    if not isinstance(content, list):
+        return content
+    if len(content) >= MIN_ROWS and all(isinstance(one, dict) for one in content):
+        return {key: _of_records([one.get(key) for one in content]) for key in content[0]}
+    if all(one is None or isinstance(one, int | float) for one in content):
+        return [np.nan if one is None else one for one in content]
+    return [_of_records(one) for one in content]
+
+
+_NESTED = {".mat": matlab_vectors, ".json": json_vectors}
+"""Vectors of files that nest them, by suffix."""
+
+
+def is_nested(path: Path) -> bool:
+    """Return whether a file nests vectors of several lengths."""
+    return path.suffix.lower() in _NESTED
+
+
+def _nested(path: Path, wanted: Sequence[str] | None) -> Table:
+    columns = _NESTED[path.suffix.lower()](path)
     if wanted is None and columns:  # scalars and tables of other lengths are no columns of the recording
         count = Counter(len(v) for v in columns.values()).most_common(1)[0][0]
         columns = {n: v for n, v in columns.items() if len(v) == count}
@@ -150,7 +191,7 @@ def _matlab(path: Path, wanted: Sequence[str] | None) -> Table:
 
 
 def by_length(path: Path, chosen: Collection[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Names of vectors of one length in a MATLAB file, and a sentence about others that go together.
+    """Names of vectors of one length in a file that nests them, and a sentence about others that go together.
 
     Parameters
     ----------
@@ -160,9 +201,9 @@ def by_length(path: Path, chosen: Collection[str]) -> tuple[tuple[str, ...], tup
     Raises
     ------
     InputError
-        As `matlab_vectors`.
+        As `matlab_vectors` and `json_vectors`.
     """
-    columns = matlab_vectors(path)
+    columns = _NESTED[path.suffix.lower()](path)
     groups: dict[int, list[str]] = {}
     for name, values in columns.items():
         groups.setdefault(len(values), []).append(name)
@@ -269,6 +310,6 @@ def _channels(stream: Any) -> list[tuple[str, str]]:
 
 
 _READERS: Mapping[str, Callable[[Path, Sequence[str] | None], Table]] = {
-    **{".parquet": _parquet, ".mat": _matlab, ".c3d": _c3d, ".trc": _trc},
+    **{".parquet": _parquet, **dict.fromkeys(_NESTED, _nested), ".c3d": _c3d, ".trc": _trc},
     **{**dict.fromkeys(STORAGE, _storage), **dict.fromkeys((".xdf", ".xdfz"), _xdf)},
 }

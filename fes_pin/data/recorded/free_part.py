@@ -19,11 +19,15 @@ LARGER = 0.99
 def free_from(time: np.ndarray, position: np.ndarray) -> float | None:
     """Time at which the free motion begins, s; None of a record that does not begin at rest at the place of its end.
 
+    None as well where samples are missing.
+
     Parameters
     ----------
     time, position
         Shape (n,); nothing drives the rig.
     """
+    if not (np.isfinite(time).all() and np.isfinite(position).all()):
+        return None
     count = round(REST_S / max(float(np.median(np.diff(time))), 1e-12))
     if count < 2 or len(time) < 4 * count:
         return None

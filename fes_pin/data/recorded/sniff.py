@@ -15,7 +15,7 @@ from typing import Any
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import as_path, read_bytes, read_text
 from fes_pin.data.recorded.clock import clock_seconds
-from fes_pin.data.recorded.formats import by_length, check_suffix, is_text, read_recording
+from fes_pin.data.recorded.formats import by_length, check_suffix, is_nested, is_text, read_recording
 from fes_pin.data.recorded.header import Header, cells_in, header_of, is_keyed, ways
 from fes_pin.data.recorded.text import DECIMALS, DELIMITERS, MISSING, TextForm, cells_of, read_text_recording
 from fes_pin.data.schema import MEANT, RigSchema, without_unit
@@ -244,7 +244,7 @@ def propose(
         units = {name: unit for k, name in enumerate(recording.names) if (unit := bare_unit(by_place.get(k, "")))}
     else:
         form, header = None, Header()
-        names, said = by_length(path, chosen) if path.suffix.lower() == ".mat" else (None, ())
+        names, said = by_length(path, chosen) if is_nested(path) else (None, ())
         recording, header = read_recording(path, wanted=names), Header(said=said)
         units = {}
     units = {**recording.units, **units}

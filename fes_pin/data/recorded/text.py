@@ -25,6 +25,8 @@ ENCODINGS = ("utf-8", "utf-16", "cp1252")
 _NUMBER = re.compile(r"^[+-]?[\d.,]+([eE][+-]?\d+)?$")
 MISSING = frozenset({"", "nan", "na", "n/a", "-", "--", "null", "none", "#n/a"})
 """What instruments write where there is no sample, in lower case."""
+AFTER, AFTER_COMMENTS = "after comments", -1
+"""`header_row` of files whose names stand in the first line that is neither a comment nor empty; in a form -1."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +40,8 @@ class TextForm:
     decimal
         "." or ",".
     header_row
-        Line of the column names, from 1; 0 if the file has none, and columns are then called column1, column2 ...
+        Line of the column names, from 1, or `AFTER_COMMENTS`, with the numbers below it; 0 if the file has none, and
+        columns are then called column1, column2 ...
     first_row
         Line of the first numbers; what stands between it and the header (a row of units) is passed over.
     names
@@ -77,7 +80,7 @@ class TextForm:
             said.append("no header")
         elif self.header_row > 1:
             said.append(f"a header in row {self.header_row}")
-        if self.header_row and self.first_row > self.header_row + 1:
+        if self.header_row > 0 and self.first_row > self.header_row + 1:
             said.append("a row of units")
         if self.comment:
             said.append(f"comments after {self.comment}")
@@ -143,9 +146,27 @@ def read_text_recording(path: Path, form: TextForm, wanted: Sequence[str] | None
         A file that is not of this form, with row and column.
     """
     lines = read_text(path, form.encoding).split("\n")
+    if form.header_row == AFTER_COMMENTS:
+        row = row_after_comments(lines, form)
+        form = replace(form, header_row=row, first_row=row + 1)
     if form.transposed:
         return _transposed(path, lines, form, wanted)
     return table_of_lines(path, lines, names_of(path, lines, form), form, wanted)
+
+
+def after_comments(path: Path, form: TextForm | None) -> TextForm | None:
+    """The form of a file whose names follow its comments, however many lines these are; another as it is."""
+    if form is None or not form.comment or form.first_row != form.header_row + 1:
+        return form
+    lines = read_text(path, form.encoding).split("\n")
+    is_next = form.header_row == row_after_comments(lines, form)
+    return replace(form, header_row=AFTER_COMMENTS, first_row=AFTER_COMMENTS + 1) if is_next else form
+
+
+def row_after_comments(lines: Sequence[str], form: TextForm) -> int:
+    """The first line, from 1, that is neither a comment nor empty; 1 where there is none."""
+    kept = (k for k, line in enumerate(lines, 1) if line.strip() and not line.lstrip().startswith(form.comment))
+    return next(kept, 1)
 
 
 def _transposed(path: Path, lines: list[str], form: TextForm, wanted: Sequence[str] | None) -> Table:
