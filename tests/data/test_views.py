@@ -117,6 +117,15 @@ def test_holes_are_cut_or_bridged_as_the_rate_asks(tmp_path, rate_hz):
     assert not any("bridged" in said for t in parts for said in t.remarks)
 
 
+def test_steps_that_grow_are_no_holes():
+    """An encoder writes a row an edge while a wheel runs out."""
+    time = np.cumsum(0.002 * np.exp(np.linspace(0.0, 5.0, 400)))
+    assert len(holes(time)) == 0
+    assert list(holes(np.r_[time[:200], time[200:] + 2.0])) == [200]
+    even = np.arange(100) * DT
+    assert list(holes(np.delete(even, [*range(20, 30), *range(31, 45)]))) == [20, 21]
+
+
 def test_rests_are_left_out(tmp_path):
     time = np.arange(0.0, 12.0, DT)
     moving = ((time > 2.0) & (time < 5.0)) | ((time > 7.0) & (time < 10.0))

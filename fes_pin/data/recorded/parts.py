@@ -33,6 +33,9 @@ def restarts(time: np.ndarray) -> np.ndarray:
 def holes(time: np.ndarray, step_s: float | None = None) -> np.ndarray:
     """Rows before which more than `LONGEST_GAP` steps are missing, shape (k,).
 
+    Steps that grow, as of an encoder that writes a row an edge while a wheel runs out, are long, but not
+    next to their neighbours: a hole is so much longer than the shorter of these as well.
+
     Parameters
     ----------
     time
@@ -44,7 +47,8 @@ def holes(time: np.ndarray, step_s: float | None = None) -> np.ndarray:
     if not (steps > 0.0).any():
         return np.zeros(0, dtype=int)
     usual = max(float(np.median(steps[steps > 0.0])), step_s or 0.0)
-    return np.flatnonzero(steps > LONGEST_GAP * usual) + 1
+    around = np.minimum(np.r_[steps[1:2], steps[:-1]], np.r_[steps[1:], steps[-2:-1]]) if len(steps) > 1 else steps
+    return np.flatnonzero((steps > LONGEST_GAP * usual) & (steps > LONGEST_GAP * np.maximum(around, 0.0))) + 1
 
 
 def rests(time: np.ndarray, readings: Sequence[np.ndarray]) -> list[slice]:
