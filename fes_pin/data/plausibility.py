@@ -111,11 +111,12 @@ def implausible(study: Study | ToPredict) -> list[str]:
 
 
 def _rests(study: Study | ToPredict) -> Iterable[str]:
-    """How long the trials of a study stand still, where that is most of the time."""
+    """How long the driven trials of a study stand still, where that is most of the time; free motion settles."""
     if isinstance(study, ToPredict):
         return
     read = study.schema.outputs
-    measured = [t for t in study.trials if read.get(t.kind) in t]
+    driving = study.schema.driving
+    measured = [t for t in study.trials if read.get(t.kind) in t and driving(t.kind, t.columns)]
     moved = {t.name: [n for n in study.schema.motion(t.kind) if n in t] for t in measured}
     share = rest_share([(t, (read[t.kind], *moved[t.name]), _stimuli(study, t)) for t in measured])
     if share > MATTERS:
