@@ -46,7 +46,11 @@ FAULTY = {
         lambda t: t.without("effort").with_columns(effort_nm=t["effort"]),
         "effort_nm: wrong unit or none; expected effort",
     ),
-    "a column that is not read": ("muscle", lambda t: t.with_columns(emg=t["force_n"]), "emg: unknown; this rig reads"),
+    "a column that is not read": (
+        "muscle",
+        lambda t: t.with_columns(skin=t["force_n"]),
+        "skin: unknown; this rig reads",
+    ),
     "no width": ("ankle", lambda t: t.without("pulse_width_us"), "pulse_width_us: missing; this rig needs pulse_width"),
     "no stimulus": ("muscle", lambda t: t.without("pulse_width_us"), "missing; this rig needs pulse_width_us or stim"),
     "another kind": ("ankle", lambda t: replace(t, kind="moving"), "kind: expected one of motion, isometric, imposed"),
