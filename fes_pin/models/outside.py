@@ -133,7 +133,9 @@ def classes_of(module: ModuleType) -> tuple[type[Effect] | type[Rig], ...]:
     InputError
         If there is none.
     """
-    parts = [c for c in vars(module).values() if isinstance(c, type) and issubclass(c, Effect | Rig)]
+    found = [c for c in vars(module).values() if isinstance(c, type) and issubclass(c, Effect | Rig)]
+    variants = [c for c in found if "name" not in vars(c) and any(base in found for base in c.__mro__[1:])]
+    parts = [c for c in found if c not in variants]
     own = [one for one in parts if f"{one.__module__}.".startswith(f"{module.__name__}.")]
     found = [one for one in own if not one.__name__.startswith("_")]
     if not found:

@@ -114,7 +114,6 @@ def test_nothing_hidden_is_adequate(tmp_path, seed):
     [
         (lambda t: {"angle_rad": np.full(len(t), 1.7)}, "never moves"),
         (lambda t: {"angle_rad": np.degrees(t["angle_rad"])}, "is it in degrees?"),
-        (lambda t: {"pulse_width_us": np.zeros(len(t))}, "never stimulated"),
         (lambda t: {"torque_nm": np.zeros(len(t))}, "no output changes"),
     ],
 )
@@ -122,7 +121,9 @@ def test_what_cannot_be_is_one_line_and_nothing_written(tmp_path, monkeypatch, c
     good = made(tmp_path, seed=1)
     write_study(good, tmp_path / "study")
     for trial in good.trials:
-        write_trial(trial.with_columns(**spoil(trial)), tmp_path / "study" / "trials" / f"{trial.name}.csv")
+        write_trial(
+            trial.with_columns(**spoil(trial)), tmp_path / "study" / "trials" / f"{trial.name}.csv", overwrite=True
+        )
     for command in (["diagnose", tmp_path / "study", "--out", tmp_path / "answer"], ["check", tmp_path / "study"]):
         assert run(monkeypatch, *command) == 2
         told = capsys.readouterr().err.strip()

@@ -131,13 +131,17 @@ def study_of(**columns):
         ({"length_m": 1e3 * sine(TIME)}, "is it in mm"),
         ({"length_m": sine(TIME) - 0.05}, "expected the whole length"),
         ({"length_m": np.full(len(TIME), 0.05)}, "never moves"),
-        ({"pulse_width_us": np.zeros(len(TIME))}, "never stimulated"),
     ],
 )
 def test_what_cannot_be_is_refused_in_one_line(columns, words):
     with pytest.raises(InputError, match=words) as told:
         implausible(study_of(**columns))
     assert "\n" not in str(told.value)
+
+
+def test_a_muscle_without_a_stimulus_is_passive():
+    said = implausible(study_of(pulse_width_us=np.zeros(len(TIME))))
+    assert any("the muscle is passive" in words for words in said)
 
 
 def test_a_length_is_read_in_imposed_trials_only(tmp_path):
