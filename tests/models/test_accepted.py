@@ -49,7 +49,7 @@ FAULTY = {
     "a column that is not read": (
         "muscle",
         lambda t: t.with_columns(skin=t["force_n"]),
-        "skin: unknown; this rig reads",
+        "skin: unknown; ",
     ),
     "no width": ("ankle", lambda t: t.without("pulse_width_us"), "pulse_width_us: missing; this rig needs pulse_width"),
     "no stimulus": ("muscle", lambda t: t.without("pulse_width_us"), "missing; this rig needs pulse_width_us or stim"),
