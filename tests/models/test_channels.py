@@ -3,9 +3,11 @@
 import pickle
 import re
 from contextlib import nullcontext
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from models.cases import RIGS, trial
 
 import fes_pin as fp
 from fes_pin.control.control import PositionController
@@ -13,6 +15,8 @@ from fes_pin.data.by_itself import PULSES
 from fes_pin.data.channels import CHANNELS, STIMULI
 from fes_pin.data.pulses import PulseLimits, pulse_list
 from fes_pin.data.recorded.events import looking_period
+from fes_pin.models.compile.layout import make_layout
+from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.stage import by_name
 
@@ -271,3 +275,15 @@ def test_a_log_of_events_is_told_from_one_that_is_sampled(seed):
     assert looking_period(t[kept], {n: v[kept] for n, v in smooth.items()}) is None
     lost = rng.random(500) > 0.2
     assert looking_period(t[lost], {"a": noise["a"][lost]}) is None
+
+
+@pytest.mark.parametrize("rig", ["ankle", "muscle"])
+def test_a_program_without_a_curve_is_none_of_a_rig_that_has_one(rig):
+    """A program is kept by its layout: one that recruits nothing was once served to a rig with a threshold."""
+    with_curve = Model(RIGS[rig]).rig
+    bare = replace(with_curve, constants={n: v for n, v in with_curve.constants.items() if n not in with_curve.ends()})
+    for kind in with_curve.schema.outputs:
+        columns = with_curve.input_columns(trial(rig, kind, np.random.default_rng(0), 20))
+        one, other = (make_layout(Model(r), kind, columns, ()) for r in (with_curve, bare))
+        assert one != other
+        assert set(one.constants) - set(other.constants) == set(with_curve.ends())

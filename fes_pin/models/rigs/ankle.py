@@ -131,8 +131,7 @@ class Ankle(Rig):
 
     def trial_constants(self, trial: Trial) -> dict[str, float]:
         a, b = _foot_gravity(float(self.constants["foot_mass_kg"]), float(self.constants["com_distance_m"]))
-        low, high = self.ends()
-        unstated = {low: 0.0, high: 1.0, **({"load_kg": 0.0, "torque_sign": 1.0} if trial.kind == IMPOSED else {})}
+        unstated = {"load_kg": 0.0, "torque_sign": 1.0} if trial.kind == IMPOSED else {}
         known = {**unstated, **self.constants, **trial.conditions, "gravity_cos": a, "gravity_sin": b}
         return {name: float(known[name]) for name in self.constant_names(trial.kind)}
 

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from fes_pin.data.channels import CHANNELS, ENVELOPE, RATE, WIDTH, Channel, channel_of
+from fes_pin.data.channels import CHANNELS, ENVELOPE, RATE, Channel, channel_of
 from fes_pin.data.errors import InputError
 from fes_pin.data.imposed import MOTION, imposed_motion, same_motion
 from fes_pin.data.read_only import ReadOnly
@@ -193,9 +193,12 @@ class Rig(ReadOnly):
         """Return the class of an effect with sizes in the unit of this rig's stimulus: `shift_ma` for `shift_us`."""
         return in_channel(kind, self.channel)
 
-    def ends(self) -> tuple[str, str]:
-        """Names of the constants between which it recruits."""
-        return (self.channel or WIDTH).ends
+    def ends(self) -> tuple[str, ...]:
+        """Names of the constants between which it recruits; none without a known threshold.
+
+        A program is kept by its layout: what the equations read must stand there.
+        """
+        return self.channel.ends if self.channel else ()
 
     def driven_signals(self, signals: tuple[str, ...], inputs: tuple[str, ...]) -> tuple[str, ...]:
         """Return those of a muscle's signals that these inputs drive: recorded pulses have no size that recruits."""

@@ -101,9 +101,8 @@ class Muscle(Rig):
 
     def trial_constants(self, trial: Trial) -> dict[str, float]:
         period = pulse_period([trial] if "stim" in trial.columns else [])
-        low, high = self.ends()
-        known = {low: 0.0, high: 1.0, "length_m": 0.0, "pulse_period_s": period}
-        return {name: float(self.constants.get(name, value)) for name, value in known.items()}
+        known = {"pulse_period_s": period, "length_m": 0.0, **self.constants}
+        return {name: float(known[name]) for name in self.constant_names(trial.kind)}
 
     def recruited(self, trial: Trial) -> np.ndarray:
         return recruited_in(trial, self.channel, self.trial_constants(trial))
