@@ -14,12 +14,14 @@ from typing import Any
 import numpy as np
 
 from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import number_in
 from fes_pin.data.recorded.free_part import free_from
 from fes_pin.data.recorded.parts import HOLES, RESTARTS, holes, restarts
 from fes_pin.data.recorded.sniff import Proposal
 from fes_pin.data.recorded.view import FITTED, INTEGRATED
 from fes_pin.data.schema import MEANT, RigSchema
 from fes_pin.data.table import MIN_ROWS, STEP_TOLERANCE, check_times
+from fes_pin.data.units import factor_of
 
 APART = "."
 """Between the name of a source and that of its column."""
@@ -114,15 +116,18 @@ def _by_name(proposals: Sequence[Proposal], schema: RigSchema) -> list[dict[str,
     alike = len(found) == 1 or all(_is_whole(one, schema) for one in found)
     if alike or len({len(some) for some in words}) > 1:
         return []
-    for place in range(len(words[0])):
-        trials: dict[tuple[str, ...], dict[str, Path]] = defaultdict(dict)
-        for path, some in zip(paths, words, strict=True):
-            trials[(*some[:place], *some[place + 1 :])][some[place]] = path
-        sources = {tuple(sorted(files)) for files in trials.values()}
-        known = next(iter(sources))
-        if len(sources) == 1 and len(known) > 1 and all(word.isalpha() for word in known):
-            return list(trials.values())
-    return []
+    return next((trials for k in range(len(words[0])) if (trials := _apart_in(k, paths, words))), [])
+
+
+def _apart_in(place: int, paths: Sequence[Path], words: Sequence[Sequence[str]]) -> list[dict[str, Path]]:
+    """Files by trial and source, where names differ in the word at one place and each trial has the same words there."""
+    trials: dict[tuple[str, ...], dict[str, Path]] = defaultdict(dict)
+    for path, some in zip(paths, words, strict=True):
+        trials[(*some[:place], *some[place + 1 :])][some[place]] = path
+    sources = {tuple(sorted(files)) for files in trials.values()}
+    known = next(iter(sources))
+    is_apart = len(sources) == 1 and len(known) > 1 and all(word.isalpha() for word in known)
+    return [*trials.values()] if is_apart else []
 
 
 def _quantities(proposal: Proposal, of_name: Sequence[str], schema: RigSchema) -> frozenset[str]:
@@ -164,41 +169,103 @@ def _meant(source: str, one: Proposal, schema: RigSchema) -> dict[str, tuple[str
     return {c: others for c in schema.columns if c != "time_s" and source in MEANT.get(c, frozenset())}
 
 
-def view_keys(
-    files: FilesOfTrial, time: Mapping[str, np.ndarray], rate_hz: float | None, stated: Mapping[str, Any]
+@dataclass(frozen=True)
+class WantedView:
+    """What a person said of the part of a recording that a trial is.
+
+    Parameters
+    ----------
+    ends
+        Of `from` and `to` those that were said, s.
+    split
+        At what it is cut; "none" leaves it whole, None where nothing was said.
+    offsets
+        Of the clocks of sources.
+    rate_hz
+        At which all trials are resampled, Hz.
+    derived
+        Columns that are integrated, and of which.
+    is_regular
+        Whether the times of all trials are made equal steps already.
+    """
+
+    ends: Mapping[str, float]
+    split: str | None
+    offsets: Mapping[str, float | str]
+    rate_hz: float | None
+    derived: Mapping[str, str]
+    is_regular: bool
+
+
+def trial_view(
+    files: FilesOfTrial, times: Mapping[str, Mapping[str, Any]], position: str | None, wanted: WantedView
 ) -> tuple[dict[str, Any], list[str]]:
     """Keys of the `[[trial]]` of some files that say which part of them it is, and what is odd about their times.
 
     Parameters
     ----------
-    time
-        Of each source, s, shape (n,).
-    rate_hz
-        At which it will be resampled.
-    stated
-        Keys that a person gave; `split = "none"` leaves the recording whole.
+    times
+        For each source what its table says of `time_s`.
+    position
+        The column of the position of a rig that nothing drives; None of others.
 
     Returns
     -------
     (keys, sentences)
     """
-    keys: dict[str, Any] = {k: v for k, v in stated.items() if v not in ("none", {})}
-    name, said = files.path.name, list[str]()
-    main = next(iter(time.values()))
-    if not {"split", "from", "to"} & set(stated):
-        split, sentence = _split(files, main, rate_hz)
-        keys |= {"split": split} if split else {}
-        said += [f"{name}: {sentence}"] if split else []
+    seconds = {source: _seconds(one, times[source]) for source, one in files.files.items()}
+    main, name = next(iter(seconds.values())), files.path.name
+    keys, said = dict[str, Any](wanted.ends), list[str]()
+    split, sentence = (wanted.split or "", "")
+    if not wanted.ends and wanted.split is None:
+        split, sentence = _split(files, main, wanted.rate_hz)
+    keys |= {"split": split} if split not in ("", "none") else {}
+    said += [f"{name}: {sentence}"] if sentence else []
     if files.is_joined:
         said.append(f"{' and '.join(one.recording.path.name for one in files.files.values())} are one trial")
-        first, *others = time
-        apart = [n for n in others if len(time[n]) != len(main) or not np.allclose(time[n], main, atol=1e-9)]
-        offsets = {**dict.fromkeys(apart, FITTED), **stated.get("offset_s", {})}
-        if unknown := [n for n in stated.get("offset_s", {}) if n not in others]:
-            message = f"expected a source other than the first, {first}: {', '.join(others)}"
-            raise InputError(message, column=f"--offset {unknown[0]}")
+        offsets = _offsets(seconds, wanted.offsets)
         keys |= {"offset_s": offsets} if offsets else {}
+    if position is not None and not keys:
+        free, more = free_part(name, main, files.proposal.recording.columns[position])
+        keys, said = free, [*said, *more]
+    keys |= {"derive": dict(wanted.derived)} if wanted.derived else {}
+    if not wanted.is_regular and (rate_hz := _own_rate(files, times, main, keys)):
+        keys["rate"] = rate_hz
     return keys, said
+
+
+def _offsets(seconds: Mapping[str, np.ndarray], stated: Mapping[str, float | str]) -> dict[str, float | str]:
+    """Offsets of the sources whose times are not those of the first one: as stated, else fitted."""
+    (first, main), *others = seconds.items()
+    if odd := [n for n in stated if n not in dict(others)]:
+        message = f"expected a source other than the first, {first}: {', '.join(dict(others))}"
+        raise InputError(message, column=f"--offset {odd[0]}")
+    apart = [n for n, time in others if len(time) != len(main) or not np.allclose(time, main, atol=1e-9)]
+    return {**dict.fromkeys(apart, FITTED), **stated}
+
+
+def _seconds(one: Proposal, time: Mapping[str, Any]) -> np.ndarray:
+    """Times of one file, s, shape (n,); none of a column that is no numbers, which its reader refuses."""
+    if "rate_hz" in time:
+        return np.arange(len(one.recording)) / float(time["rate_hz"])
+    return _factor(time) * one.recording.columns.get(time["name"], np.zeros(0))
+
+
+def _factor(time: Mapping[str, Any]) -> float:
+    """What recorded times are multiplied by to be in s."""
+    return float(time.get("scale", 1.0)) * factor_of(time.get("unit", "s"), "time_s")
+
+
+def _own_rate(
+    files: FilesOfTrial, times: Mapping[str, Mapping[str, Any]], time: np.ndarray, view: Mapping[str, Any]
+) -> float | None:
+    """The rate of a trial whose times, those of its first file, are not equally spaced, Hz; None of one whose are."""
+    source, one = next(iter(files.files.items()))
+    time = time[(time >= view.get("from", -np.inf)) & (time <= view.get("to", np.inf))]
+    if "rate_hz" in times[source] or not len(time):
+        return None
+    half_digit = abs(_factor(times[source])) * one.recording.half_digit_of(times[source]["name"])
+    return rate_of(time, str(view.get("split", "")), half_digit)
 
 
 def _split(files: FilesOfTrial, time: np.ndarray, rate_hz: float | None) -> tuple[str, str]:
@@ -256,7 +323,5 @@ def offsets_of(said: Mapping[str, str]) -> dict[str, float | str]:
     InputError
         Anything else.
     """
-    from fes_pin.data.numbers import number_in  # noqa: PLC0415 - numbers are checked where they are read
-
     error = {name: partial(InputError, column=f"--offset {name}") for name in said}
     return {name: text if text == FITTED else number_in(text, error[name]) for name, text in said.items()}
