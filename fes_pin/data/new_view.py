@@ -120,7 +120,7 @@ def _by_name(proposals: Sequence[Proposal], schema: RigSchema) -> list[dict[str,
 
 
 def _apart_in(place: int, paths: Sequence[Path], words: Sequence[Sequence[str]]) -> list[dict[str, Path]]:
-    """Files by trial and source, where names differ in the word at one place and each trial has the same words there."""
+    """Files by trial and source, where names differ in one word, at a place, that each trial has in the same ways."""
     trials: dict[tuple[str, ...], dict[str, Path]] = defaultdict(dict)
     for path, some in zip(paths, words, strict=True):
         trials[(*some[:place], *some[place + 1 :])][some[place]] = path

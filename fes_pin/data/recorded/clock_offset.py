@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 
+from fes_pin.data.recorded.regular import MOST_PER_SAMPLE
 from fes_pin.data.table import Table
 
 MOST_S = 0.5
@@ -60,12 +61,13 @@ def _best_lag(moves: Table, motion: str, pushes: Table) -> tuple[float, float, f
     reach = math.ceil(most / dt)
     begin = max(moves.time[0], pushes.time[0] + reach * dt)  # where the effort was recorded at every offset
     count = int((min(moves.time[-1], pushes.time[-1] - reach * dt) - begin) / dt)
-    band = _band_hz(moves.columns[motion], dt)
+    known, effort = (v / max(float(np.abs(v).max()), 1e-300) for v in (moves.columns[motion], pushes.columns["effort"]))
+    band = _band_hz(known, dt)
     edge = math.ceil(1.0 / (band * dt))  # over which a filter rings
-    if count <= 3 * edge:
+    if not 3 * edge < count <= MOST_PER_SAMPLE * len(moves):  # too short, or mostly a hole
         return 0.0, 1.0, 1.0
-    known = np.interp(begin + np.arange(count) * dt, moves.time, moves.columns[motion])
-    effort = np.interp(begin + np.arange(-reach, count + reach) * dt, pushes.time, pushes.columns["effort"])
+    known = np.interp(begin + np.arange(count) * dt, moves.time, known)
+    effort = np.interp(begin + np.arange(-reach, count + reach) * dt, pushes.time, effort)
     columns = _columns(low_pass(known[:, None], dt, band)[:, 0], motion, dt)[edge : count - edge]
     smooth = low_pass(effort[:, None], dt, band)[edge : len(effort) - edge, 0]
     basis = np.linalg.qr(columns / np.maximum(np.abs(columns).max(axis=0), 1e-300))[0]
