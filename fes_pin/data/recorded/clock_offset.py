@@ -21,6 +21,9 @@ EXPLAINED = 0.5
 """Least share of the effort that the motion explains at the best offset; else the recordings do not show it."""
 SHARPER = 0.9
 """Largest ratio of the unexplained share at the best offset to its mean over all: else no offset is the best."""
+OF_A_PERIOD, FINE = 0.1, 41
+"""Part of a period of the band between rows that are compared, and between offsets that are tried first; number of
+offsets that are tried about the best of these."""
 OF_POWER, TIMES = 0.99, 3.0
 """The band reaches to so many times the frequency below which this share of the motion's power lies."""
 
@@ -66,19 +69,29 @@ def _best_lag(moves: Table, motion: str, pushes: Table) -> tuple[float, float, f
     edge = math.ceil(1.0 / (band * dt))  # over which a filter rings
     if not 3 * edge < count <= MOST_PER_SAMPLE * len(moves):  # too short, or mostly a hole
         return 0.0, 1.0, 1.0
-    known = np.interp(begin + np.arange(count) * dt, moves.time, known)
-    effort = np.interp(begin + np.arange(-reach, count + reach) * dt, pushes.time, effort)
-    columns = _columns(low_pass(known[:, None], dt, band)[:, 0], motion, dt)[edge : count - edge]
-    smooth = low_pass(effort[:, None], dt, band)[edge : len(effort) - edge, 0]
-    basis = np.linalg.qr(columns / np.maximum(np.abs(columns).max(axis=0), 1e-300))[0]
-    shifted = np.lib.stride_tricks.sliding_window_view(smooth, len(columns))  # row k: k - reach samples later
-    power = np.sum((shifted - shifted.mean(axis=1, keepdims=True)) ** 2, axis=1)
-    left = (np.sum(shifted**2, axis=1) - np.sum((shifted @ basis) ** 2, axis=1)) / np.maximum(power, 1e-300)
-    k = int(np.clip(np.argmin(left), 1, len(left) - 2))
-    before, at, after = left[k - 1 : k + 2]
-    bend = before - 2.0 * at + after
-    part = 0.5 * (before - after) / bend if bend > 0.0 else 0.0
-    return -(k - reach + float(np.clip(part, -0.5, 0.5))) * dt, float(max(at, 0.0)), float(left.mean())
+    at = begin + np.arange(count) * dt
+    columns = _columns(low_pass(np.interp(at, moves.time, known)[:, None], dt, band)[:, 0], motion, dt)
+    around = begin + np.arange(-reach, count + reach) * dt
+    smooth = low_pass(np.interp(around, pushes.time, effort)[:, None], dt, band)[:, 0]
+    rows = slice(edge, count - edge, max(1, round(OF_A_PERIOD / (band * dt))))
+    basis = np.linalg.qr(columns[rows] / np.maximum(np.abs(columns[rows]).max(axis=0), 1e-300))[0]
+
+    def unexplained(later_s: np.ndarray) -> np.ndarray:
+        """The share of an effort so much later that the motion does not explain, shape (lags,)."""
+        efforts = np.array([np.interp(at[rows] + lag, around, smooth) for lag in later_s])
+        power = np.sum((efforts - efforts.mean(axis=1, keepdims=True)) ** 2, axis=1)
+        return (np.sum(efforts**2, axis=1) - np.sum((efforts @ basis) ** 2, axis=1)) / np.maximum(power, 1e-300)
+
+    step = OF_A_PERIOD / band
+    lags = np.linspace(-most, most, 2 * math.ceil(most / step) + 1)
+    shares = unexplained(lags)
+    fine = lags[int(np.argmin(shares))] + np.linspace(-step, step, FINE)
+    found = unexplained(fine)
+    k = int(np.clip(np.argmin(found), 1, FINE - 2))
+    before, least, after = found[k - 1 : k + 2]
+    bend = before - 2.0 * least + after
+    part = float(np.clip(0.5 * (before - after) / bend, -0.5, 0.5)) if bend > 0.0 else 0.0
+    return -float(fine[k] + part * (fine[1] - fine[0])), float(max(least, 0.0)), float(shares.mean())
 
 
 def _columns(known: np.ndarray, motion: str, dt: float) -> np.ndarray:

@@ -61,13 +61,15 @@ def rests(time: np.ndarray, readings: Sequence[np.ndarray]) -> list[slice]:
     readings
         Each of shape (n,).
     """
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d  # noqa: PLC0415 - for recordings that are split at rests
+
     length = max(2, round(REST_S / float(np.median(np.diff(time)))))
     if length >= len(time):
         return []
     still = np.ones(len(time) - length + 1, dtype=bool)
     for values in readings:
-        windows = np.lib.stride_tricks.sliding_window_view(values, length)
-        still &= np.ptp(windows, axis=1) <= STILL * np.ptp(values)
+        most, least = (f(values, length, origin=-(length // 2)) for f in (maximum_filter1d, minimum_filter1d))
+        still &= (most - least)[: len(still)] <= STILL * np.ptp(values)
     inside = np.convolve(still, np.ones(length), "full") > 0.5
     edges = np.flatnonzero(np.diff(np.r_[False, inside, False].astype(int)))
     return [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
