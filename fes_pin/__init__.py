@@ -47,8 +47,8 @@ if TYPE_CHECKING:  # every public name with its module: it is imported from ther
     from fes_pin.data.study import read_study as read_study
     from fes_pin.data.study import write_study as write_study
     from fes_pin.data.trial import Trial as Trial
-    from fes_pin.data.trial import read_trial as read_trial
-    from fes_pin.data.trial import write_trial as write_trial
+    from fes_pin.data.trial_files import read_trial as read_trial
+    from fes_pin.data.trial_files import write_trial as write_trial
     from fes_pin.diagnosis.result import Diagnosis as Diagnosis
     from fes_pin.identify.fit import Fit as Fit
     from fes_pin.models import effects as effects

@@ -72,7 +72,7 @@ def _stimulated(path: Path) -> Trial:
     from fes_pin.data.by_itself import PULSES
     from fes_pin.data.recorded.sniff import read_csv_or_hint
     from fes_pin.data.schema import known_rigs, schema_of
-    from fes_pin.data.trial import read_trial
+    from fes_pin.data.trial_files import read_trial
 
     names = set(read_csv_or_hint(path).names)
     kinds = [(one, kind) for one in known_rigs().values() for kind in one.outputs]

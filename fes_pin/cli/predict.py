@@ -134,7 +134,7 @@ def _trial(
 ) -> Trial:
     """The trial to predict; what is wrong with it names the file or the option that was given."""
     from fes_pin.data.study import read_columns
-    from fes_pin.data.trial import read_trial
+    from fes_pin.data.trial_files import read_trial
 
     said = pairs("--set", setting)
     kind = said.pop("kind", None)

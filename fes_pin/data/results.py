@@ -15,7 +15,8 @@ from fes_pin.data.provenance import Provenance
 from fes_pin.data.read_only import ReadOnly, as_dicts
 from fes_pin.data.show import DataFrame, by_columns, frame, table_html, table_text
 from fes_pin.data.study import Study
-from fes_pin.data.trial import Trial, trial_csv
+from fes_pin.data.trial import Trial
+from fes_pin.data.trial_files import trial_csv
 from fes_pin.infer.keys import Key
 from fes_pin.infer.result import ON, STOPPED, Cause, Explained, Named, Remainder, shown
 from fes_pin.infer.text import listed, percent

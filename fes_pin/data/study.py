@@ -39,16 +39,8 @@ from fes_pin.data.stimulus import with_one_stimulus
 from fes_pin.data.study_text import HORIZON, StudyTables, check_files, checked_horizon
 from fes_pin.data.table import format_csv
 from fes_pin.data.toml import Document, document_of, read_toml
-from fes_pin.data.trial import (
-    Recordings,
-    Trial,
-    check_trial,
-    derived_trial,
-    read_body_trial,
-    read_view,
-    trial_csv,
-    walk_recordings,
-)
+from fes_pin.data.trial import Trial, check_trial, derived_trial
+from fes_pin.data.trial_files import Recordings, read_body_trial, read_view, trial_csv, walk_recordings
 from fes_pin.data.turns import with_whole_turns
 from fes_pin.data.walk_conventions import STANDARD
 

@@ -15,7 +15,8 @@ from fes_pin.body.joints import SIDES
 from fes_pin.data.errors import InputError, errors_of
 from fes_pin.data.smooth import CUTOFF_HZ
 from fes_pin.data.study import Study
-from fes_pin.data.trial import Trial, walk_recordings
+from fes_pin.data.trial import Trial
+from fes_pin.data.trial_files import walk_recordings
 from fes_pin.data.walk_conventions import MOMENTS_ON
 from fes_pin.walk.motion import Motion, Session, has_rates, heading_of, motion_of
 from fes_pin.walk.walk_trial import LOADED_N, Plates, WalkTrial, plates_of, stretches

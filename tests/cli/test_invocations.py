@@ -23,7 +23,7 @@ from fes_pin.data.files import check_folder
 from fes_pin.data.motion import OPTIONAL, REQUIRED
 from fes_pin.data.outputs import RECORD
 from fes_pin.data.study import read_study, write_study
-from fes_pin.data.trial import write_trial
+from fes_pin.data.trial_files import write_trial
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.store import save_model
 from fes_pin.view import report

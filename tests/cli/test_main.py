@@ -19,7 +19,7 @@ from fes_pin.cli import main
 from fes_pin.data.outputs import Outputs
 from fes_pin.data.results import NEXT_FILE
 from fes_pin.data.study import read_study, write_study
-from fes_pin.data.trial import read_trial, write_trial
+from fes_pin.data.trial_files import read_trial, write_trial
 from fes_pin.diagnosis.diagnosis import diagnose_joint
 from fes_pin.identify.stored import load_random
 from fes_pin.infer.noise import estimate_noise

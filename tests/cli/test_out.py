@@ -11,7 +11,7 @@ from data import studies
 from diagnosis.hidden import study_of
 
 from fes_pin.data.study import read_study, write_study
-from fes_pin.data.trial import read_trial
+from fes_pin.data.trial_files import read_trial
 from fes_pin.models.catalogue import load_library
 from fes_pin.models.store import load_model, save_model
 

@@ -24,7 +24,7 @@ from fes_pin.data.errors import InputError
 from fes_pin.data.files import read_bytes, write_files, write_text
 from fes_pin.data.motion import OPTIONAL, REQUIRED
 from fes_pin.data.outputs import RECORD, Outputs
-from fes_pin.data.trial import write_trial
+from fes_pin.data.trial_files import write_trial
 from fes_pin.diagnosis.diagnosis import diagnose_joint
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.store import save_model

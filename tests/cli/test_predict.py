@@ -13,7 +13,7 @@ from diagnosis.hidden import slide, study_of
 
 from fes_pin.data.study import read_study, write_study
 from fes_pin.data.table import table_bytes
-from fes_pin.data.trial import write_trial
+from fes_pin.data.trial_files import write_trial
 from fes_pin.identify.replay import squares_of
 from fes_pin.infer.held_out import percent_of_spread
 from fes_pin.infer.text import percent

@@ -16,7 +16,7 @@ from fes_pin.data.motion import (
     read_ground_reaction,
 )
 from fes_pin.data.study import read_study, write_study
-from fes_pin.data.trial import read_trial
+from fes_pin.data.trial_files import read_trial
 
 ROWS = 7
 TOML = """[study]

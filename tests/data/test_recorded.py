@@ -14,7 +14,7 @@ from fes_pin.data.recorded.text import TextForm, read_text_recording
 from fes_pin.data.schema import known_rigs
 from fes_pin.data.study import read_columns, read_study
 from fes_pin.data.templates import pendulum
-from fes_pin.data.trial import read_trial
+from fes_pin.data.trial_files import read_trial
 from fes_pin.data.units import UNITS, factor_of, split_header
 
 TIME = np.arange(60) * 0.01

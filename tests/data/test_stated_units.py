@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from data.test_forms import drawn, study_of, written
+from data.test_laboratory_forms import drawn, study_of, written
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.motion import read_coordinates, read_motion

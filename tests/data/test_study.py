@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from fes_pin.data.errors import InputError
 from fes_pin.data.outputs import RECORD
 from fes_pin.data.study import Study, read_study, write_study
-from fes_pin.data.trial import Trial, read_trial, write_trial
+from fes_pin.data.trial import Trial
+from fes_pin.data.trial_files import read_trial, write_trial
 from fes_pin.models.rigs.rigid import load_urdf
 
 numbers = st.floats(-1e6, 1e6)

@@ -13,7 +13,7 @@ from oracle.studies import ankle_rig
 
 from fes_pin.cli import main
 from fes_pin.data.study import write_study
-from fes_pin.data.trial import read_trial, trial_csv
+from fes_pin.data.trial_files import read_trial, trial_csv
 from fes_pin.diagnosis.experiment import ROOM, candidates, discriminations, near_measured, next_experiment
 from fes_pin.identify.problem import measured_columns
 from fes_pin.models.effects import effect_named

@@ -11,7 +11,8 @@ from fes_pin.cli.main import predict
 from fes_pin.data.log import Log, advanced
 from fes_pin.data.recorded.text import read_csv
 from fes_pin.data.study import read_study
-from fes_pin.data.trial import Trial, trial_csv
+from fes_pin.data.trial import Trial
+from fes_pin.data.trial_files import trial_csv
 from fes_pin.diagnosis.diagnosis import diagnose_joint
 from fes_pin.identify.ahead import predict_ahead
 from fes_pin.identify.effort_timing import lateness_of

@@ -64,7 +64,7 @@ def test_a_file_written_elsewhere_is_seen(tmp_path):
     scratch = tmp_path / "scratch"
     scratch.mkdir()
     study = small_study(np.random.default_rng(0), "muscle")
-    from fes_pin.data.trial import write_trial
+    from fes_pin.data.trial_files import write_trial
     from fes_pin.models.store import save_model
 
     save_model(nominal_model(study), tmp_path / "model.toml")

@@ -13,7 +13,8 @@ from scipy.integrate import solve_ivp
 
 from fes_pin.cli import main
 from fes_pin.data.study import read_study, write_study
-from fes_pin.data.trial import Trial, read_trial, write_trial
+from fes_pin.data.trial import Trial
+from fes_pin.data.trial_files import read_trial, write_trial
 from fes_pin.diagnosis.diagnosis import diagnose_joint
 from fes_pin.models.effects import CoulombFriction
 from fes_pin.models.model import Model

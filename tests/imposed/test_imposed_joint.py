@@ -10,7 +10,8 @@ from imposed_rigs.motion import drawn
 
 from fes_pin.data.imposed import imposed_motion
 from fes_pin.data.study import read_study, write_study
-from fes_pin.data.trial import Trial, read_trial, write_trial
+from fes_pin.data.trial import Trial
+from fes_pin.data.trial_files import read_trial, write_trial
 from fes_pin.diagnosis import logged
 from fes_pin.diagnosis.diagnosis import diagnose_joint
 from fes_pin.identify.likelihood import LikelihoodProblem

@@ -145,7 +145,7 @@ def test_a_muscle_without_a_stimulus_is_passive():
 
 
 def test_a_length_is_read_in_imposed_trials_only(tmp_path):
-    from fes_pin.data.trial import read_trial
+    from fes_pin.data.trial_files import read_trial
 
     (tmp_path / "a.csv").write_text("time_s,stim,length_m,force_n\n0,1,0.05,0\n0.1,0,0.05,1\n0.2,0,0.05,1\n")
     with pytest.raises(InputError, match="read in trials of kind imposed"):
