@@ -154,7 +154,7 @@ def _likely(rows: list[tuple[int, list[bool]]], form: TextForm) -> tuple[float, 
 
 
 def _is_number(cell: str, number: re.Pattern[str]) -> bool:
-    return number.match(cell) is not None or (":" in cell and clock_seconds(cell) is not None)
+    return number.match(cell) is not None or clock_seconds(cell) is not None
 
 
 def read_csv_or_hint(path: str | Path) -> Table:
