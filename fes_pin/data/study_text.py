@@ -188,22 +188,25 @@ def columns_text(
     """
     used = {source["name"] for source in sources.values() if "name" in source}
     ignored = [name for name in names if name not in used]
-    as_named = all(source == {"name": column} for column, source in sources.items())
-    plain = is_plain and where == "columns" and as_named and tuple(names[:1]) == ("time_s",)
-    if plain and form == TextForm() and not ignored and not any(options.values()):
+    about = _about_files(form or TextForm(), options)
+    as_named = all(source == {"name": column} for column, source in sources.items()) and names[0] == "time_s"
+    if is_plain and where == "columns" and as_named and form is not None and not about and not ignored:
         return []
-    out = ["", f"[{where}]  # the rig's columns, as the recordings call them, and their units there"]
-    out += [f"{column} = {inline_table(source)}" for column, source in sources.items()]
-    out += [f"ignored = [{', '.join(map(quoted, ignored))}]"] if ignored else []
-    about: dict[str, Any] = {k: v for k, v in options.items() if v is not None}
-    form = form or TextForm()
+    values = {**sources, **({"ignored": ignored} if ignored else {})}
+    out = toml_table(where, values, "the rig's columns, as the recordings call them, and their units there")
+    return out + toml_table(f"{where}.file", about, "how the recordings are written")
+
+
+def _about_files(form: TextForm, options: Mapping[str, Any]) -> dict[str, Any]:
+    """What the table `file` says: the options that are set, and what is not as in a plain form."""
+    about = {k: v for k, v in options.items() if v is not None}
     about |= {k: v for k, v in asdict(form).items() if v != getattr(TextForm(), k)}
     if form.first_row != form.header_row + 1:
         about["first_row"] = form.first_row
     if form.header_row == AFTER_COMMENTS:
         about |= {"header_row": AFTER}
         about.pop("first_row", None)
-    return out + toml_table(f"{where}.file", about, "how the recordings are written")
+    return about
 
 
 def source_from_option(column: str, option: str, names: Sequence[str]) -> dict[str, Any]:

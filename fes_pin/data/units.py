@@ -6,7 +6,7 @@ nanometre.
 """
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
@@ -203,17 +203,18 @@ def split_header(header: str) -> tuple[str, str]:
     found = _BRACKETED.match(text)
     if found and found["unit"]:
         return found["name"].strip(), found["unit"]
-    for separator in ("/", "_", " ", "-", "."):
-        name, at, unit = text.rpartition(separator)
-        if separator in "/_" and at and separator in name and unit.lower() in ("s",):  # rad_s, m/s: per second
+    return next(((name.strip(), unit) for name, unit in _apart(text) if name and _ends_a_name(unit)), (text, ""))
+
+
+def _apart(text: str) -> Iterator[tuple[str, str]]:
+    """Ways to part a text into a name and what may be a unit at its end; the name is "" where there is none."""
+    for separator in "/_ -.":
+        name, _, unit = text.rpartition(separator)
+        if separator in "/_" and unit in ("s", "S"):  # rad_s, m/s: per second
             before, _, per = name.rpartition(separator)
-            if before and known_unit(f"{per}/{unit}", tuple(UNITS)):
-                return before, f"{per}/{unit}"
-        if at and name and _ends_a_name(unit):
-            return name.strip(), unit
-    if len(text) > SPELT_OUT and _ends_a_name(text):  # Microseconds
-        return text, text
-    camel = re.match(r"^(.*[a-z])([A-Z][A-Za-z]+)$", text)  # CurrentKG, angleDeg
-    if camel and _ends_a_name(camel[2]):
-        return camel[1], camel[2]
-    return text, ""
+            yield before, f"{per}/{unit}"
+        yield name, unit
+    if len(text) > SPELT_OUT:  # Microseconds
+        yield text, text
+    if camel := re.match(r"^(.*[a-z])([A-Z][A-Za-z]+)$", text):  # CurrentKG, angleDeg
+        yield camel[1], camel[2]

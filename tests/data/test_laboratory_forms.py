@@ -8,7 +8,7 @@ import pytest
 from fes_pin.data.errors import InputError, listed
 from fes_pin.data.new_study import new_study
 from fes_pin.data.recorded.formats import read_recording
-from fes_pin.data.recorded.sniff import propose, sniff, sniffed
+from fes_pin.data.recorded.sniff import propose, sniffed
 from fes_pin.data.schema import known_rigs
 from fes_pin.data.study import read_study
 from fes_pin.data.templates import pendulum
@@ -78,7 +78,7 @@ def test_a_header_that_a_script_wrote_as_a_list_has_its_names(tmp_path, how, del
 )
 def test_brackets_behind_names_are_no_list(tmp_path, header):
     path = written(tmp_path / "a.csv", header, values=drawn(1)[1])
-    assert read_recording(path, sniff(path)[0]).names == tuple(header.split(",")) and sniff(path)[0].names == ()
+    assert read_recording(path, sniffed(path)[0]).names == tuple(header.split(",")) and sniffed(path)[0].names == ()
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -86,7 +86,7 @@ def test_brackets_behind_names_are_no_list(tmp_path, header):
 def test_names_with_another_delimiter_than_the_numbers(tmp_path, between, seed):
     names, values = drawn(seed, 3)
     path = written(tmp_path / "a.txt", between.join(names), values=values, delimiter=" ")
-    assert read_recording(path, sniff(path)[0]).names == tuple(names)
+    assert read_recording(path, sniffed(path)[0]).names == tuple(names)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -215,8 +215,8 @@ NO_UNITS = {  # the row above, the row of the names
 def test_two_rows_of_names_are_no_row_of_units(tmp_path, case):
     above, names = NO_UNITS[case]
     path = written(tmp_path / "a.csv", ",".join(above), ",".join(names), values=drawn(3, 4)[1])
-    form, units = sniff(path)
-    assert read_recording(path, form).names == tuple(names) and units == {}
+    form, header = sniffed(path)
+    assert read_recording(path, form).names == tuple(names) and header.units == {}
 
 
 def test_a_unit_below_the_time_and_names_below_the_channels(tmp_path):
@@ -282,7 +282,7 @@ def test_names_in_lines_with_a_key(tmp_path):
     form, header = sniffed(written(tmp_path / "c.txt", *lab, values=drawn(0, 3)[1], delimiter="\t"))
     assert form.names == ("Time", "Force", "EMG")
     plain = written(tmp_path / "d.csv", "Channel,Force", values=drawn(0, 2)[1])
-    assert sniff(plain)[0].names == () and read_recording(plain, sniff(plain)[0]).names == ("Channel", "Force")
+    assert sniffed(plain)[0].names == () and read_recording(plain, sniffed(plain)[0]).names == ("Channel", "Force")
 
 
 START_OF_CLOCK = datetime(2026, 2, 2, 23, 59, 59, 500000, tzinfo=UTC)
@@ -329,9 +329,9 @@ def test_a_sample_that_is_no_number_is_no_header(tmp_path, rows):
     path = written(tmp_path / "a.csv", "time_s,position", *bad, values=drawn(0, 2)[1])
     with pytest.raises(InputError, match="--column position="):
         study_of(tmp_path, path)
-    assert sniff(path)[0].first_row == 2
+    assert sniffed(path)[0].first_row == 2
     keyed = written(tmp_path / "b.csv", "time_s,position", "Interval,0.01", values=drawn(0, 2)[1])
-    assert sniff(keyed)[0].first_row == 3 and read_recording(keyed, sniff(keyed)[0]).names == ("time_s", "position")
+    assert sniffed(keyed)[0].first_row == 3 and read_recording(keyed, sniffed(keyed)[0]).names == ("time_s", "position")
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -9,7 +9,7 @@ import pytest
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.recorded.formats import UNREADABLE, read_recording
-from fes_pin.data.recorded.sniff import sniff
+from fes_pin.data.recorded.sniff import sniffed
 from fes_pin.data.recorded.text import TextForm, read_text_recording
 from fes_pin.data.schema import known_rigs
 from fes_pin.data.study import read_columns, read_study
@@ -55,9 +55,9 @@ def test_a_form_is_recognized_and_read(tmp_path, case):
     how, form = FORMS[case]
     path = tmp_path / "a.csv"
     path.write_bytes(text(**how).encode())
-    found, units = sniff(path)
+    found, header = sniffed(path)
     assert found == form
-    assert units == ({0: "ms", 1: "deg", 2: "Nm", 3: how["units"][3].strip("[]")} if "units" in how else {})
+    assert header.units == ({0: "ms", 1: "deg", 2: "Nm", 3: how["units"][3].strip("[]")} if "units" in how else {})
     read = read_text_recording(path, found, ("t_ms", "Angle", "Torque"))
     assert read.names == ("t_ms", "Angle", "Torque", "state")
     assert np.allclose(read.columns["Angle"], ANGLE, atol=1e-6)
@@ -69,14 +69,14 @@ def test_a_form_is_recognized_and_read(tmp_path, case):
 def test_other_encodings(tmp_path, encoding):
     path = tmp_path / "a.csv"
     path.write_bytes(text().replace("Angle", "Winkel_°").encode(encoding))
-    form, _ = sniff(path)
+    form, _ = sniffed(path)
     assert read_text_recording(path, form, ("t_ms",)).names[1] == "Winkel_°"
 
 
 def test_without_a_header_columns_are_counted(tmp_path):
     path = tmp_path / "a.txt"
     path.write_text("\n".join(f"{t:.3f} {a:.5f}" for t, a in zip(TIME, ANGLE, strict=True)))
-    form, _ = sniff(path)
+    form, _ = sniffed(path)
     assert form.header_row == 0
     assert np.allclose(read_text_recording(path, form).columns["column2"], ANGLE, atol=1e-5)
 

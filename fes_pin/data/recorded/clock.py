@@ -30,6 +30,8 @@ def clock_seconds(cell: str) -> tuple[float, str] | None:
     seconds, and which of the two it is in words
         A date whose day and month cannot be told apart counts by its time of day.
     """
+    if ":" not in cell:
+        return None
     if dated := _DATED.match(cell):
         zone = (dated["zone"] or "Z").replace("Z", "+00:00")
         whole, _, part = dated["time"].replace(",", ".").partition(".")

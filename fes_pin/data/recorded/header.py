@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from fes_pin.data.recorded.text import TextForm, cells_of
@@ -30,7 +30,7 @@ class Header:
     names
         Of the columns where the line, read as cells, does not have them so.
     units
-        By place of the column, as the file states them.
+        By place of the column, where the file states them, without brackets.
     rate_hz
         Of the samples, where the file states it.
     said
@@ -64,39 +64,39 @@ def header_of(lines: Sequence[str], form: TextForm, numbers: Sequence[Sequence[s
 
 def _from_rows(lines: Sequence[str], form: TextForm, columns: int, keyed: set[int]) -> Header:
     """Names in the nearest line that has as many cells, with the units of a line below or above it."""
-    rows: list[tuple[int, list[str]]] = []
-    nearest = max((place for place, line in enumerate(lines) if line.strip()), default=0)
-    for place in range(len(lines) - 1, -1, -1):
-        cells = [] if place in keyed else names_in(lines[place], form, columns, is_nearest=place == nearest)
-        if cells and any(re.search(r"[^\W\d_]", cell) for cell in cells):
-            rows.append((place, cells))
-        elif rows and lines[place].strip():
-            break  # of what stands above a line of another kind nothing belongs to these columns
-        if len(rows) == 2:
-            break
+    rows = _wordy(lines, form, columns, keyed)
     if not rows:
         return Header(said=_too_few(lines, form, columns, keyed))
-    (place, below), (higher, above) = rows[0], rows[1] if len(rows) > 1 else (rows[0][0], [])
-    if above and are_units(below, above) and not are_units(above):
-        return _named(lines, form, higher, above, {k: cell.strip("[](){} ") for k, cell in enumerate(below)})
-    if above and are_units(above, below) and not are_units(below):
-        return _named(lines, form, place, below, {k: cell.strip("[](){} ") for k, cell in enumerate(above)})
-    mixed = [k for k, cell in enumerate(below) if above and is_unit_of(bare_unit(cell), above[k])]
-    if mixed and len(mixed) < len(below):  # a unit below the name of the time, names below the numbers of channels
-        names = [above[k] if k in mixed else cell for k, cell in enumerate(below)]
-        return _named(lines, form, place, names, {k: bare_unit(below[k]) for k in mixed})
-    return _named(lines, form, place, below, {})
-
-
-def _named(lines: Sequence[str], form: TextForm, place: int, names: list[str], units: Mapping[int, str]) -> Header:
-    """The header in a line; its names are stated where its cells are not these."""
+    place, names, units = (*rows[0], {}) if len(rows) == 1 else _of_two(*rows)
     plain = cells_in(lines[place], form)
     plain = (*plain, *[""] * (len(names) - len(plain)))
     return Header(place + 1, () if plain == tuple(names) else tuple(names), units)
 
 
-def _is_unit(cell: str) -> bool:
-    return bool(cell) and known_unit(bare_unit(cell), tuple(UNITS)) is not None
+def _wordy(lines: Sequence[str], form: TextForm, columns: int, keyed: set[int]) -> list[tuple[int, list[str]]]:
+    """Places and cells of the nearest line of words with a cell for each column, and of one that stands next above."""
+    rows: list[tuple[int, list[str]]] = []
+    filled = [place for place, line in enumerate(lines) if line.strip()]
+    for place in reversed(filled):
+        cells = [] if place in keyed else _names_in(lines[place], form, columns, is_nearest=place == filled[-1])
+        if any(re.search(r"[^\W\d_]", cell) for cell in cells):
+            rows.append((place, cells))
+        elif rows:
+            break  # of what stands above a line of another kind nothing belongs to these columns
+    return rows[:2]
+
+
+def _of_two(nearest: tuple[int, list[str]], higher: tuple[int, list[str]]) -> tuple[int, list[str], dict[int, str]]:
+    """Of two lines the place of the one that has the names; these; and by place of the column what units they state."""
+    for (place, names), (_, units) in ((higher, nearest), (nearest, higher)):
+        if are_units(units, names) and not are_units(names):
+            return place, names, {k: unit for k, cell in enumerate(units) if (unit := bare_unit(cell))}
+    (place, below), (_, above) = nearest, higher
+    mixed = {k: unit for k, cell in enumerate(below) if is_unit_of(unit := bare_unit(cell), above[k])}
+    if len(mixed) == len(below):
+        return place, below, {}
+    # a unit below the name of the time, names below the numbers of channels
+    return place, [above[k] if k in mixed else cell for k, cell in enumerate(below)], mixed
 
 
 def cells_in(line: str, form: TextForm) -> tuple[str, ...]:
@@ -104,13 +104,10 @@ def cells_in(line: str, form: TextForm) -> tuple[str, ...]:
     return tuple(cells_of(line.lstrip().removeprefix(form.comment), form))
 
 
-def names_in(line: str, form: TextForm, columns: int, is_nearest: bool = False) -> list[str]:
+def _names_in(line: str, form: TextForm, columns: int, is_nearest: bool) -> list[str]:
     """The names of this many columns that a line holds, in the file's cells or as a script writes a list; or none.
 
-    Parameters
-    ----------
-    is_nearest
-        Whether it stands next to the numbers: it may then have another delimiter than they.
+    The line next to the numbers may have another delimiter than they.
     """
     for names in ways(line, form, is_nearest):
         is_short = len(names) == columns - 1 and (line.rstrip(" \r").endswith(form.delimiter) or are_units(names))
@@ -123,27 +120,29 @@ def names_in(line: str, form: TextForm, columns: int, is_nearest: bool = False) 
 def _is_list(line: str, form: TextForm) -> bool:
     """True of a line that holds several names, and not one with its unit: `Angle, deg`."""
     others = [names for names in ways(line, form, True) if len(names) > 1]
-    return any(len(names) > 2 or not _is_unit(names[1]) for names in others)
+    return any(len(names) > 2 or known_unit(bare_unit(names[1]), tuple(UNITS)) is None for names in others)
 
 
-def ways(line: str, form: TextForm, others: bool) -> Iterator[list[str]]:
+def ways(line: str, form: TextForm, others: bool) -> list[list[str]]:
     """Ways to read names in a line: a list of a script, the file's cells, and with `others` other delimiters too."""
     text = line.strip().removeprefix(form.comment).strip()
     if not text:
-        return
-    if listed := re.match(r"^(?:\w+\s*=\s*)?[\[(](.*)[\])]$", text):
-        inner = listed[1]
-        quoted = re.findall(r"'([^']*)'|\"([^\"]*)\"", inner) if inner.strip()[:1] in ("'", '"') else []
-        if quoted or ("," in inner and not re.search(r"[\[\]()]", inner)):  # `[s],[deg]` is a row of units
-            yield [one or other for one, other in quoted] if quoted else [n.strip() for n in inner.split(",")]
-    if form.delimiter != " ":
-        yield list(cells_in(line, form))
-    if others:
-        for separator in (",", ";", "\t"):
-            if separator != form.delimiter and separator in text:
-                yield [n.strip(" \"'") for n in text.rstrip(f"{separator} ").split(separator)]
-    if form.delimiter == " ":
-        yield list(cells_in(line, form))
+        return []
+    separators = [s for s in (",", ";", "\t") if s != form.delimiter and s in text] if others else []
+    parted = [[n.strip(" \"'") for n in text.rstrip(f"{s} ").split(s)] for s in separators]
+    own = [list(cells_in(line, form))]
+    return _script_list(text) + (parted + own if form.delimiter == " " else own + parted)
+
+
+def _script_list(text: str) -> list[list[str]]:
+    """The names of a list as a script writes it, `names = ['t', 'F']`; none of a row of units, `[s],[deg]`."""
+    found = re.match(r"^(?:\w+\s*=\s*)?[\[(](.*)[\])]$", text)
+    if found is None:
+        return []
+    inner = found[1].strip()
+    if inner[:1] in ("'", '"') and (quoted := re.findall(r"(['\"])(.*?)\1", inner)):
+        return [[name for _, name in quoted]]
+    return [[n.strip() for n in inner.split(",")]] if "," in inner and not re.search(r"[\[\]()]", inner) else []
 
 
 def _too_few(lines: Sequence[str], form: TextForm, columns: int, keyed: set[int]) -> tuple[str, ...]:
@@ -218,7 +217,8 @@ def _from_keys(
     ahead = len(numbers[0]) - len(names)
     if ahead not in (0, 1):
         return None
-    stated = {k + ahead: unit for k, unit in enumerate(rows.get("units", (0, []))[1]) if unit and k < len(names)}
+    units = [bare_unit(cell) for cell in rows.get("units", (0, []))[1][: len(names)]]
+    stated = {k: unit for k, unit in enumerate(units, ahead) if unit}
     if ahead and (unit := _counts_in(numbers, rate)):
         return Header(place + 1, ("Time", *names), {0: unit, **stated})
     return Header(place + 1, (*[""] * ahead, *names), stated)

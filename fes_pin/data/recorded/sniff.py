@@ -16,11 +16,11 @@ from fes_pin.data.errors import InputError
 from fes_pin.data.files import as_path, read_bytes, read_text
 from fes_pin.data.recorded.clock import clock_seconds
 from fes_pin.data.recorded.formats import by_length, check_suffix, is_nested, is_text, read_recording
-from fes_pin.data.recorded.header import Header, cells_in, header_of, is_keyed, ways
+from fes_pin.data.recorded.header import NUMBER, Header, cells_in, header_of, is_keyed, ways
 from fes_pin.data.recorded.text import DECIMALS, DELIMITERS, MISSING, TextForm, cells_of, read_text_recording
 from fes_pin.data.schema import MEANT, RigSchema, without_unit
 from fes_pin.data.table import Table
-from fes_pin.data.units import bare_unit, known_unit, may_be, quantities_of, split_header, words_of
+from fes_pin.data.units import known_unit, may_be, quantities_of, split_header, words_of
 
 LOOKED_AT = 400
 """Lines that are looked at; no preamble of an instrument is nearly as long."""
@@ -28,22 +28,9 @@ NEW_STUDY = "`fes-pin new-study` writes a [columns] table that reads it as it is
 WIDE = 10
 """Columns for each row, at least, of a table that looks transposed; the one with the fewest rows that is read has 3."""
 COMMENTS = ("#", "%", "//")
-_NUMBER = {
-    ".": re.compile(r"^[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$"),
-    ",": re.compile(r"^[+-]?\d+(,\d+)?([eE][+-]?\d+)?$"),
-}
-
-
-def sniff(path: Path) -> tuple[TextForm, dict[int, str]]:
-    """The form that a text file seems to have, and the units that a row of it names, by place of the column.
-
-    Raises
-    ------
-    InputError
-        Not a text file, or no rows of numbers in it.
-    """
-    form, header = sniffed(path)
-    return form, dict(header.units)
+_NUMBER = {".": NUMBER, ",": re.compile(r"^[+-]?\d+(,\d+)?([eE][+-]?\d+)?$")}
+Rows = list[tuple[int, list[bool]]]
+"""Places of the rows of numbers, the last first, and of each cell whether it is a number."""
 
 
 def sniffed(path: Path, stated: Mapping[str, Any] = MappingProxyType({})) -> tuple[TextForm, Header]:
@@ -57,16 +44,9 @@ def sniffed(path: Path, stated: Mapping[str, Any] = MappingProxyType({})) -> tup
     Raises
     ------
     InputError
-        As `sniff`.
+        Not a text file, or no rows of numbers in it.
     """
-    encoding = _encoding(path)
-    lines = read_text(path, encoding).split("\n")[:LOOKED_AT]
-    forms = [TextForm(delimiter, decimal, encoding=encoding) for delimiter in DELIMITERS for decimal in DECIMALS]
-    rows, form = max(((_rows(lines, form), form) for form in forms), key=lambda pair: _likely(*pair))
-    if not rows:
-        raise InputError("expected rows of numbers, found none", file=path)
-    comment = next((c for line in lines for c in COMMENTS if line.lstrip().startswith(c)), "")
-    form = replace(form, comment=comment)
+    lines, rows, form = _likeliest(path)
     found = max(_first_of(lines, rows, form), int(stated.get("header_row", 0)))
     first = int(stated.get("first_row", found + 1)) - 1
     above = lines[:first]
@@ -82,7 +62,19 @@ def sniffed(path: Path, stated: Mapping[str, Any] = MappingProxyType({})) -> tup
     return replace(form, **stated), header
 
 
-def _first_of(lines: list[str], rows: list[tuple[int, list[bool]]], form: TextForm) -> int:
+def _likeliest(path: Path) -> tuple[list[str], Rows, TextForm]:
+    """The first lines of a file, its rows of numbers, and the form in which these are likeliest, without a header."""
+    encoding = _encoding(path)
+    lines = read_text(path, encoding).split("\n")[:LOOKED_AT]
+    forms = [TextForm(delimiter, decimal, encoding=encoding) for delimiter in DELIMITERS for decimal in DECIMALS]
+    rows, form = max(((_rows(lines, form), form) for form in forms), key=lambda pair: _likely(*pair))
+    if not rows:
+        raise InputError("expected rows of numbers, found none", file=path)
+    comment = next((c for line in lines for c in COMMENTS if line.lstrip().startswith(c)), "")
+    return lines, rows, replace(form, comment=comment)
+
+
+def _first_of(lines: list[str], rows: Rows, form: TextForm) -> int:
     """Place of the first row of numbers: `Interval,0.5` is none above rows that are all numbers.
 
     What is no number below a row of names is a sample that is wrong.
@@ -95,7 +87,7 @@ def _first_of(lines: list[str], rows: list[tuple[int, list[bool]]], form: TextFo
     return top if above.row else first
 
 
-def _transposed(above: Sequence[str], rows: list[tuple[int, list[bool]]], form: TextForm) -> Header | None:
+def _transposed(above: Sequence[str], rows: Rows, form: TextForm) -> Header | None:
     """The header of a table whose quantities stand in lines: as many names as lines, or a name before each line."""
     count, columns = len(rows), len(rows[0][1])
     if not 2 <= count < columns:
@@ -130,10 +122,10 @@ def _encoding(path: Path) -> str:
     return "utf-8"
 
 
-def _rows(lines: list[str], form: TextForm) -> list[tuple[int, list[bool]]]:
+def _rows(lines: list[str], form: TextForm) -> Rows:
     """The rows at the end of the lines that are numbers read this way, last first; of each cell whether it is one."""
     number = _NUMBER[form.decimal]
-    rows: list[tuple[int, list[bool]]] = []
+    rows: Rows = []
     for place in range(len(lines) - 1, -1, -1):
         line = lines[place]
         if not line.strip() or line.lstrip().startswith(COMMENTS):
@@ -146,7 +138,7 @@ def _rows(lines: list[str], form: TextForm) -> list[tuple[int, list[bool]]]:
     return rows
 
 
-def _likely(rows: list[tuple[int, list[bool]]], form: TextForm) -> tuple[float, bool, int, bool]:
+def _likely(rows: Rows, form: TextForm) -> tuple[float, bool, int, bool]:
     """What the likeliest way to read the lines has most of: numbers among its cells first."""
     cells = [kind for _, kinds in rows for kind in kinds]
     share = sum(cells) / max(len(cells), 1)
@@ -154,7 +146,7 @@ def _likely(rows: list[tuple[int, list[bool]]], form: TextForm) -> tuple[float, 
 
 
 def _is_number(cell: str, number: re.Pattern[str]) -> bool:
-    return number.match(cell) is not None or (":" in cell and clock_seconds(cell) is not None)
+    return number.match(cell) is not None or clock_seconds(cell) is not None
 
 
 def read_csv_or_hint(path: str | Path) -> Table:
@@ -181,7 +173,7 @@ def read_csv_or_hint(path: str | Path) -> Table:
 
 def _hint(path: Path) -> str:
     try:
-        form, _ = sniff(path)
+        form, _ = sniffed(path)
     except InputError:
         return ""
     words = form.in_words()
@@ -240,8 +232,7 @@ def propose(
     if is_text(path):
         form, header = sniffed(path, stated)
         recording = _numbers(path, form)
-        by_place = header.units if recording.names else {}
-        units = {name: unit for k, name in enumerate(recording.names) if (unit := bare_unit(by_place.get(k, "")))}
+        units = {name: header.units[k] for k, name in enumerate(recording.names) if k in header.units}
     else:
         form, header = None, Header()
         names, said = by_length(path, chosen) if is_nested(path) else (None, ())

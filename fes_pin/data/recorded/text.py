@@ -6,8 +6,9 @@ They are read fast where they are clean, and cell by cell to say where they are 
 import csv
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -171,23 +172,31 @@ def row_after_comments(lines: Sequence[str], form: TextForm) -> int:
 
 def _transposed(path: Path, lines: list[str], form: TextForm, wanted: Sequence[str] | None) -> Table:
     """The table whose quantities stand in lines; a sample's row is its place in them."""
-    body, rows = _body(lines, form)
-    cells = [cells_of(line, form) for line in body]
-    odd = next((k for k, row in enumerate(cells) if len(row) != len(cells[0])), None)
-    if odd is not None or not cells:
-        found = f"expected lines of {len(cells[0])} values, found {len(cells[odd])}" if odd else "expected numbers"
-        raise InputError(found, file=path, row=int(rows[odd]) if odd else form.first_row)
-    names = form.names or (names_of(path, lines, form) if form.header_row else ())
-    if not names and all(_NUMBER.match(row[0]) for row in cells):
-        names = tuple(f"column{k}" for k in range(1, len(cells) + 1))
-    elif not names:
-        names, cells = tuple(row[0] for row in cells), [row[1:] for row in cells]
+    cells = _equal_lines(path, lines, form)
+    if form.names or form.header_row:
+        names = names_of(path, lines, form)
+    elif all(_NUMBER.match(row[0]) for row in cells):
+        names = without_twins([""] * len(cells))
+    else:
+        names, cells = without_twins([row[0] for row in cells]), [row[1:] for row in cells]
     if len(names) != len(cells):
         raise InputError(f"expected {len(cells)} names of as many lines, found {len(names)}", file=path)
     between = ";" if form.decimal == "," else ","
     turned = [between.join(row) for row in zip(*cells, strict=True)]
-    table = table_of_lines(path, turned, without_twins(list(names)), TextForm(between, form.decimal, 0, 1), wanted)
+    table = table_of_lines(path, turned, names, TextForm(between, form.decimal, 0, 1), wanted)
     return replace(table, header_row=form.header_row)
+
+
+def _equal_lines(path: Path, lines: list[str], form: TextForm) -> list[list[str]]:
+    """Cells of the lines of numbers, as many in each."""
+    body, rows = _body(lines, form)
+    cells = [cells_of(line, form) for line in body]
+    if not cells:
+        raise InputError("expected numbers", file=path, row=form.first_row)
+    for row, found in zip(rows.tolist(), cells, strict=True):
+        if len(found) != len(cells[0]):
+            raise InputError(f"expected lines of {len(cells[0])} values, found {len(found)}", file=path, row=row)
+    return cells
 
 
 def table_of_lines(
@@ -314,31 +323,41 @@ def _slowly(
     names, places = which
     clocks: dict[str, str] = {}
     values = np.empty((len(body), len(places)))
-    missing = {""} if form.strict else MISSING
     for index, (line, row) in enumerate(zip(body, rows.tolist(), strict=True)):
-        cells = cells_of(line, form)
-        if not line.strip():
-            raise InputError("expected numbers, found an empty row", file=path, row=row, column=names[0])
-        if len(cells) > len(names) or (form.strict and len(cells) < len(names)):
-            message = f"expected {len(names)} values as in the header, found {len(cells)}"
-            raise InputError(message, file=path, row=row, column=names[min(len(cells), len(names) - 1)])
+        error = partial(InputError, file=path, row=row)
+        cells = _whole(line, names, form, error)
         for k, place in enumerate(places):
-            cell = cells[place] if place < len(cells) else ""
-            is_missing = cell.lower() in missing
-            if is_missing and form.strict:
-                raise InputError("expected a number, found nothing", file=path, row=row, column=names[place])
-            clock = None if form.strict or is_missing or ":" not in cell else clock_seconds(cell)
-            if clock is not None:
-                values[index, k], clocks[names[place]] = clock
-            else:
-                values[index, k] = np.nan if is_missing else _number(cell, path, row, names[place], form.decimal)
+            values[index, k], clock = _reading(cells[place], form, partial(error, column=names[place]))
+            if clock:
+                clocks[names[place]] = clock
     for k, place in enumerate(places):
         if what := clocks.get(names[place]):
             values[:, k] = from_first(values[:, k], of_day=what != "dates")
     return values, clocks
 
 
-def _number(cell: str, path: Path, row: int, column: str, decimal: str) -> float:
+def _whole(line: str, names: tuple[str, ...], form: TextForm, error: Callable[..., InputError]) -> list[str]:
+    """A cell of a line for each name; "" for those that are missing at its end, where the form is not strict."""
+    cells, count = cells_of(line, form), len(names)
+    if not line.strip():
+        raise error("expected numbers, found an empty row", column=names[0])
+    if len(cells) > count or (form.strict and len(cells) < count):
+        message = f"expected {count} values as in the header, found {len(cells)}"
+        raise error(message, column=names[min(len(cells), count - 1)])
+    return cells + [""] * (count - len(cells))
+
+
+def _reading(cell: str, form: TextForm, error: Callable[[str], InputError]) -> tuple[float, str]:
+    """The number that a cell says, NaN of a sample that is missing; of a clock s, and what kind it is in words."""
+    if form.strict and not cell:
+        raise error("expected a number, found nothing")
+    if not form.strict and cell.lower() in MISSING:
+        return math.nan, ""
+    clock = None if form.strict else clock_seconds(cell)
+    return clock or (_number(cell, form.decimal, error), "")
+
+
+def _number(cell: str, decimal: str, error: Callable[[str], InputError]) -> float:
     """The finite number that a cell says with this decimal sign."""
     try:
         if "_" in cell or (decimal == "," and "." in cell):
@@ -346,9 +365,9 @@ def _number(cell: str, path: Path, row: int, column: str, decimal: str) -> float
         value = float(cell.replace(decimal, "."))
     except ValueError:
         what = "a number with a decimal comma" if decimal == "," else "a number"
-        raise InputError(f"expected {what}, found {cell[:40]!r}", file=path, row=row, column=column) from None
+        raise error(f"expected {what}, found {cell[:40]!r}") from None
     if not math.isfinite(value):
-        raise InputError(f"expected a finite number, found {cell[:40]!r}", file=path, row=row, column=column)
+        raise error(f"expected a finite number, found {cell[:40]!r}")
     return value
 
 

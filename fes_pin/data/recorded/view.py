@@ -16,7 +16,7 @@ from fes_pin.data.errors import KeyFault
 from fes_pin.data.recorded.clock_offset import clock_offset
 from fes_pin.data.recorded.parts import HOLES, RESTARTS, RESTS, changes, cut, holes, moving, restarts, rows_of
 from fes_pin.data.recorded.regular import at_times
-from fes_pin.data.schema import OF_A_VIEW, any_number, check_known, one_of, positive
+from fes_pin.data.schema import any_number, check_known, one_of, positive
 from fes_pin.data.table import MIN_ROWS, Table
 
 FITTED = "fit"
@@ -156,28 +156,33 @@ def view_of(table: Mapping[str, Any], sources: Sequence[str], error: KeyFault) -
     InputError
         What `error` makes, for a value that is not what it must be.
     """
-    seconds, given = any_number("s"), {k: table[k] for k in OF_A_VIEW if k in table}
-    ends = {k: seconds.check(given[k], partial(error, k)) for k in ("from", "to") if k in given}
+    seconds = any_number("s")
+    ends = {k: seconds.check(table[k], partial(error, k)) for k in ("from", "to") if k in table}
     if len(ends) > 1 and ends["from"] >= ends["to"]:
         raise error("to", f"expected a time after from = {ends['from']:g}, found {ends['to']:g}")
-    marks = given.get("at", [])
+    marks, split = table.get("at", []), table.get("split", "")
     if not isinstance(marks, list):
         raise error("at", "expected a list of times in s")
     at = tuple(sorted(seconds.check(one, partial(error, "at")) for one in marks))
-    split = given.get("split", "")
     if not isinstance(split, str) or (at and split):
         raise error("split", f'expected "{RESTARTS}", "{HOLES}", "{RESTS}" or the name of a column, and no at')
-    rate = positive("Hz").check(given["rate"], partial(error, "rate")) if "rate" in given else None
-    derive = _table(given, "derive", error)
+    rate = positive("Hz").check(table["rate"], partial(error, "rate")) if "rate" in table else None
+    derive = _table(table, "derive", error)
     for name, source in derive.items():
         if INTEGRATED.get(name) != one_of(source, tuple(INTEGRATED.values()), partial(error, f"derive.{name}")):
             raise error(f"derive.{name}", 'expected position = "velocity"')
-    offsets = _table(given, "offset_s", error)
+    offsets = _offsets(table, sources, error)
+    return View(ends.get("from"), ends.get("to"), at, split, derive, rate, offsets, len(sources) > 1)
+
+
+def _offsets(table: Mapping[str, Any], sources: Sequence[str], error: KeyFault) -> dict[str, float | str]:
+    """By source what is added to its times, s, or `FITTED`."""
+    offsets = _table(table, "offset_s", error)
     if not sources and offsets:
         raise error("offset_s", "expected it of a trial with sources, whose clocks differ")
     check_known(offsets, sources, lambda key, message: error(f"offset_s.{key}", message))
-    checked = {n: v if v == FITTED else seconds.check(v, partial(error, f"offset_s.{n}")) for n, v in offsets.items()}
-    return View(ends.get("from"), ends.get("to"), at, split, derive, rate, checked, len(sources) > 1)
+    seconds = any_number("s")
+    return {n: v if v == FITTED else seconds.check(v, partial(error, f"offset_s.{n}")) for n, v in offsets.items()}
 
 
 def _table(given: Mapping[str, Any], key: str, error: KeyFault) -> Mapping[str, Any]:
