@@ -241,25 +241,31 @@ def ground_reaction_of(table: Table) -> dict[str, np.ndarray]:
 
 
 def plates_in(table: Table) -> dict[str, dict[str, np.ndarray]]:
-    """Columns `Fx` ... `Tz` of every plate, by the foot that the file names, `r` or `l`, or by the plate's number.
+    """Columns `Fx` ... `Tz` of every plate, (n,), by the foot that the file names, `r` or `l`, or the plate's number.
 
     Raises
     ------
     InputError
         A column of a plate is missing, or there is no plate.
     """
-    names = {(_ground(name) if is_storage(table.path) else name): name for name in table.names[1:]}
-    labels = list(dict.fromkeys(n[0] for n in names if n[1:] in PLATE))
-    numbered = [n for n in labels if n.isdigit()]
-    if numbered and "r" in labels:  # as in OpenSim's gait examples, where a column without a foot or number is of `r`
-        called = {"1": "l"} if numbered == ["1"] else {"r": "0"}
-        names = {called.get(n[0], n[0]) + n[1:]: of for n, of in names.items()}
-        labels = list(dict.fromkeys(called.get(n, n) for n in labels))
-    for label in labels or ["r"]:
-        for kind in PLATE:
-            if f"{label}{kind}" not in names:
-                raise _missing(table, f"{label}{kind}", table.names)
+    names = _plate_columns(table)
+    labels = list(dict.fromkeys(n[0] for n in names if n[1:] in PLATE)) or ["r"]
+    for name in (f"{label}{kind}" for label in labels for kind in PLATE):
+        if name not in names:
+            raise _missing(table, name, table.names)
     return {label: {kind[1:]: table.columns[names[f"{label}{kind}"]] for kind in PLATE} for label in labels}
+
+
+def _plate_columns(table: Table) -> dict[str, str]:
+    """The names of a table's columns by what they are of a plate, `r_Fx` or `1_Fx`; others by themselves."""
+    names = {(_ground(name) if is_storage(table.path) else name): name for name in table.names[1:]}
+    labels = {n[0] for n in names if n[1:] in PLATE}
+    numbered = {n for n in labels if n.isdigit()}
+    if not numbered or "r" not in labels:
+        return names
+    # as in OpenSim's gait examples, where a column without a foot or number is of `r`
+    called = {"1": "l"} if numbered == {"1"} else {"r": "0"}
+    return {called.get(n[0], n[0]) + n[1:]: of for n, of in names.items()}
 
 
 def _ground(name: str) -> str:
