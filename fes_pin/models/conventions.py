@@ -135,10 +135,7 @@ class _Seen:
 
     def __init__(self, trials: Sequence[Trial], constants: Mapping[str, float]) -> None:
         self.constants = constants
-        moving = [t for t in trials if "position" in t and len(t) >= FEWEST and 0.0 < np.ptp(t["position"]) < FARTHEST]
-        driven = [t for t in moving if "effort" in t and np.ptp(t["effort"]) > 0.0]
-        self.is_driven, self.trials = bool(driven), driven or [t for t in moving if "effort" not in t]
-        self.trials = [t if self.is_driven else t.with_columns(effort=np.zeros(len(t))) for t in self.trials]
+        self.is_driven, self.trials = _moving(trials)
         self.band = band_hz(self.trials)
         if math.isnan(self.band):  # coarse readings, or short: what is slow may show it
             self.band, self.trials = SLOWEST_HZ, [t for t in self.trials if _is_long(t)]
@@ -214,6 +211,14 @@ class _Seen:
     def _rows(self, lines: Sequence[Sequence[np.ndarray]]) -> np.ndarray:
         each = zip(self.trials, lines, strict=True)
         return np.concatenate([smoothed_rows(t, np.stack(list(one)), self.band) for t, one in each])
+
+
+def _moving(trials: Sequence[Trial]) -> tuple[bool, list[Trial]]:
+    """Return whether efforts drive trials that move, and those; else the trials that move freely, of effort 0."""
+    moving = [t for t in trials if "position" in t and len(t) >= FEWEST and 0.0 < np.ptp(t["position"]) < FARTHEST]
+    if driven := [t for t in moving if "effort" in t and np.ptp(t["effort"]) > 0.0]:
+        return True, driven
+    return False, [t.with_columns(effort=np.zeros(len(t))) for t in moving if "effort" not in t]
 
 
 def _is_long(trial: Trial) -> bool:
