@@ -1,7 +1,7 @@
 """Walking data: joint coordinates and ground reactions from CSV and from OpenSim's .mot and .sto files."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -127,10 +127,14 @@ def read_coordinates(path: str | Path) -> tuple[np.ndarray, dict[str, np.ndarray
 
 
 def coordinates_of(table: Table, in_degrees: bool | None) -> dict[str, np.ndarray]:
-    """The coordinates that a table holds, in rad and m, by themselves; see `read_coordinates`."""
-    return _knees_as_gait2354(
-        coordinates_unwrapped(in_radians(named_coordinates(table), stated_degrees(table, in_degrees)))[0]
-    )
+    """The coordinates that a table holds, in rad and m, by themselves; see `read_coordinates`.
+
+    Flexion of a knee is negative, as gait2354 has it; Rajagopal's model counts it positive (IEEE Trans. Biomed. Eng.
+    63:2068).
+    """
+    columns = in_radians(named_coordinates(table), stated_degrees(table, in_degrees))
+    columns, _ = coordinates_unwrapped(columns)
+    return knees_turned(columns, "rl") if knees_bend_positively(columns) else columns
 
 
 def stated_degrees(table: Table, in_degrees: bool | None) -> bool:
@@ -188,11 +192,9 @@ def knees_bend_positively(columns: Mapping[str, np.ndarray]) -> bool:
     return all(bool(knee.max() > BENT_RAD and knee.min() > BACK_RAD) for knee in knees)
 
 
-def _knees_as_gait2354(columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Flexion negative, as gait2354 has it; Rajagopal's model counts it positive (IEEE Trans. Biomed. Eng. 63:2068)."""
-    if not knees_bend_positively(columns):
-        return columns
-    turned = {f"{kind}_knee_angle_{side}" for kind in ("q", "qd", "qdd") for side in "rl"}
+def knees_turned(columns: Mapping[str, np.ndarray], sides: Collection[str]) -> dict[str, np.ndarray]:
+    """Coordinates with the knees of these sides, `r` and `l`, and their rates counted with the other sign."""
+    turned = {f"{kind}_knee_angle_{side}" for kind in ("q", "qd", "qdd") for side in sides}
     return {name: -values if name in turned else values for name, values in columns.items()}
 
 

@@ -163,6 +163,7 @@ def trials_named(names: Sequence[str]) -> str:
 
 
 def _check_rows(study: Study | ToPredict) -> None:
+    """Raise InputError for too few samples for what is fitted."""
     fitted = [t for t in study.trials if t.role != "held_out"]
     wanted = SAMPLES_EACH * len(study.start)
     found = sum(map(len, fitted))

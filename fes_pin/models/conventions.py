@@ -209,6 +209,7 @@ class _Seen:
         return [c for c in SIGNS if not math.isnan(self.factors[c.column])]
 
     def _rows(self, lines: Sequence[Sequence[np.ndarray]]) -> np.ndarray:
+        """Return the columns of each trial, some of (n,), below the band and as rows: (rows, columns)."""
         each = zip(self.trials, lines, strict=True)
         return np.concatenate([smoothed_rows(t, np.stack(list(one)), self.band) for t, one in each])
 
@@ -227,10 +228,12 @@ def _is_long(trial: Trial) -> bool:
 
 
 def _usual(speeds: np.ndarray) -> float:
+    """Return the root mean square of speeds, (n,): above 0."""
     return float(np.sqrt(np.mean(speeds**2))) + 1e-300
 
 
 def _sizes(columns: np.ndarray) -> np.ndarray:
+    """Return the root mean square of each column of (n, k), shape (k,): above 0."""
     return np.asarray(np.sqrt(np.mean(np.square(columns), axis=0)) + 1e-300)
 
 
