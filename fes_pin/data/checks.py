@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from fes_pin.data.channels import CHANNELS
+from fes_pin.data.channels import CHANNELS, WIDTH
 from fes_pin.data.errors import KeyFault
 from fes_pin.data.motion import GROUND_REACTION, OPTIONAL, REQUIRED, TRANSLATIONS, knees_bend_positively
 from fes_pin.data.schema import IMPOSED, ROLES, RigSchema, is_like, number_or_none, one_of, positive, unknown, unread
@@ -23,6 +23,9 @@ LOW_PASS = "low_pass_hz"
 LABELS = {"role": None, "group": None, LOW_PASS: None, "remarks": ()}
 """What is said of a trial but for name, kind and conditions, and what holds of one that says nothing."""
 TURN = 2.0 * math.pi
+"""Angle in rad that no joint turns by."""
+JOINTS = tuple(f"q_{one}" for one in REQUIRED if one not in (*TRANSLATIONS, "pelvis_rotation"))
+"""Angles of a walk, but for the heading: one may walk in circles."""
 LONGEST_MUSCLE_M = 1.0
 """Length in m that no muscle with its tendon has: the longest, sartorius, comes to about half a metre."""
 TOGETHER = ({"pulse_width_us", "amplitude_ma", "frequency_hz"}, {"charge_uc", "frequency_hz"})
@@ -98,25 +101,31 @@ def check_columns(names: Sequence[str], schema: RigSchema, kind: str, inputs_onl
     if len(schema.recordings) > 1:
         _check_body_columns(names, inputs_only, error)
         return
-    known, stimuli = schema.columns_of(kind), schema.stimuli(kind)
-    absent = [name for name in known if name not in names and name != "time_s"]
+    known = schema.columns_of(kind)[1:]
+    absent = [name for name in known if name not in names]
     for name in names:
         if name not in known and is_like(name, absent):
             raise error(unknown(name, absent), name, None)
-    output, motion = schema.outputs[kind], schema.motion(kind)[:1]
+    _check_stimuli(names, schema, kind, error)
+    needed = dict.fromkeys(schema.motion(kind)[:1], "has its motion there")
+    if not inputs_only:
+        needed[schema.outputs[kind]] = "measures it"
+    for name, why in needed.items():
+        if name not in names:
+            raise error(f"missing; a trial of kind {kind} {why}", name, None)
+    for name in names:
+        if name not in known:
+            raise error(_not_read(name, schema, kind), name, None)
+
+
+def _check_stimuli(names: Sequence[str], schema: RigSchema, kind: str, error: Fault) -> None:
+    """Require a stimulus of a rig that needs one, and no two that one trial may not hold together."""
+    stimuli = schema.stimuli(kind)
     found = [name for name in stimuli if name in names]
     if schema.inputs_required and not found and kind != IMPOSED:
         raise error(f"missing; this rig needs {' or '.join(stimuli)}", stimuli[0], None)
-    if not any(set(found) <= together for together in TOGETHER) and len(found) > 1:
+    if len(found) > 1 and not any(set(found) <= together for together in TOGETHER):
         raise error(f"expected one of {' and '.join(found)}, found both", found[1], None)
-    for name in motion:
-        if name not in names:
-            raise error(f"missing; a trial of kind {kind} has its motion there", name, None)
-    if output not in names and not inputs_only:
-        raise error(f"missing; a trial of kind {kind} measures it", output, None)
-    for name in names:
-        if name not in known or name == "time_s":
-            raise error(_not_read(name, schema, kind), name, None)
 
 
 def _check_body_columns(names: Sequence[str], inputs_only: bool, error: Fault) -> None:
@@ -154,37 +163,42 @@ def check_values(
     threshold_us
         Of its recruitment, where that is known: widths above it are in its unit.
     """
-    if "pulse_width_us" in columns:
-        width = columns["pulse_width_us"]
-        if (least := float(width.min())) < 0.0:
-            message = f"expected a pulse width of at least 0 us, found {least:g}"
-            raise error(message, "pulse_width_us", int(np.argmax(width < 0.0)))
-        if 0.0 < (most := float(width.max())) <= min(SHORTEST_PULSE_US, threshold_us):
-            message = f"reaches {most:.4g} us, and no pulse is so short: is it in {'ms' if most > 0.002 else 's'}?"
-            raise error(message, "pulse_width_us", int(np.argmax(width)))
-        if most > LONGEST_PULSE_US:
-            message = f"reaches {most:g} us, and no pulse is so long: is it in ns?"
-            raise error(message, "pulse_width_us", int(width.argmax()))
+    if WIDTH.column in columns:
+        _check_widths(columns[WIDTH.column], threshold_us, error)
     _check_sizes(columns, error)
     if "stim" in columns and (other := ~np.isin(columns["stim"], (0.0, 1.0))).any():
         sample = int(np.argmax(other))
         raise error(f"expected 0 or 1, found {columns['stim'][sample]:g}", "stim", sample)
-    if len(schema.recordings) > 1 and knees_bend_positively(columns):
+    is_walk = len(schema.recordings) > 1
+    if is_walk and knees_bend_positively(columns):
         raise error("its knees bend positively; expected flexion below 0, as gait2354 has it", "q_knee_angle_r", None)
-    turning = [
-        f"q_{one}" for one in REQUIRED if one not in (*TRANSLATIONS, "pelvis_rotation")
-    ]  # one may walk in circles
-    turning = turning if len(schema.recordings) > 1 else []
-    for name in ("angle_rad", *turning):
+    for name in JOINTS if is_walk else ("angle_rad",):
         if name in columns and (most := float(np.abs(columns[name]).max())) > TURN:
-            message = f"reaches {most:.4g}; no {'ankle' if name == 'angle_rad' else 'joint'} turns so far"
-            raise error(f"{message}: is it in degrees?", name, int(np.argmax(np.abs(columns[name]))))
+            message = f"reaches {most:.4g}; no {'joint' if is_walk else 'ankle'} turns so far: is it in degrees?"
+            raise error(message, name, int(np.argmax(np.abs(columns[name]))))
     if "length_m" in columns:
-        length = columns["length_m"]
-        if (most := float(length.max())) > LONGEST_MUSCLE_M:
-            raise error(f"reaches {most:.4g} m; no muscle is so long: is it in mm?", "length_m", int(length.argmax()))
-        if not (least := float(length.min())) > 0.0:
-            raise error(f"is {least:.4g} m; expected the whole length, above 0", "length_m", int(length.argmin()))
+        _check_lengths(columns["length_m"], error)
+
+
+def _check_widths(width: np.ndarray, threshold_us: float, error: Fault) -> None:
+    """Refuse widths of pulses, (n,), below 0 us, and those that are in ms, s or ns."""
+    least, most = float(width.min()), float(width.max())
+    if least < 0.0:
+        message = f"expected a pulse width of at least 0 us, found {least:g}"
+        raise error(message, WIDTH.column, int(np.argmax(width < 0.0)))
+    if 0.0 < most <= min(SHORTEST_PULSE_US, threshold_us):
+        message = f"reaches {most:.4g} us, and no pulse is so short: is it in {'ms' if most > 0.002 else 's'}?"
+        raise error(message, WIDTH.column, int(np.argmax(width)))
+    if most > LONGEST_PULSE_US:
+        raise error(f"reaches {most:g} us, and no pulse is so long: is it in ns?", WIDTH.column, int(width.argmax()))
+
+
+def _check_lengths(length: np.ndarray, error: Fault) -> None:
+    """Refuse lengths of a muscle, (n,) m, of 0 and less, and those that are in mm."""
+    if (most := float(length.max())) > LONGEST_MUSCLE_M:
+        raise error(f"reaches {most:.4g} m; no muscle is so long: is it in mm?", "length_m", int(length.argmax()))
+    if not (least := float(length.min())) > 0.0:
+        raise error(f"is {least:.4g} m; expected the whole length, above 0", "length_m", int(length.argmin()))
 
 
 def _check_sizes(columns: Mapping[str, np.ndarray], error: Fault) -> None:
@@ -204,6 +218,17 @@ def check_constants(schema: RigSchema, constants: Mapping[str, float], files: Co
     files
         Keys of the files that are there.
     """
+    _check_recruitment(constants, error)
+    if absent := [key for key in schema.either if key not in constants and not files]:
+        expected = ", or ".join((" and ".join(schema.either), *schema.files))
+        raise error(absent[0], f"missing; expected {expected}")
+    for key, required in schema.files.items():
+        if required and key not in files:
+            raise error(key, "missing; expected the path of a file")
+
+
+def _check_recruitment(constants: Mapping[str, float], error: KeyFault) -> None:
+    """Require both ends of one channel's recruitment, saturation above threshold, where any end is stated."""
     stated = [c for c in CHANNELS.values() if any(end in constants for end in c.ends)]
     if len(stated) > 1:
         one, other = (c.ends[0] for c in stated[:2])
@@ -215,12 +240,6 @@ def check_constants(schema: RigSchema, constants: Mapping[str, float], files: Co
         if constants[high] <= constants[low]:
             message = f"expected a saturation above the threshold of {constants[low]:g} {channel.unit}"
             raise error(high, f"{message}, found {constants[high]:g}")
-    if absent := [key for key in schema.either if key not in constants and not files]:
-        expected = ", or ".join((" and ".join(schema.either), *schema.files))
-        raise error(absent[0], f"missing; expected {expected}")
-    for key, required in schema.files.items():
-        if required and key not in files:
-            raise error(key, "missing; expected the path of a file")
 
 
 def check_same_inputs(

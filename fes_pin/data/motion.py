@@ -1,7 +1,7 @@
 """Walking data: joint coordinates and ground reactions from CSV and from OpenSim's .mot and .sto files."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -127,10 +127,14 @@ def read_coordinates(path: str | Path) -> tuple[np.ndarray, dict[str, np.ndarray
 
 
 def coordinates_of(table: Table, in_degrees: bool | None) -> dict[str, np.ndarray]:
-    """The coordinates that a table holds, in rad and m, by themselves; see `read_coordinates`."""
-    return _knees_as_gait2354(
-        coordinates_unwrapped(in_radians(named_coordinates(table), stated_degrees(table, in_degrees)))[0]
-    )
+    """The coordinates that a table holds, in rad and m, by themselves; see `read_coordinates`.
+
+    Flexion of a knee is negative, as gait2354 has it; Rajagopal's model counts it positive (IEEE Trans. Biomed. Eng.
+    63:2068).
+    """
+    columns = in_radians(named_coordinates(table), stated_degrees(table, in_degrees))
+    columns, _ = coordinates_unwrapped(columns)
+    return knees_turned(columns, "rl") if knees_bend_positively(columns) else columns
 
 
 def stated_degrees(table: Table, in_degrees: bool | None) -> bool:
@@ -188,11 +192,9 @@ def knees_bend_positively(columns: Mapping[str, np.ndarray]) -> bool:
     return all(bool(knee.max() > BENT_RAD and knee.min() > BACK_RAD) for knee in knees)
 
 
-def _knees_as_gait2354(columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Flexion negative, as gait2354 has it; Rajagopal's model counts it positive (IEEE Trans. Biomed. Eng. 63:2068)."""
-    if not knees_bend_positively(columns):
-        return columns
-    turned = {f"{kind}_knee_angle_{side}" for kind in ("q", "qd", "qdd") for side in "rl"}
+def knees_turned(columns: Mapping[str, np.ndarray], sides: Collection[str]) -> dict[str, np.ndarray]:
+    """Coordinates with the knees of these sides, `r` and `l`, and their rates counted with the other sign."""
+    turned = {f"{kind}_knee_angle_{side}" for kind in ("q", "qd", "qdd") for side in sides}
     return {name: -values if name in turned else values for name, values in columns.items()}
 
 
@@ -241,25 +243,31 @@ def ground_reaction_of(table: Table) -> dict[str, np.ndarray]:
 
 
 def plates_in(table: Table) -> dict[str, dict[str, np.ndarray]]:
-    """Columns `Fx` ... `Tz` of every plate, by the foot that the file names, `r` or `l`, or by the plate's number.
+    """Columns `Fx` ... `Tz` of every plate, (n,), by the foot that the file names, `r` or `l`, or the plate's number.
 
     Raises
     ------
     InputError
         A column of a plate is missing, or there is no plate.
     """
-    names = {(_ground(name) if is_storage(table.path) else name): name for name in table.names[1:]}
-    labels = list(dict.fromkeys(n[0] for n in names if n[1:] in PLATE))
-    numbered = [n for n in labels if n.isdigit()]
-    if numbered and "r" in labels:  # as in OpenSim's gait examples, where a column without a foot or number is of `r`
-        called = {"1": "l"} if numbered == ["1"] else {"r": "0"}
-        names = {called.get(n[0], n[0]) + n[1:]: of for n, of in names.items()}
-        labels = list(dict.fromkeys(called.get(n, n) for n in labels))
-    for label in labels or ["r"]:
-        for kind in PLATE:
-            if f"{label}{kind}" not in names:
-                raise _missing(table, f"{label}{kind}", table.names)
+    names = _plate_columns(table)
+    labels = list(dict.fromkeys(n[0] for n in names if n[1:] in PLATE)) or ["r"]
+    for name in (f"{label}{kind}" for label in labels for kind in PLATE):
+        if name not in names:
+            raise _missing(table, name, table.names)
     return {label: {kind[1:]: table.columns[names[f"{label}{kind}"]] for kind in PLATE} for label in labels}
+
+
+def _plate_columns(table: Table) -> dict[str, str]:
+    """The names of a table's columns by what they are of a plate, `r_Fx` or `1_Fx`; others by themselves."""
+    names = {(_ground(name) if is_storage(table.path) else name): name for name in table.names[1:]}
+    labels = {n[0] for n in names if n[1:] in PLATE}
+    numbered = {n for n in labels if n.isdigit()}
+    if not numbered or "r" not in labels:
+        return names
+    # as in OpenSim's gait examples, where a column without a foot or number is of `r`
+    called = {"1": "l"} if numbered == {"1"} else {"r": "0"}
+    return {called.get(n[0], n[0]) + n[1:]: of for n, of in names.items()}
 
 
 def _ground(name: str) -> str:

@@ -56,6 +56,8 @@ STILL = 6.0
 """Deviations of its noise that an imposed motion must exceed to count as one."""
 RATE_RATIO = 5.0
 """Factor by which a velocity may differ from the slope of its position: filters make less, degrees make 57."""
+NEVER = "a muscle that is never stimulated shows nothing"
+"""Why a study without a stimulus above the threshold is rejected."""
 PIECES = 8
 """Pieces of a trial that velocity and slope are compared over: over one sample the position's noise would be all."""
 
@@ -93,21 +95,25 @@ def implausible(study: Study | ToPredict) -> list[str]:
         check_trial(trial, study.schema, inputs_only=True, threshold_us=-math.inf)
     _check_rows(study)
     done = [(t, remark) for t in study.trials for remark in t.remarks]  # to samples, when they were read
-    warnings = [*_each("", done), *_inputs(study), *_units(study), *_imposed(study)]
+    few = [(t, f"fewer than {FEW} samples") for t in study.trials if len(t) < FEW]
+    driven_by = (*_inputs(study), *_units(study), *_imposed(study))
+    return [*_each("", [*done, *few]), *driven_by, *_outputs(study), *_rates(study.trials), *_rests(study)]
+
+
+def _outputs(study: Study | ToPredict) -> Iterable[str]:
+    """Remarks on readings; that none changes, or that they show two counts alone, is an InputError."""
     outputs = tuple(dict.fromkeys((*study.schema.outputs.values(), "velocity")))
     driving = study.schema.driving
     measured = [(t, n) for t in study.trials for n in outputs if n in t and n not in driving(t.kind, t.columns)]
-    constant = [(t, n) for t, n in measured if not np.ptp(t[n]) > 0.0]
-    _check_counts(study, [one for one in measured if one not in constant])
-    if len(constant) == len(measured) and not isinstance(study, ToPredict):
+    moving = [(t, n) for t, n in measured if np.ptp(t[n]) > 0.0]
+    _check_counts(study, moving)
+    if not moving and not isinstance(study, ToPredict):
         raise InputError("no output changes in any trial; there is nothing to compare a model with", file=study.folder)
-    warnings += _each("does not change at all", constant)
-    moving = [one for one in measured if one not in constant]
-    warnings += _each("is cut off at its largest or smallest value (clipping?)", [m for m in moving if _is_clipped(*m)])
-    warnings += _each("holds whole numbers only: are they an encoder's counts?", [m for m in moving if _is_counted(*m)])
+    yield from _each("does not change at all", [(t, n) for t, n in measured if not np.ptp(t[n]) > 0.0])
+    yield from _each("is cut off at its largest or smallest value (clipping?)", [m for m in moving if _is_clipped(*m)])
+    yield from _each("holds whole numbers only: are they an encoder's counts?", [m for m in moving if _is_counted(*m)])
     for trial, name in moving:
-        warnings += dropouts(trial, name) or _held(trial, name)
-    return [*warnings, *_rates(study.trials), *_rests(study)]
+        yield from dropouts(trial, name) or _held(trial, name)
 
 
 def _rests(study: Study | ToPredict) -> Iterable[str]:
@@ -157,6 +163,7 @@ def trials_named(names: Sequence[str]) -> str:
 
 
 def _check_rows(study: Study | ToPredict) -> None:
+    """Raise InputError for too few samples for what is fitted."""
     fitted = [t for t in study.trials if t.role != "held_out"]
     wanted = SAMPLES_EACH * len(study.start)
     found = sum(map(len, fitted))
@@ -167,49 +174,45 @@ def _check_rows(study: Study | ToPredict) -> None:
 
 def _inputs(study: Study | ToPredict) -> Iterable[str]:
     """Remarks on inputs; a muscle that is never stimulated is an InputError."""
-    if short := [t.name for t in study.trials if len(t) < FEW]:
-        yield f"fewer than {FEW} samples in {trials_named(short)}"
     alone = isinstance(study, ToPredict)  # trials that nothing drives are then no oddity, but for a muscle at rest
     names = dict.fromkeys(n for t in study.trials for n in _stimuli(study, t) if n in PULSES or not alone)
-    is_free = not names and not alone and not any(t.kind == IMPOSED for t in study.trials)
-    if is_free and study.schema.inputs_required:
-        message = "no trial is stimulated; a muscle that is never stimulated shows nothing"
-        raise InputError(message, file=study.folder)
-    if is_free:
+    if not names and not alone and not any(t.kind == IMPOSED for t in study.trials):
+        if study.schema.inputs_required:
+            raise InputError(f"no trial is stimulated; {NEVER}", file=study.folder)
         column = " or ".join(study.schema.inputs)
         yield f"no trial is driven: there is no column {column}, and the motion is taken for free"
     for name in names:
-        channel = CHANNELS.get(name)
-        threshold = study.constants.get(channel.ends[0], 0.0) if channel else 0.0
-        driven = [t for t in study.trials if name in _stimuli(study, t)]
-        below = [t for t in driven if not (np.abs(t[name]) > threshold).any()]
-        idle = [t.name for t in below]
-        zero = (
-            f"{name} is never above the threshold of {threshold:g} {own_unit(name)}"
-            if threshold
-            else f"{name} is zero throughout"
-        )
-        if len(idle) < len(driven):
-            if idle and name in PULSES:  # a joint may swing free between driven trials
-                for trial in below:
-                    check_values({name: trial[name]}, study.schema, trial.error, threshold)
-                yield f"{zero} in {trials_named(idle)}"
-        elif name not in PULSES:
-            yield f"no trial is driven: {zero}"
-        elif name == RATE and len(names) > 1:
-            continue
-        elif all(t.kind == IMPOSED for t in study.trials) and not any(t[name].any() for t in driven):
-            yield f"{zero} in all trials: the muscle is passive"
-        else:
-            most = max(float(np.abs(t[name]).max()) for t in study.trials if name in t)
-            unit = "ms" if threshold < 1e3 * most else "s"
-            is_short = name == WIDTH.column and 0.0 < most < SHORTEST_US
-            hint = f" (it reaches {most:.4g}: is it in {unit}?)" if is_short else ""
-            if alone and not hint:
-                yield f"{zero}: nothing is stimulated"
-                continue
-            message = f"{zero} in all trials{hint}; a muscle that is never stimulated shows nothing"
-            raise InputError(message, file=study.folder)
+        yield from _input(study, name, len(names) > 1)
+
+
+def _input(study: Study | ToPredict, name: str, has_others: bool) -> Iterable[str]:
+    """Remarks on one input, by the trials that it does not drive; with others a rate may be 0 throughout."""
+    threshold = study.constants.get(CHANNELS[name].ends[0], 0.0) if name in CHANNELS else 0.0
+    zero = f"never above the threshold of {threshold:g} {own_unit(name)}" if threshold else "zero throughout"
+    trials = [t for t in study.trials if name in _stimuli(study, t)]
+    idle = [t for t in trials if not (np.abs(t[name]) > threshold).any()]
+    if len(idle) == len(trials):
+        if name != RATE or not has_others:
+            yield _undriven(study, name, threshold, f"{name} is {zero}")
+    elif idle and name in PULSES:  # a joint may swing free between driven trials
+        for trial in idle:
+            check_values({name: trial[name]}, study.schema, trial.error, threshold)
+        yield f"{name} is {zero} in {trials_named([t.name for t in idle])}"
+
+
+def _undriven(study: Study | ToPredict, name: str, threshold: float, idle: str) -> str:
+    """What is said of an input that drives no trial; InputError for a muscle that is never stimulated."""
+    if name not in PULSES:
+        return f"no trial is driven: {idle}"
+    most = max(float(np.abs(t[name]).max()) for t in study.trials if name in t)
+    if most == 0.0 and all(t.kind == IMPOSED for t in study.trials):
+        return f"{idle} in all trials: the muscle is passive"
+    is_short = name == WIDTH.column and 0.0 < most < SHORTEST_US
+    if isinstance(study, ToPredict) and not is_short:
+        return f"{idle}: nothing is stimulated"
+    unit = "ms" if threshold < 1e3 * most else "s"
+    hint = f" (it reaches {most:.4g}: is it in {unit}?)" if is_short else ""
+    raise InputError(f"{idle} in all trials{hint}; {NEVER}", file=study.folder)
 
 
 def _units(study: Study | ToPredict) -> Iterable[str]:
@@ -238,8 +241,7 @@ def _imposed(study: Study | ToPredict) -> Iterable[str]:
         return
     name = study.schema.imposed[0]
     motions = [imposed_motion(t, study.schema.imposed) for t in trials]
-    ends = [(float(m.values[0].min()), float(m.values[0].max())) for m in motions]
-    moved = max(high for _, high in ends) - min(low for low, _ in ends)
+    moved = float(np.ptp(np.concatenate([m.values[0] for m in motions])))
     longest = max(float(np.abs(t[name]).max()) for t in trials)
     if not moved > max(STILL * max(m.std[0] for m in motions), 1e-9 * longest):
         message = f"{name} never moves in any imposed trial: nothing but noise of {motions[0].std[0]:.2g} is in it"
@@ -247,7 +249,12 @@ def _imposed(study: Study | ToPredict) -> Iterable[str]:
     bands = [m.bandwidth_hz for m in motions]
     band = f"{min(bands):.2g} Hz" if max(bands) < 1.1 * min(bands) else f"{min(bands):.2g} to {max(bands):.2g} Hz"
     yield f"velocity and acceleration of {name} are those of smoothing splines with a bandwidth of {band}"
-    found = {t.name: effort_of_repeats(t, study.schema) for t in trials if not is_stimulated(t)}
+    yield from _unrepeated(study, [t for t in trials if not is_stimulated(t)])
+
+
+def _unrepeated(study: Study, trials: Sequence[Trial]) -> Iterable[str]:
+    """Efforts of trials that nothing stimulates and that differ between equal cycles of their imposed motion."""
+    found = {t.name: effort_of_repeats(t, study.schema) for t in trials}
     if odd := {n: one for n, one in found.items() if one is not None and one.is_no_mechanism}:
         most = max(odd.values(), key=lambda one: one.share)
         effort = study.schema.outputs[IMPOSED]

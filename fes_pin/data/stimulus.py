@@ -59,20 +59,8 @@ def with_one_stimulus(
     both = [t for t in trials if WIDTH.column in t and AMPLITUDE.column in t]
     if not both:
         return tuple(trials)
-    channel = channel_of(constants) or varying([(t[WIDTH.column], t[AMPLITUDE.column]) for t in both])
-    if channel is CHARGE:
-        made = {t.name: _by_charge(t) for t in both}
-    else:
-        other = AMPLITUDE if channel is WIDTH else WIDTH
-        found = _in_pulses([(t[WIDTH.column], t[AMPLITUDE.column]) for t in both])[int(other is AMPLITUDE)]
-        if len(found) and np.ptp(found) > SAME * np.max(found):
-            words = f"{found.min():.4g} to {found.max():.4g} {other.unit}: a threshold in {channel.unit} is not one"
-            needed = " and ".join(CHARGE.ends)
-            raise both[0].error(
-                f"varies in {words} of all these pulses; expected {needed} of their charge", other.column
-            )
-        size = f"{np.median(found):.4g} {other.unit}" if len(found) else "0"
-        made = {t.name: _alone(t, channel, other, size) for t in both}
+    channel = channel_of(constants) or varying(_pairs(both))
+    made = {t.name: t for t in (_by_charge(both) if channel is CHARGE else _alone(both, channel))}
     return tuple(made.get(t.name, t) for t in trials)
 
 
@@ -110,8 +98,18 @@ def _with_envelopes(trials: Sequence[Trial], constants: Mapping[str, float]) -> 
 
 def varying(pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> Channel:
     """The channel that recruits where widths and amplitudes are known, by which of them varies between pulses."""
-    varies = [bool(len(x) and np.ptp(x) > SAME * x.max()) for x in _in_pulses(pairs)]
-    return CHARGE if all(varies) else AMPLITUDE if varies[1] else WIDTH
+    width, amplitude = map(_varies, _in_pulses(pairs))
+    return CHARGE if width and amplitude else AMPLITUDE if amplitude else WIDTH
+
+
+def _varies(sizes: np.ndarray) -> bool:
+    """Whether a quantity of pulses, shape (m,), is not one that a stimulator holds."""
+    return bool(len(sizes) and np.ptp(sizes) > SAME * sizes.max())
+
+
+def _pairs(trials: Sequence[Trial]) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Width and amplitude of each trial, (n,)."""
+    return [(t[WIDTH.column], t[AMPLITUDE.column]) for t in trials]
 
 
 def _in_pulses(pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
@@ -120,16 +118,24 @@ def _in_pulses(pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
     return both[:, (both != 0.0).all(axis=0)]
 
 
-def _by_charge(trial: Trial) -> Trial:
-    charge = 1e-3 * trial[WIDTH.column] * trial[AMPLITUDE.column]
+def _by_charge(trials: Sequence[Trial]) -> list[Trial]:
+    """Trials with the charge of each pulse, uC, in the place of its width and amplitude."""
     words = f"the stimulus is the charge of a pulse, {WIDTH.column} x {AMPLITUDE.column}"
-    return _replaced(trial, {CHARGE.column: charge}, words)
+    return [_replaced(t, {CHARGE.column: 1e-3 * t[WIDTH.column] * t[AMPLITUDE.column]}, words) for t in trials]
 
 
-def _alone(trial: Trial, channel: Channel, other: Channel, size: str) -> Trial:
-    values = np.where(trial[other.column] != 0.0, trial[channel.column], 0.0)
+def _alone(trials: Sequence[Trial], channel: Channel) -> list[Trial]:
+    """Trials with the width or the amplitude alone; InputError where the other is not the same in all pulses."""
+    widths, amplitudes = _in_pulses(_pairs(trials))
+    other, found = (AMPLITUDE, amplitudes) if channel is WIDTH else (WIDTH, widths)
+    if _varies(found):
+        words = f"{found.min():.4g} to {found.max():.4g} {other.unit}: a threshold in {channel.unit} is not one"
+        needed = " and ".join(CHARGE.ends)
+        raise trials[0].error(f"varies in {words} of all these pulses; expected {needed} of their charge", other.column)
+    size = f"{np.median(found):.4g} {other.unit}" if len(found) else "0"
     words = f"the stimulus is {channel.column}; {other.column} is {size} in every pulse and left out"
-    return _replaced(trial, {channel.column: values}, words)
+    held = [np.where(t[other.column] != 0.0, t[channel.column], 0.0) for t in trials]
+    return [_replaced(t, {channel.column: v}, words) for t, v in zip(trials, held, strict=True)]
 
 
 def _replaced(trial: Trial, columns: Mapping[str, np.ndarray], words: str) -> Trial:

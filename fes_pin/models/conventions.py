@@ -135,10 +135,7 @@ class _Seen:
 
     def __init__(self, trials: Sequence[Trial], constants: Mapping[str, float]) -> None:
         self.constants = constants
-        moving = [t for t in trials if "position" in t and len(t) >= FEWEST and 0.0 < np.ptp(t["position"]) < FARTHEST]
-        driven = [t for t in moving if "effort" in t and np.ptp(t["effort"]) > 0.0]
-        self.is_driven, self.trials = bool(driven), driven or [t for t in moving if "effort" not in t]
-        self.trials = [t if self.is_driven else t.with_columns(effort=np.zeros(len(t))) for t in self.trials]
+        self.is_driven, self.trials = _moving(trials)
         self.band = band_hz(self.trials)
         if math.isnan(self.band):  # coarse readings, or short: what is slow may show it
             self.band, self.trials = SLOWEST_HZ, [t for t in self.trials if _is_long(t)]
@@ -212,8 +209,17 @@ class _Seen:
         return [c for c in SIGNS if not math.isnan(self.factors[c.column])]
 
     def _rows(self, lines: Sequence[Sequence[np.ndarray]]) -> np.ndarray:
+        """Return the columns of each trial, some of (n,), below the band and as rows: (rows, columns)."""
         each = zip(self.trials, lines, strict=True)
         return np.concatenate([smoothed_rows(t, np.stack(list(one)), self.band) for t, one in each])
+
+
+def _moving(trials: Sequence[Trial]) -> tuple[bool, list[Trial]]:
+    """Return whether efforts drive trials that move, and those; else the trials that move freely, of effort 0."""
+    moving = [t for t in trials if "position" in t and len(t) >= FEWEST and 0.0 < np.ptp(t["position"]) < FARTHEST]
+    if driven := [t for t in moving if "effort" in t and np.ptp(t["effort"]) > 0.0]:
+        return True, driven
+    return False, [t.with_columns(effort=np.zeros(len(t))) for t in moving if "effort" not in t]
 
 
 def _is_long(trial: Trial) -> bool:
@@ -222,10 +228,12 @@ def _is_long(trial: Trial) -> bool:
 
 
 def _usual(speeds: np.ndarray) -> float:
+    """Return the root mean square of speeds, (n,): above 0."""
     return float(np.sqrt(np.mean(speeds**2))) + 1e-300
 
 
 def _sizes(columns: np.ndarray) -> np.ndarray:
+    """Return the root mean square of each column of (n, k), shape (k,): above 0."""
     return np.asarray(np.sqrt(np.mean(np.square(columns), axis=0)) + 1e-300)
 
 

@@ -15,7 +15,7 @@ from scipy.ndimage import distance_transform_edt, find_objects, label
 from fes_pin.body.joints import SIDES
 from fes_pin.body.skeleton import TO_WORLD
 from fes_pin.data.smooth import low_pass
-from fes_pin.data.walk_conventions import LOADED_N, level_in_the_air
+from fes_pin.data.walk_recorded import LOADED_N, level_in_the_air
 from fes_pin.walk.motion import Motion, Session, about
 
 ORDINARY_N = 1.5
