@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 
 import fes_pin as fp
 from fes_pin.cli.own import new_study
-from fes_pin.data.recorded.columns import FILE_KEYS, columns_of
+from fes_pin.data.recorded.columns_table import FILE_KEYS, columns_of
 from fes_pin.data.results import RESULT, TABLE, TEXT
 from fes_pin.data.schema import known_rigs
 from fes_pin.data.units import UNITS

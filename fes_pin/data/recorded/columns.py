@@ -1,29 +1,22 @@
-"""The table `[columns]` of a study: which column of the recordings is which of the rig's, in which unit."""
+"""Columns of recordings as a rig has them: which column of a file is which of the rig's, in which unit."""
 
 import math
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from fes_pin.data.errors import KeyFault, listed
-from fes_pin.data.recorded.events import EVENTS, sampled_events
+from fes_pin.data.errors import listed
+from fes_pin.data.recorded.events import sampled_events
 from fes_pin.data.recorded.formats import read_recording
 from fes_pin.data.recorded.regular import check_steps, filled, resampled
-from fes_pin.data.recorded.text import AFTER, AFTER_COMMENTS, DECIMALS, DELIMITERS, ENCODINGS, TextForm
+from fes_pin.data.recorded.text import TextForm
 from fes_pin.data.recorded.wraps import table_without_wraps
-from fes_pin.data.schema import RigSchema, any_number, check_known, one_of, positive, unknown
+from fes_pin.data.schema import RigSchema
 from fes_pin.data.table import Table
 from fes_pin.data.units import factor_of, known_unit, quantities_of, stated_unit
 
-FILE_KEYS = (
-    *("delimiter", "decimal", "header_row", "first_row", "comment", "encoding", "names", "transposed"),
-    *("resample_hz", "missing", "rows"),
-)
-SOURCE_KEYS = ("name", "unit", "scale", "zero", "edge", "rate_hz")
 INTERPOLATE = "interpolate"
 
 
@@ -154,29 +147,31 @@ class Columns:
         measured = () if inputs_only else (schema.outputs[kind],)
         needed = {"time_s", *schema.stimuli(kind), *schema.motion(kind)[:1], *measured}
         known = schema.columns_of(kind)
-        taken = {}
-        for column, source in self.sources.items():
-            if column not in known:  # read in trials of another kind
-                continue
-            if source.name and source.name not in recording.names:
-                if column in needed:
-                    message = f"missing; [columns] takes {column} from it, and this file has {listed(recording.names)}"
-                    raise recording.error(message, source.name)
-                continue
-            taken[column] = source
+        taken = self._stated_in(recording, needed, known)
         declared = {*self.ignored, *also, *(s.name for s in self.sources.values())}
-        for name in recording.names:
-            if name in declared:
-                continue
+        for name in (n for n in recording.names if n not in declared):
             if name not in known or name in taken:
                 expected = f"this rig reads {', '.join(known)}"
                 raise recording.error(f"expected it in [columns], or there among `ignored`; {expected}", name)
             taken[name] = ColumnSource(name)
         for column, source in taken.items():
             unit = recording.units.get(source.name, "")
-            if not source.is_stated and unit and (why := _unsaid(column, source.name, unit)):
+            if not source.is_stated and unit and (why := unsaid(column, source.name, unit)):
                 raise recording.error(why, source.name)
         return {c: taken[c] for c in ("time_s", *(n for n in taken if n != "time_s")) if c in taken}
+
+    def _stated_in(self, recording: Table, needed: set[str], known: Collection[str]) -> dict[str, ColumnSource]:
+        """Sources of `[columns]` that this file has; one that it lacks and the rig needs is an error."""
+        taken = {}
+        for column, source in self.sources.items():
+            if column not in known:  # read in trials of another kind
+                continue
+            if not source.name or source.name in recording.names:
+                taken[column] = source
+            elif column in needed:
+                message = f"missing; [columns] takes {column} from it, and this file has {listed(recording.names)}"
+                raise recording.error(message, source.name)
+        return taken
 
     def _time(self, recording: Table, source: ColumnSource | None) -> tuple[np.ndarray, float]:
         """Times, s, and half of the last digit that they were printed with."""
@@ -218,74 +213,7 @@ def _steps_in_words(steps: np.ndarray) -> str:
     return f"time steps of about {1e3 * usual:.3g} ms{longest}"
 
 
-def columns_of(table: Mapping[str, Any], schema: RigSchema, revolute: bool | None, error: KeyFault) -> Columns:
-    """The table `[columns]` of a study, checked.
-
-    Parameters
-    ----------
-    table
-        As TOML gives it.
-    revolute
-        Whether the rig's joint turns or slides; None if it has none, or that is not known.
-    error
-        Makes the exception for a key below `columns` and a message.
-
-    Raises
-    ------
-    Exception
-        What `error` makes.
-    """
-    if len(schema.recordings) > 1:
-        raise error("", f"expected no [columns] for rig {schema.name}: its files name their columns themselves")
-    sources, ignored, about = {}, (), {}
-    for key, value in table.items():
-        if key == "ignored":
-            if not isinstance(value, list) or not all(isinstance(one, str) for one in value):
-                raise error(key, "expected a list of column names")
-            ignored = tuple(value)
-        elif key == "file":
-            if not isinstance(value, dict):
-                raise error(key, "expected a table [columns.file]")
-            about = value
-        elif key not in schema.columns:
-            raise error(key, unknown(key, (*schema.columns, "ignored", "file")))
-        else:
-            sources[key] = _source(key, value, revolute, error)
-    names = [s.name for s in sources.values() if s.name]
-    for column, source in sources.items():
-        if source.name in ignored or (source.name and names.count(source.name) > 1):
-            raise error(column, f"{source.name!r} is named twice in [columns]")
-    scaled = frozenset(c for c in sources if isinstance(table[c], dict) and "scale" in table[c])
-    return _with_file(Columns(sources, ignored, revolute=revolute, scaled=scaled), about, error)
-
-
-def _source(column: str, value: Any, revolute: bool | None, error: KeyFault) -> ColumnSource:
-    given = {"name": value} if isinstance(value, str) else value
-    if not isinstance(given, dict):
-        raise error(column, 'expected the name of a column, or a table like { name = "Angle", unit = "deg" }')
-    check_known(given, SOURCE_KEYS, lambda key, message: error(f"{column}.{key}", message))
-    keys = [k for k in ("scale", "zero", "edge", "rate_hz") if k in given]
-    numbers = {k: any_number("").check(given[k], partial(error, f"{column}.{k}")) for k in keys}
-    rate = numbers.get("rate_hz")
-    if rate is not None and (column != "time_s" or not rate > 0.0 or len(given) > 1):
-        raise error(f"{column}.rate_hz", "expected a rate above 0, alone, and of time_s only")
-    if "edge" in numbers and column != "stim":
-        raise error(f"{column}.edge", "expected for stim only: where a recorded trigger rises above it, a pulse begins")
-    if numbers.get("scale") == 0.0:
-        raise error(f"{column}.scale", "expected a number other than 0")
-    name, unit = given.get("name", ""), given.get("unit", "")
-    if not isinstance(unit, str):
-        raise error(f"{column}.unit", "expected a unit as text")
-    if rate is None and (not isinstance(name, str) or not name):
-        raise error(f"{column}.name", "expected the name of a column of the files")
-    is_stated = bool(unit) or bool({"scale", "edge", "rate_hz"} & set(numbers))
-    if name != column and not is_stated and (why := _unsaid(column, name, "", revolute)):
-        raise error(f"{column}.unit", why)
-    factor = factor_of(unit, column, revolute, partial(error, f"{column}.unit")) if unit else 1.0
-    return ColumnSource(name, factor, **numbers, is_stated=is_stated)
-
-
-def _unsaid(column: str, name: str, unit: str, revolute: bool | None = None) -> str:
+def unsaid(column: str, name: str, unit: str, revolute: bool | None = None) -> str:
     """What is missing where a file states other numbers than a rig's column holds; "" where they may be the same.
 
     Parameters
@@ -304,50 +232,3 @@ def _unsaid(column: str, name: str, unit: str, revolute: bool | None = None) -> 
     if not quantities_of(column, revolute) or (column == "stim" and quantity != "current"):
         return ""
     return f"missing, and {says} says {f'a {quantity}, {stated}' if quantity else stated}: expected a unit or a scale"
-
-
-def _with_file(columns: Columns, about: Mapping[str, Any], error: KeyFault) -> Columns:
-    """With what `[columns.file]` says of how the files are written."""
-    check_known(about, FILE_KEYS, lambda key, message: error(f"file.{key}", message))
-    form = {key: _of_file(key, value, partial(error, f"file.{key}")) for key, value in about.items()}
-    rate, missing, rows = (form.pop(key, None) for key in ("resample_hz", "missing", "rows"))
-    if rows is not None and rate is None:
-        raise error("file.rows", f'expected resample_hz as well: rows = "{EVENTS}" are held from step to step')
-    form.setdefault("first_row", form.get("header_row", 1) + 1)
-    if form.get("header_row") == AFTER_COMMENTS and ("comment" not in form or "first_row" in about):
-        raise error("file.header_row", f'"{AFTER}" wants comment to say what begins one, and no first_row')
-    text = TextForm(**form)
-    if text.first_row <= text.header_row:
-        raise error("file.first_row", f"expected a line below the header in line {text.header_row}")
-    return replace(columns, form=text, resample_hz=rate, fills=missing is not None, events=rows is not None)
-
-
-WORDS = {
-    **{"delimiter": DELIMITERS, "decimal": DECIMALS, "encoding": ENCODINGS},
-    **{"missing": (INTERPOLATE,), "rows": (EVENTS,)},
-}
-"""Keys of `[columns.file]` that have one of some words."""
-
-
-def _of_file(key: str, value: Any, error: Callable[[str], Exception]) -> Any:
-    """The value of a key of `[columns.file]`, checked."""
-    if key in WORDS:
-        return one_of(value, WORDS[key], error)
-    if key == "resample_hz":
-        return positive("Hz").check(value, error)
-    if key == "comment":
-        if not isinstance(value, str) or not value.strip():
-            raise error("expected what a comment begins with")
-        return value.strip()
-    if key == "names":
-        if not isinstance(value, list) or not value or not all(isinstance(one, str) for one in value):
-            raise error("expected a list of names, one for each column of the files")
-        return tuple(value)
-    if key == "transposed":
-        if not isinstance(value, bool):
-            raise error("expected true or false")
-        return value
-    is_after = key == "header_row" and value == AFTER
-    if not is_after and (isinstance(value, bool) or not isinstance(value, int) or value < (key == "first_row")):
-        raise error("expected the number of a line, from 1" + (" (0: no header)" * (key == "header_row")))
-    return AFTER_COMMENTS if is_after else value
