@@ -16,7 +16,7 @@ from fes_pin.data.errors import InputError
 from fes_pin.data.files import inside, read_bytes
 from fes_pin.data.new_columns import NewColumns, Source
 from fes_pin.data.new_view import FilesOfTrial, WantedView, grouped_files, trial_view
-from fes_pin.data.recorded.sniff import Proposal, propose
+from fes_pin.data.recorded.sniff import Proposal, proposals_of
 from fes_pin.data.schema import NumberKey, any_number, one_of, unknown
 from fes_pin.data.study_text import HEADER, source_in_words, toml_table
 from fes_pin.data.wanted import Wanted, labels_of, number_set, of_files
@@ -73,7 +73,9 @@ def new_study(wanted: Wanted, guess: Guess) -> NewStudy:
 def with_kind(made: NewStudy, kind: str) -> NewStudy:
     """Return a new study with a kind for the trials that state none."""
     text = re.sub(
-        r"(\[\[trial\]\]\n(?:file|sources) = .*\n)(?!kind)", rf'\1kind = "{kind}"\n', str(made.contents["study.toml"])
+        r"(\[\[trial\]\]\n(?:file|sources) = .*\n(?:sheet = .*\n)?)(?!kind|sheet)",
+        rf'\1kind = "{kind}"\n',
+        str(made.contents["study.toml"]),
     )
     return replace(made, contents={**made.contents, "study.toml": text})
 
@@ -87,7 +89,8 @@ class _Making:
         """What nobody has said, as options, and what is asked for it, by `column NAME` or `set KEY`."""
         self.own = of_files(wanted.files, "--set", wanted.settings)
         chosen = tuple(wanted.columns.values())
-        each = [propose(p, self.schema, wanted.revolute, wanted.form, chosen) for p in wanted.files]
+        found = [proposals_of(p, self.schema, wanted.revolute, wanted.form, chosen) for p in wanted.files]
+        each = [one for some in found for one in some]
         self.trials = grouped_files(each, self.schema, wanted.sources)
         self.columns = NewColumns(wanted, self.trials, self.missing)
 
@@ -142,7 +145,8 @@ class _Making:
     def _trial_keys(self, one: FilesOfTrial, files: Mapping[str, str], kind: str) -> dict[str, Any]:
         """Its files, its kind where that is not open, and its labels."""
         whole = {"sources": files} if one.is_joined else {"file": files[""]}
-        known = {} if self._is_open(one.proposal, kind) else {"kind": kind}
+        known = {"sheet": one.proposal.sheet} if one.proposal.sheet else {}
+        known |= {} if self._is_open(one.proposal, kind) else {"kind": kind}
         return {**whole, **known, **labels_of(self.wanted, *(p.recording.path for p in one.files.values()))}
 
     def _position(self, columns: Mapping[str, Source]) -> str | None:

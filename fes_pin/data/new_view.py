@@ -157,7 +157,10 @@ def _joined(files: Mapping[str, Proposal], schema: RigSchema) -> FilesOfTrial:
     first = next(iter(files.values())).recording
     names = tuple(f"{source}{APART}{n}" for source, one in files.items() for n in one.recording.names)
     whole = replace(first, names=names, columns=columns)
-    return FilesOfTrial(files, Proposal(whole, None, candidates, units))
+    sheets = dict.fromkeys(one.sheet for one in files.values())
+    if len(sheets) > 1:
+        raise InputError(f"expected the same sheet in each file of a trial, found {', '.join(sheets)}", file=first.path)
+    return FilesOfTrial(files, Proposal(whole, None, candidates, units, sheet=next(iter(sheets))))
 
 
 def _meant(source: str, one: Proposal, schema: RigSchema) -> dict[str, tuple[str, ...]]:
@@ -225,8 +228,9 @@ def trial_view(
         said.append(f"{' and '.join(one.recording.path.name for one in files.files.values())} are one trial")
         offsets = _offsets(seconds, wanted.offsets)
         keys |= {"offset_s": offsets} if offsets else {}
-    if position is not None and not keys:
-        free, more = free_part(name, main, files.proposal.recording.columns[position])
+    recorded = files.proposal.recording.columns.get(position or "")  # none of words, which their reader refuses
+    if recorded is not None and not keys:
+        free, more = free_part(name, main, recorded)
         keys, said = free, [*said, *more]
     keys |= {"derive": dict(wanted.derived)} if wanted.derived else {}
     if not wanted.is_regular and (rate_hz := _own_rate(files, times, main, keys)):

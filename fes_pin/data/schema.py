@@ -16,7 +16,7 @@ from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.table import own_table
 
 ROLES = ("fit", "held_out")
-OF_A_VIEW = ("sources", "from", "to", "at", "split", "derive", "rate", "offset_s")
+OF_A_VIEW = ("sources", "from", "to", "at", "split", "derive", "rate", "offset_s", "sheet")
 """Keys of a `[[trial]]` that say which part of which recordings it is."""
 ALSO_OF_A_TRIAL = ("file", "kind", "role", "group", "name", "remarks", "low_pass_hz", *OF_A_VIEW)
 """Keys of a `[[trial]]` in addition to its conditions."""

@@ -436,6 +436,7 @@ class _Reader(StudyTables):
             paths.append(PurePosixPath((table[main] if main in table else table["sources"][main]).replace("\\", "/")))
         stems = Counter(path.stem for path in dict.fromkeys(paths))
         names = [path.stem if stems[path.stem] == 1 else str(path.with_suffix("")) for path in paths]
+        names = [f"{name}-{view.sheet}" if view.sheet else name for name, (_, view) in zip(names, views, strict=True)]
         count = Counter(names)
         twice = [f"{n}-{names[:k].count(n) + 1}" if count[n] > 1 else n for k, n in enumerate(names)]
         return [table.get("name", name) for table, name in zip(tables, twice, strict=True)]

@@ -6,6 +6,7 @@
 | `.mat` | pymatreader (scipy and h5py) | `matlab` |
 | `.c3d` | ezc3d | `c3d` |
 | `.xdf`, `.xdfz` | pyxdf | `xdf` |
+| `.xlsx`, `.xls`, `.ods` ... | python-calamine | `spreadsheet` |
 | `.mot`, `.sto`, `.trc`, `.json` | none | |
 """
 
@@ -28,10 +29,7 @@ from fes_pin.data.recorded.text import TextForm, read_text_recording, without_tw
 from fes_pin.data.table import MIN_ROWS, Table
 
 UNREADABLE = {
-    **dict.fromkeys(
-        (".xlsx", ".xls", ".xlsm", ".ods", ".numbers"),
-        "a spreadsheet: what a cell shows need not be what was measured; save the sheet as CSV",
-    ),
+    ".numbers": "a spreadsheet of Numbers; save it as .xlsx or CSV",
     **dict.fromkeys((".pkl", ".pickle"), "a pickle, which runs code when it is read; save it as CSV or Parquet"),
     **dict.fromkeys((".zip", ".gz", ".7z"), "an archive; unpack it first"),
 }
@@ -39,7 +37,7 @@ UNREADABLE = {
 
 
 def is_text(path: Path) -> bool:
-    """Return whether a file is read as text, by its suffix."""
+    """Return whether a file is read as text, by its suffix: a spreadsheet's sheet is."""
     return path.suffix.lower() not in {*_READERS, *UNREADABLE}
 
 

@@ -6,17 +6,20 @@ numbers.
 
 import operator
 import re
+from collections import defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from fes_pin.data.errors import InputError
-from fes_pin.data.files import as_path, read_bytes, read_text
+from fes_pin.data.errors import InputError, listed
+from fes_pin.data.files import as_path, read_bytes
 from fes_pin.data.recorded.clock import clock_seconds
 from fes_pin.data.recorded.formats import by_length, check_suffix, is_nested, is_text, read_recording
 from fes_pin.data.recorded.header import NUMBER, Header, cells_in, header_of, is_keyed, ways
+from fes_pin.data.recorded.sheets import is_spreadsheet, sheets_of
 from fes_pin.data.recorded.text import DECIMALS, DELIMITERS, MISSING, TextForm, cells_of, read_text_recording
 from fes_pin.data.schema import MEANT, RigSchema, without_unit
 from fes_pin.data.table import Table
@@ -46,7 +49,7 @@ def sniffed(path: Path, stated: Mapping[str, Any] = MappingProxyType({})) -> tup
     InputError
         Not a text file, or no rows of numbers in it.
     """
-    lines, rows, form = _likeliest(path)
+    lines, rows, form = _likeliest(path, str(stated.get("sheet", "")))
     found = max(_first_of(lines, rows, form), int(stated.get("header_row", 0)))
     first = int(stated.get("first_row", found + 1)) - 1
     above = lines[:first]
@@ -62,11 +65,14 @@ def sniffed(path: Path, stated: Mapping[str, Any] = MappingProxyType({})) -> tup
     return replace(form, **stated), header
 
 
-def _likeliest(path: Path) -> tuple[list[str], Rows, TextForm]:
+def _likeliest(path: Path, sheet: str) -> tuple[list[str], Rows, TextForm]:
     """The first lines of a file, its rows of numbers, and the form in which these are likeliest, without a header."""
-    encoding = _encoding(path)
-    lines = read_text(path, encoding).split("\n")[:LOOKED_AT]
-    forms = [TextForm(delimiter, decimal, encoding=encoding) for delimiter in DELIMITERS for decimal in DECIMALS]
+    if is_spreadsheet(path):
+        forms = [TextForm(sheet=sheet)]
+    else:
+        encoding = _encoding(path)
+        forms = [TextForm(delimiter, decimal, encoding=encoding) for delimiter in DELIMITERS for decimal in DECIMALS]
+    lines = forms[0].lines(path)[:LOOKED_AT]
     rows, form = max(((_rows(lines, form), form) for form in forms), key=lambda pair: _likely(*pair))
     if not rows:
         raise InputError("expected rows of numbers, found none", file=path)
@@ -159,7 +165,7 @@ def read_csv_or_hint(path: str | Path) -> Table:
     """
     path = as_path(path)
     check_suffix(path)
-    if not is_text(path):
+    if not is_text(path) or is_spreadsheet(path):
         raise InputError(f"expected CSV, found {path.suffix}; {NEW_STUDY}", file=path)
     try:
         return read_text_recording(path, TextForm(strict=True))
@@ -198,6 +204,8 @@ class Proposal:
         Of the samples, where lines above the numbers state it.
     said
         What is odd about the file and how it is taken, a sentence each.
+    sheet
+        Of a spreadsheet that has several.
     """
 
     recording: Table
@@ -206,6 +214,38 @@ class Proposal:
     units: Mapping[str, str]
     rate_hz: float | None = None
     said: tuple[str, ...] = ()
+    sheet: str = ""
+
+
+def proposals_of(
+    path: Path, schema: RigSchema, revolute: bool | None, stated: Mapping[str, Any], chosen: Collection[str] = ()
+) -> list[Proposal]:
+    """What the recordings in a file seem to hold, as `propose`: one, or the sheets of a spreadsheet that are alike.
+
+    Of sheets with other columns those with most rows are taken.
+
+    Raises
+    ------
+    InputError
+        As `propose`.
+    """
+    sheets = sheets_of(path) if is_spreadsheet(path) else ()
+    if len(sheets) < 2:
+        return [propose(path, schema, revolute, stated, chosen)]
+    alike: dict[Any, list[Proposal]] = defaultdict(list)
+    for sheet in sheets:
+        with suppress(InputError):  # a title page, a drawing
+            one = propose(path, schema, revolute, {**stated, "sheet": sheet}, chosen)
+            one = replace(one, form=replace(one.form or TextForm(), sheet=""), sheet=sheet)
+            alike[one.recording.names, one.form].append(one)
+    if not alike:
+        raise InputError(f"expected rows of numbers in one of its sheets, {listed(sheets)}", file=path)
+    taken = max(alike.values(), key=lambda some: sum(len(one.recording) for one in some))
+    names = [one.sheet for one in taken]
+    left = [sheet for sheet in sheets if sheet not in names]
+    words = f"{path.name}: {listed(names)} of its {len(sheets)} sheets {'are trials' if names[1:] else 'is a trial'}"
+    said = words + (f", not {listed(left)}: without numbers, or with other columns" if left else "")
+    return [replace(taken[0], said=(*taken[0].said, said)), *taken[1:]]
 
 
 def propose(

@@ -14,8 +14,9 @@ from pathlib import Path
 import numpy as np
 
 from fes_pin.data.errors import InputError
-from fes_pin.data.files import as_path, read_text
+from fes_pin.data.files import as_path
 from fes_pin.data.recorded.clock import clock_seconds, from_first
+from fes_pin.data.recorded.sheets import lines_in
 from fes_pin.data.table import MIN_ROWS, Table
 from fes_pin.data.units import are_units, bare_unit
 
@@ -53,6 +54,8 @@ class TextForm:
         What a line begins with that is passed over; "" for nothing.
     encoding
         Of `ENCODINGS`.
+    sheet
+        Of a spreadsheet; "" for its first one.
     strict
         Whether each line must hold as many numbers as there are names, none of them missing and no two names alike, as
         the study format has it.
@@ -66,7 +69,18 @@ class TextForm:
     encoding: str = "utf-8"
     names: tuple[str, ...] = ()
     transposed: bool = False
+    sheet: str = ""
     strict: bool = False
+
+    def lines(self, path: Path) -> list[str]:
+        """Lines of a file, or of a sheet of a spreadsheet.
+
+        Raises
+        ------
+        InputError
+            As `lines_in`.
+        """
+        return lines_in(path, self.encoding, self.delimiter, self.sheet)
 
     def in_words(self) -> str:
         """What sets this form apart from that of the study format; "" if nothing does."""
@@ -146,7 +160,7 @@ def read_text_recording(path: Path, form: TextForm, wanted: Sequence[str] | None
     InputError
         A file that is not of this form, with row and column.
     """
-    lines = read_text(path, form.encoding).split("\n")
+    lines = form.lines(path)
     if form.header_row == AFTER_COMMENTS:
         row = row_after_comments(lines, form)
         form = replace(form, header_row=row, first_row=row + 1)
@@ -159,7 +173,7 @@ def after_comments(path: Path, form: TextForm | None) -> TextForm | None:
     """The form of a file whose names follow its comments, however many lines these are; another as it is."""
     if form is None or not form.comment or form.first_row != form.header_row + 1:
         return form
-    lines = read_text(path, form.encoding).split("\n")
+    lines = form.lines(path)
     is_next = form.header_row == row_after_comments(lines, form)
     return replace(form, header_row=AFTER_COMMENTS, first_row=AFTER_COMMENTS + 1) if is_next else form
 

@@ -45,6 +45,8 @@ class View:
         By source what is added to its times, s; `FITTED` where the recordings show it.
     is_joined
         Whether it has several sources.
+    sheet
+        Of a spreadsheet; "" for its first one.
     """
 
     begin_s: float | None = None
@@ -55,6 +57,7 @@ class View:
     rate_hz: float | None = None
     offsets: Mapping[str, float | str] = field(default_factory=dict)
     is_joined: bool = False
+    sheet: str = ""
 
     @property
     def also(self) -> tuple[str, ...]:
@@ -62,10 +65,10 @@ class View:
         return () if self.split in ("", RESTARTS, HOLES, RESTS) else (self.split,)
 
     def overlaps(self, other: View) -> bool:
-        """Return whether two views of one file have a stretch of time in common."""
+        """Return whether two views of one file have a stretch of time of one sheet in common."""
         begins = [-np.inf if v.begin_s is None else v.begin_s for v in (self, other)]
         ends = [np.inf if v.end_s is None else v.end_s for v in (self, other)]
-        return max(begins) < min(ends)
+        return self.sheet == other.sheet and max(begins) < min(ends)
 
     def parts(self, table: Table, readings: Sequence[str]) -> list[Table]:
         """The parts of a recording that are trials, in its order.
@@ -172,7 +175,10 @@ def view_of(table: Mapping[str, Any], sources: Sequence[str], error: KeyFault) -
         if INTEGRATED.get(name) != one_of(source, tuple(INTEGRATED.values()), partial(error, f"derive.{name}")):
             raise error(f"derive.{name}", 'expected position = "velocity"')
     offsets = _offsets(table, sources, error)
-    return View(ends.get("from"), ends.get("to"), at, split, derive, rate, offsets, len(sources) > 1)
+    sheet = table.get("sheet", "")
+    if not isinstance(sheet, str):
+        raise error("sheet", "expected the name of a sheet of a spreadsheet")
+    return View(ends.get("from"), ends.get("to"), at, split, derive, rate, offsets, len(sources) > 1, sheet)
 
 
 def _offsets(table: Mapping[str, Any], sources: Sequence[str], error: KeyFault) -> dict[str, float | str]:
