@@ -23,6 +23,15 @@ model and a trial to predict."""
 READING_KINDS = (*KINDS[2:], "recording", "walk", "view", "files")
 """Spoilt files alone, and views of recordings; of what `fes-pin new-study` reads as well: an instrument's recording, a
 walk in two `.mot`, two files of one trial."""
+SAID = (
+    *(("--column", f"position=Angle{more}") for more in ("", ":deg", ",scale=-1", ":nobody", "s")),
+    *(("--column", what) for what in ("effort=Torque", "effort=", "time_s=t:ms", "time_s=rate=50", "velocity=Angle")),
+    *(("--split", at) for at in ("restarts", "holes", "rests", "Angle", "none")),
+    *(("--set", what) for what in ("kind=imposed", "from=0.1", "to=0.3", "a.csv:from=9", "damping=x")),
+    *(("--header-row", "1"), ("--header-row", "0"), ("--first-row", "9"), ("--names", "t,q,u"), ("--transposed",)),
+    *(("--resample", "50"), ("--resample", "1e6"), ("--fill",), ("--role", "a.csv=held_out")),
+)
+"""What a person may say of a recording, right and wrong."""
 
 
 @dataclass(frozen=True)
@@ -101,7 +110,8 @@ def _new_study(kind: str, work: Path, rng: np.random.Generator) -> Call:
     if kind == "recording":
         recording, out = work / "a.csv", work / "made"
         recording.write_text(instrument(rng), encoding="utf-8")
-        return Call(["new-study", str(recording), "--pendulum", "0.3", "1", "--out", str(out)], recording, out)
+        said = [word for option in rng.permutation(len(SAID))[: int(rng.integers(4))] for word in SAID[option]]
+        return Call(["new-study", str(recording), "--pendulum", "0.3", "1", *said, "--out", str(out)], recording, out)
     if kind == "files":
         files, out = (work / "a_pos.csv", work / "a_tau.csv"), work / "made"
         for path in files:

@@ -16,6 +16,7 @@ KEYS = {
     "rate": ("50", "33.3", "0", "-5", "1e9", "1e-9", '"a"'),
     "derive": ('{ position = "velocity" }', "{}", '{ position = "effort" }', "3", '{ velocity = "position" }'),
     "offset_s": ('{ a = "fit" }', "{ a = 0.01 }", "{}", "1", '{ b = "x" }'),
+    "sheet": ('"Sheet1"', '""', "1"),
     "sources": ('{ a = "trials/00.csv" }', '{ a = "trials/00.csv", b = "trials/01.csv" }', "{}", "3", '{ "" = "a" }'),
 }
 """Values of each key, of which some cannot be."""
