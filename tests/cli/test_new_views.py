@@ -229,3 +229,17 @@ def test_a_unit_of_another_quantity_wants_a_scale(monkeypatch, capsys, tmp_path,
     said = fails(monkeypatch, capsys, *words, f"velocity=speed:{unit}")
     assert f"found {unit!r}; of another quantity NAME,scale=NUMBER (m/s for each)" in said
     assert run(monkeypatch, *words, "velocity=speed,scale=0.02") == 0
+
+
+@pytest.mark.parametrize("column", ["t [ms]", "Angle"])
+def test_a_word_among_the_numbers_of_a_free_motion_is_named_by_its_place(monkeypatch, capsys, tmp_path, column):
+    path = write(tmp_path / "a.csv", **{"t [ms]": 1e3 * TIME, "Angle": swing(TIME)})
+    lines = path.read_text().splitlines()
+    lines[40] = ",".join(
+        "twelve" if n == column else v for n, v in zip(("t [ms]", "Angle"), lines[40].split(","), strict=True)
+    )
+    path.write_text("\n".join(lines))
+    said = ("--column", "time_s=t [ms]:ms", "--column", "position=Angle:rad")
+    printed = fails(monkeypatch, capsys, "new-study", path, *ROD, *said)
+    assert f"row 41, column {column}: expected a number, found 'twelve'" in printed
+    assert not (tmp_path / "study.toml").exists()

@@ -24,9 +24,9 @@ def free_from(time: np.ndarray, position: np.ndarray) -> float | None:
     Parameters
     ----------
     time, position
-        Shape (n,); nothing drives the rig.
+        Shape (n,), times (0,) where they are no numbers; nothing drives the rig.
     """
-    if not (np.isfinite(time).all() and np.isfinite(position).all()):
+    if not len(time) or not (np.isfinite(time).all() and np.isfinite(position).all()):
         return None
     count = round(REST_S / max(float(np.median(np.diff(time))), 1e-12))
     if count < 2 or len(time) < 4 * count:
