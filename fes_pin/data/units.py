@@ -41,8 +41,9 @@ _OF_A_JOINT = {"position": ("angle", "length"), "velocity": ("angular rate", "sp
 
 
 def _plain(unit: str) -> str:
-    """A unit without what writers vary: case, spaces, dots, signs of multiplication."""
+    """A unit without what writers vary: case, spaces, dots, signs of multiplication, ways to say "per second"."""
     text = unit.strip().replace("µ", "u").replace("μ", "u").replace("°", "deg").replace("º", "deg").lower()
+    text = re.sub(r"(?<=[a-z])[\s.*·⋅]*s\^?(?:-1|⁻¹)$|\s*(?:/|\bper\b)\s*(?:s|sec|seconds?)$", "/s", text)
     text = re.sub(r"[\s.*·⋅^_-]", "", text)
     return _SPELLINGS.get(text, text)
 
@@ -210,7 +211,7 @@ def _apart(text: str) -> Iterator[tuple[str, str]]:
     """Ways to part a text into a name and what may be a unit at its end; the name is "" where there is none."""
     for separator in "/_ -.":
         name, _, unit = text.rpartition(separator)
-        if separator in "/_" and unit in ("s", "S"):  # rad_s, m/s: per second
+        if separator in "/_" and unit.lower() in ("s", "sec"):  # rad_s, m/s: per second
             before, _, per = name.rpartition(separator)
             yield before, f"{per}/{unit}"
         yield name, unit
