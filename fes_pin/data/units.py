@@ -27,6 +27,8 @@ _SPELLINGS: dict[str, str] = {}
 
 CURRENTS = frozenset({"current", "amps", "ampere", "amperes", "strom", "courant", "corrente", "corriente"})
 """Words for an electric current: no effort without a scale, and no pulse width."""
+SPEEDS = MEANT["velocity"] - {"rate"}
+"""Words for a speed: one in Hz is turns a second, while a rate in Hz is one of pulses or samples."""
 LONGEST = 12
 """Characters of the longest unit in a row that also has known ones; `revolutions` has 11."""
 SPELT_OUT = 4
@@ -135,7 +137,16 @@ def may_be(column: str, name: str, unit: str = "", revolute: bool | None = None)
     quantity, stated = stated_unit(name, unit)
     if not quantity or known_unit(unit or stated, quantities_of(column, revolute)) is not None:
         return True
+    if turns_a_second(column, name, unit, revolute):
+        return True
     return quantity in ("voltage", "counts", "share") or (quantity == "current" and column == "effort")
+
+
+def turns_a_second(column: str, name: str, unit: str = "", revolute: bool | None = None) -> bool:
+    """Return whether a recorded column is the speed of what turns, in Hz: `Motor speed [Hz]`, but not `Pulse rate`."""
+    if column != "velocity" or revolute is False or stated_unit(name, unit) != ("frequency", "Hz"):
+        return False
+    return bool(SPEEDS & words_of(split_header(name)[0]))
 
 
 def words_of(name: str) -> frozenset[str]:
@@ -200,7 +211,7 @@ def split_header(header: str) -> tuple[str, str]:
     (name, unit)
         The unit is empty where the header names none that is known.
     """
-    text = header.strip().strip("\"'")
+    text = re.sub(r"#\d+$", "", header.strip().strip("\"'"))  # the second of that name
     found = _BRACKETED.match(text)
     if found and found["unit"]:
         return found["name"].strip(), found["unit"]

@@ -12,6 +12,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+import numpy as np
+
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import as_path, read_bytes, read_text
 from fes_pin.data.recorded.clock import clock_seconds
@@ -28,6 +30,8 @@ NEW_STUDY = "`fes-pin new-study` writes a [columns] table that reads it as it is
 WIDE = 10
 """Columns for each row, at least, of a table that looks transposed; the one with the fewest rows that is read has 3."""
 COMMENTS = ("#", "%", "//")
+WANTED = frozenset("setpoint target goal desired demand demanded command commanded cmd reference ref soll".split())
+"""Words for what a controller wants, which is no reading."""
 _NUMBER = {".": NUMBER, ",": re.compile(r"^[+-]?\d+(,\d+)?([eE][+-]?\d+)?$")}
 Rows = list[tuple[int, list[bool]]]
 """Places of the rows of numbers, the last first, and of each cell whether it is a number."""
@@ -65,13 +69,26 @@ def sniffed(path: Path, stated: Mapping[str, Any] = MappingProxyType({})) -> tup
 def _likeliest(path: Path) -> tuple[list[str], Rows, TextForm]:
     """The first lines of a file, its rows of numbers, and the form in which these are likeliest, without a header."""
     encoding = _encoding(path)
-    lines = read_text(path, encoding).split("\n")[:LOOKED_AT]
+    every = read_text(path, encoding).split("\n")
+    lines = every[:LOOKED_AT]
     forms = [TextForm(delimiter, decimal, encoding=encoding) for delimiter in DELIMITERS for decimal in DECIMALS]
     rows, form = max(((_rows(lines, form), form) for form in forms), key=lambda pair: _likely(*pair))
     if not rows:
         raise InputError("expected rows of numbers, found none", file=path)
+    if len(rows) > 1 and _counts(cells_of(lines[rows[-1][0]], form), every[rows[-1][0] + 1 :]):
+        rows = rows[:-1]
     comment = next((c for line in lines for c in COMMENTS if line.lstrip().startswith(c)), "")
     return lines, rows, replace(form, comment=comment)
+
+
+def _counts(cells: Sequence[str], below: Sequence[str]) -> bool:
+    """Return whether a first row says how many samples each channel has: whole numbers, the lines below at most."""
+    found = [cell for cell in cells if cell]
+    if not all(cell.isdecimal() for cell in found):
+        return False
+    count = sum(1 for line in below if line.strip())
+    most = max(map(int, found), default=0)
+    return most == count and min(map(int, found)) > 0.5 * most
 
 
 def _first_of(lines: list[str], rows: Rows, form: TextForm) -> int:
@@ -250,7 +267,24 @@ def propose(
         }
         taken = {name for found in candidates.values() for name in found}
         candidates |= {c: tuple(n for n in found if n not in taken) for c, found in either.items()}
+    candidates = {c: _readings(c, _without_copies(found, recording)) for c, found in candidates.items()}
     return Proposal(recording, form, _without_doubles(candidates), units, header.rate_hz, header.said)
+
+
+def _without_copies(names: Sequence[str], recording: Table) -> tuple[str, ...]:
+    """Columns of which no two hold the same numbers, as the times before each channel do; the first of them."""
+    kept: list[str] = []
+    for name in names:
+        values = recording.columns[name]
+        if not any(np.array_equal(values, recording.columns[other], equal_nan=True) for other in kept):
+            kept.append(name)
+    return tuple(kept)
+
+
+def _readings(column: str, names: tuple[str, ...]) -> tuple[str, ...]:
+    """Columns of a motion without those that say what was wanted of it, where others say what it was."""
+    read = tuple(n for n in names if not WANTED & words_of(n)) if column in ("position", "velocity") else names
+    return read or names
 
 
 def _numbers(path: Path, form: TextForm) -> Table:
