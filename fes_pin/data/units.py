@@ -158,7 +158,7 @@ def words_of(name: str) -> frozenset[str]:
 def bare_unit(cell: str) -> str:
     """The unit that a cell of a row of units states; "" of one that has none."""
     bare = cell.strip("[](){} ")
-    return "" if bare in ("-", "1") else bare
+    return "" if bare in ("-", "1", "*") else bare
 
 
 def are_units(cells: Sequence[str], names: Sequence[str] = ()) -> bool:

@@ -21,7 +21,7 @@ from fes_pin.data.recorded.formats import by_length, check_suffix, is_nested, is
 from fes_pin.data.recorded.header import NUMBER, Header, cells_in, header_of, is_keyed, ways
 from fes_pin.data.recorded.text import DECIMALS, DELIMITERS, MISSING, TextForm, cells_of, read_text_recording
 from fes_pin.data.schema import MEANT, RigSchema, without_unit
-from fes_pin.data.table import Table
+from fes_pin.data.table import MIN_ROWS, Table
 from fes_pin.data.units import known_unit, may_be, quantities_of, split_header, words_of
 
 LOOKED_AT = 400
@@ -55,7 +55,8 @@ def sniffed(path: Path, stated: Mapping[str, Any] = MappingProxyType({})) -> tup
     first = int(stated.get("first_row", found + 1)) - 1
     above = lines[:first]
     turned = None if "transposed" in stated else _transposed(above, rows, form)
-    numbers = [cells_of(lines[place], form) for place, _ in reversed(rows[-2:])]
+    below = [place for place, _ in reversed(rows) if place >= first] or [rows[-1][0]]
+    numbers = [cells_of(lines[place], form) for place in below[:2]]
     header = turned or (Header() if stated.get("transposed") else header_of(above, form, numbers))
     if not turned and not header.row and not header.said and len(numbers[0]) >= WIDE * len(rows):
         odd = f"{len(rows)} rows of {len(numbers[0])} columns without names: is the table transposed?"
@@ -70,7 +71,7 @@ def _likeliest(path: Path) -> tuple[list[str], Rows, TextForm]:
     """The first lines of a file, its rows of numbers, and the form in which these are likeliest, without a header."""
     encoding = _encoding(path)
     every = read_text(path, encoding).split("\n")
-    lines = every[:LOOKED_AT]
+    lines = _first_block(every[:LOOKED_AT])
     forms = [TextForm(delimiter, decimal, encoding=encoding) for delimiter in DELIMITERS for decimal in DECIMALS]
     rows, form = max(((_rows(lines, form), form) for form in forms), key=lambda pair: _likely(*pair))
     if not rows:
@@ -79,6 +80,20 @@ def _likeliest(path: Path) -> tuple[list[str], Rows, TextForm]:
         rows = rows[:-1]
     comment = next((c for line in lines for c in COMMENTS if line.lstrip().startswith(c)), "")
     return lines, rows, replace(form, comment=comment)
+
+
+def _first_block(lines: list[str]) -> list[str]:
+    """Lines before a header that comes again below its numbers."""
+    places: dict[str, int] = {}
+    for k, line in enumerate(lines):
+        text = line.strip()
+        if not text[:1].isalpha():
+            continue
+        between = sum(1 for one in lines[places.get(text, k) : k] if one.lstrip()[:1] in "+-.0123456789" and one.strip())
+        if between >= MIN_ROWS:
+            return lines[:k]
+        places.setdefault(text, k)
+    return lines
 
 
 def _counts(cells: Sequence[str], below: Sequence[str]) -> bool:
