@@ -183,8 +183,13 @@ class NewColumns:
         if len(candidates) == 1:
             return self._with_unit(column, candidates[0], seen, nothing)
         free = self._free(column, seen)
-        if not candidates and len(free) == 1 and not any(map(seen.unit_of, free)):
-            return self._with_unit(column, next(iter(free)), seen, nothing)
+        last = next(iter(free)) if not candidates and len(free) == 1 else ""
+        if last and not seen.unit_of(last) and seen.values(last).size:
+            return self._with_unit(column, last, seen, nothing)
+        if not candidates and (levers := self._by_lever(column, seen)):
+            own = own_unit(column, self.wanted.revolute)
+            self._ask(column, f"NAME,scale=NUMBER ({listed(levers, ' or ')}; {own} for each unit of it{nothing})")
+            return None
         could = listed(candidates, " or ") if candidates else f"one of {listed(list(free.values()))}"
         if column == "time_s":
             could += "; or rate=HZ of a file without times"
@@ -200,6 +205,12 @@ class NewColumns:
         alone = {names[0] for c in others if len(names := seen.could_be(c)) == 1}
         every = dict(zip(seen.names, seen.with_units(), strict=True))
         return {name: words for name, words in every.items() if name not in said | alone} or every
+
+    def _by_lever(self, column: str, seen: Seen) -> list[str]:
+        """Columns of torques for a force, which is one over its lever."""
+        if quantities_of(column, self.wanted.revolute) != ("force",):
+            return []
+        return [n for n in seen.names if stated_unit(n, seen.unit_of(n))[0] == "torque"]
 
     def _with_unit(self, column: str, name: str, seen: Seen, nothing: str) -> Source | None:
         unit = stated_unit(name, seen.unit_of(name))[1] or seen.unit_of(name)

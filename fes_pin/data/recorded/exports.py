@@ -12,7 +12,7 @@ _CHANNELS = re.compile(r"^(\d+) channels?$")
 _EACH = re.compile(r"^([\d.]+)\s*(\w+)/sample\b")
 
 
-class Described(NamedTuple):
+class ChannelHeader(NamedTuple):
     """Names of columns, by place the units that are stated, the sample rate in Hz, and the line of the names or 0."""
 
     names: tuple[str, ...]
@@ -21,12 +21,12 @@ class Described(NamedTuple):
     row: int
 
 
-def described(lines: Sequence[str], form: TextForm, columns: int) -> Described | None:
+def channels_of(lines: Sequence[str], form: TextForm, columns: int) -> ChannelHeader | None:
     """What lines above the numbers describe of this many columns; None where they are of another program."""
     return _acqknowledge(lines, form, columns) or _opensignals(lines, form, columns)
 
 
-def _acqknowledge(lines: Sequence[str], form: TextForm, columns: int) -> Described | None:
+def _acqknowledge(lines: Sequence[str], form: TextForm, columns: int) -> ChannelHeader | None:
     """`0.5 msec/sample`, `2 channels`, then a label and a unit for each; a line `min  CH1  CH2` stands below."""
     texts = [line.strip() for line in lines]
     start = next((k for k, text in enumerate(texts) if _CHANNELS.match(text)), None)
@@ -45,10 +45,10 @@ def _acqknowledge(lines: Sequence[str], form: TextForm, columns: int) -> Describ
     step = known_unit(each[2], ("time",)) if each else None
     rate = 1.0 / (float(each[1]) * UNITS["time"][step[1]]) if each and step and float(each[1]) > 0.0 else None
     names = (*["Time"] * ahead, *pairs[::2])
-    return Described(names, {**({0: cells[0]} if ahead else {}), **units}, rate, row + 1)
+    return ChannelHeader(names, {**({0: cells[0]} if ahead else {}), **units}, rate, row + 1)
 
 
-def _opensignals(lines: Sequence[str], form: TextForm, columns: int) -> Described | None:
+def _opensignals(lines: Sequence[str], form: TextForm, columns: int) -> ChannelHeader | None:
     """A comment holds JSON: each device has the names of its columns, what its channels sense, and the sample rate."""
     for row, line in enumerate(lines, 1):
         text = line.strip().removeprefix(form.comment or "#").strip()
@@ -59,7 +59,7 @@ def _opensignals(lines: Sequence[str], form: TextForm, columns: int) -> Describe
         if known and len(names) == columns:
             rate = next(iter(rates)) if len(rates) == 1 else None
             is_rate = isinstance(rate, int | float) and rate > 0.0
-            return Described(tuple(names), {}, float(rate) if is_rate else None, row)
+            return ChannelHeader(tuple(names), {}, float(rate) if is_rate else None, row)
     return None
 
 

@@ -5,7 +5,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from fes_pin.data.recorded.exports import described
+from fes_pin.data.recorded.exports import channels_of
 from fes_pin.data.recorded.text import TextForm, cells_of
 from fes_pin.data.units import UNITS, are_units, bare_unit, is_unit_of, known_unit, split_header
 
@@ -54,7 +54,7 @@ def header_of(lines: Sequence[str], form: TextForm, numbers: Sequence[Sequence[s
         Cells of the first two rows of numbers.
     """
     columns = len(numbers[0])
-    if (known := described(lines, form, columns)) is not None:
+    if (known := channels_of(lines, form, columns)) is not None:
         return Header(known.row, known.names, known.units, known.rate_hz)
     keyed = _keyed(lines, form, columns)
     rate = next((rate for _, kind, cells in keyed if (rate := _rate(kind, cells)) is not None), None)
