@@ -223,7 +223,7 @@ def _apart(text: str) -> Iterator[tuple[str, str]]:
     for separator in "/_ -.":
         name, _, unit = text.rpartition(separator)
         if separator in "/_" and unit.lower() in ("s", "sec"):  # rad_s, m/s: per second
-            before, _, per = name.rpartition(separator)
+            before, _, per = (name.replace(" ", separator) if separator == "/" else name).rpartition(separator)
             yield before, f"{per}/{unit}"
         yield name, unit
     if len(text) > SPELT_OUT:  # Microseconds

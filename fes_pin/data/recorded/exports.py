@@ -58,8 +58,8 @@ def _opensignals(lines: Sequence[str], form: TextForm, columns: int) -> ChannelH
         rates = {one.get("sampling rate") for one in known}
         if known and len(names) == columns:
             rate = next(iter(rates)) if len(rates) == 1 else None
-            is_rate = isinstance(rate, int | float) and rate > 0.0
-            return ChannelHeader(tuple(names), {}, float(rate) if is_rate else None, row)
+            stated = float(rate) if isinstance(rate, int | float) and rate > 0.0 else None
+            return ChannelHeader(tuple(names), {}, stated, row)
     return None
 
 

@@ -30,7 +30,10 @@ NEW_STUDY = "`fes-pin new-study` writes a [columns] table that reads it as it is
 WIDE = 10
 """Columns for each row, at least, of a table that looks transposed; the one with the fewest rows that is read has 3."""
 COMMENTS = ("#", "%", "//")
-WANTED = frozenset("setpoint target goal desired demand demanded command commanded cmd reference ref soll".split())
+WANTED = frozenset(
+    {"setpoint", "target", "goal", "desired", "demand", "demanded", "soll"}
+    | {"command", "commanded", "cmd", "reference", "ref"}
+)
 """Words for what a controller wants, which is no reading."""
 _NUMBER = {".": NUMBER, ",": re.compile(r"^[+-]?\d+(,\d+)?([eE][+-]?\d+)?$")}
 Rows = list[tuple[int, list[bool]]]
@@ -89,8 +92,8 @@ def _first_block(lines: list[str]) -> list[str]:
         text = line.strip()
         if not text[:1].isalpha():
             continue
-        between = sum(1 for one in lines[places.get(text, k) : k] if one.lstrip()[:1] in "+-.0123456789" and one.strip())
-        if between >= MIN_ROWS:
+        between = lines[places.get(text, k) : k]
+        if sum(1 for one in between if one.strip() and one.lstrip()[0] in "+-.0123456789") >= MIN_ROWS:
             return lines[:k]
         places.setdefault(text, k)
     return lines

@@ -308,7 +308,8 @@ def _passed_over(lines: list[str], body: list[str], rows: np.ndarray, form: Text
     noted = [line for line in body if "#" in line and REMARK.search(line)]
     said = [f"its header comes again in {len(again)} lines, which are passed over"] if again else []
     if noted:
-        said.append(f"{len(noted)} rows end in a remark, {noted[0][noted[0].index('#'):][:40]!r}: it is passed over")
+        remark = noted[0][noted[0].index("#") :][:40].strip()
+        said.append(f"{len(noted)} rows end in a remark, {remark!r}: it is passed over")
     return said
 
 
