@@ -291,10 +291,10 @@ def propose(
 
 def _without_copies(names: Sequence[str], recording: Table) -> tuple[str, ...]:
     """Columns of which no two hold the same numbers, as the times before each channel do; the first of them."""
-    kept: list[str] = []
+    read, kept = recording.columns, list[str]()
     for name in names:
-        values = recording.columns[name]
-        if not any(np.array_equal(values, recording.columns[other], equal_nan=True) for other in kept):
+        others = [read[other] for other in kept if other in read]
+        if name not in read or not any(np.array_equal(read[name], other, equal_nan=True) for other in others):
             kept.append(name)
     return tuple(kept)
 
