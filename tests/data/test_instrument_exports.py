@@ -246,6 +246,32 @@ def test_what_is_asked_for_is_what_is_left(tmp_path):
         study_of(tmp_path, two)
 
 
+@pytest.mark.parametrize(
+    "name", ["AccX (g)", "Force_x", "F_x", "Motor temperature", "Motor Efficiency (%)", "torque y"]
+)
+def test_an_axis_of_another_quantity_is_no_position_and_what_no_rig_reads_no_effort(tmp_path, name):
+    time, values = drawn(4)
+    path = written(tmp_path / "a.csv", f"t [s],{name},foo", *lines_of(time, values, ","))
+    found = propose(path, JOINT, True).candidates
+    is_effort = "orce" in name or "F_" in name or "torque" in name
+    assert found["position"] == () and found["effort"] == ((name,) if is_effort and "F_x" not in name else ())
+
+
+@pytest.mark.parametrize("name", ["x", "cart x", "x_pos", "encoder_x", "q", "laser.x"])
+def test_an_axis_alone_or_of_a_thing_is_a_position(tmp_path, name):
+    time, values = drawn(4)
+    path = written(tmp_path / "a.csv", f"t,{name},foo", *lines_of(time, values, ","))
+    assert propose(path, JOINT, True).candidates["position"] == (name,)
+
+
+def test_columns_in_the_unit_stand_among_several_of_a_word(tmp_path):
+    time, values = drawn(4, 3)
+    path = written(tmp_path / "a.csv", "t,position x,position y,rotation_degree", *lines_of(time, values, ","))
+    assert propose(path, JOINT, True).candidates["position"] == ("position x", "position y", "rotation_degree")
+    one = written(tmp_path / "b.csv", "t,position x,foo,rotation_degree", *lines_of(time, values, ","))
+    assert propose(one, JOINT, True).candidates["position"] == ("position x",)
+
+
 def test_a_torque_is_a_force_over_its_lever(tmp_path):
     time, values = drawn(2, rows=60)
     path = written(tmp_path / "a.csv", "time [s],elbow_trq [Nm],stim_pw [us]", *lines_of(time, abs(values), ","))

@@ -149,7 +149,10 @@ def test_what_no_pendulum_does_by_itself():
     )
     settled = free(lambda t: 1.2 + 0.5 * np.exp(-3.0 * t) * np.cos(6.0 * t) + noise(t))
     (words,) = (one for one in said(settled) if "comes to rest" in one)
-    assert "at 1.2 rad, and by the URDF it hangs at 0.3672, in" in words and "(zero in [columns], 47.7 of degrees)" in words
+    assert (
+        "at 1.2 rad, and by the URDF it hangs at 0.3672, in" in words
+        and "(zero in [columns], 47.7 of degrees)" in words
+    )
     fine = free(lambda t: 0.5 * np.exp(-3.0 * t) * np.cos(6.0 * t) + noise(t))
     assert len(said(fine)) == 1  # that it is not driven
 

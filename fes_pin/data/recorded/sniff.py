@@ -35,6 +35,8 @@ WANTED = frozenset(
     | {"command", "commanded", "cmd", "reference", "ref"}
 )
 """Words for what a controller wants, which is no reading."""
+OTHERS = frozenset({"acc", "accel", "acceleration", "temp", "temperature", "temperatur", "efficiency", "power"})
+"""Words for quantities that no rig reads."""
 _NUMBER = {".": NUMBER, ",": re.compile(r"^[+-]?\d+(,\d+)?([eE][+-]?\d+)?$")}
 Rows = list[tuple[int, list[bool]]]
 """Places of the rows of numbers, the last first, and of each cell whether it is a number."""
@@ -278,7 +280,9 @@ def propose(
         units.setdefault(name, split_header(name)[1])
     named = {c: tuple(_candidates(c, recording.columns, units, revolute)) for c in schema.columns}
     named = _without_doubles(named)
-    candidates = {c: found or _by_unit(c, named, units, revolute) for c, found in named.items()}
+    candidates = {
+        c: found if len(found) == 1 else (*found, *_by_unit(c, named, units, revolute)) for c, found in named.items()
+    }
     if revolute is not None:  # a torque in newtons wants a scale, and is no other column's
         either = {
             c: tuple(_candidates(c, recording.columns, units, None)) for c, found in candidates.items() if not found
@@ -301,8 +305,10 @@ def _without_copies(names: Sequence[str], recording: Table) -> tuple[str, ...]:
 
 def _readings(column: str, names: tuple[str, ...]) -> tuple[str, ...]:
     """Columns of a motion without those that say what was wanted of it, where others say what it was."""
-    read = tuple(n for n in names if not WANTED & words_of(n)) if column in ("position", "velocity") else names
-    return read or names
+    if column not in ("position", "velocity"):
+        return names
+    words = {n: words_of(n) for n in names}
+    return tuple(n for n, found in words.items() if not (WANTED & found or {"set", "point"} <= found)) or names
 
 
 def _numbers(path: Path, form: TextForm) -> Table:
@@ -328,8 +334,21 @@ def _candidates(
         if not may_be(column, name, units.get(name, ""), revolute):
             continue  # another quantity
         words = words_of(bare)
-        if without_unit(column) == "_".join(words) or words & MEANT.get(column, frozenset()):
+        if without_unit(column) == "_".join(words) or _means(words, column):
             yield name
+
+
+def _means(words: frozenset[str], column: str) -> bool:
+    """Return whether words are for a rig's column; an axis or a letter is for none where a word is for another.
+
+    `Force_x` and `F_x` are no positions, nor is `AccX`.
+    """
+    meant = words & MEANT.get(column, frozenset())
+    if not meant or words & OTHERS:
+        return False
+    long = {word for word in words if len(word) > 1}
+    is_force = column not in ("effort", "force_n") and words & (MEANT["effort"] | MEANT["force_n"])
+    return bool(meant & long) or not (is_force or any(long & others for others in MEANT.values()))
 
 
 def _by_unit(
