@@ -20,7 +20,7 @@ from fes_pin.data.recorded.view import INTEGRATED
 from fes_pin.data.schema import IMPOSED, check_known
 from fes_pin.data.stimulus import varying
 from fes_pin.data.study_text import columns_text, form_in_words, source_from_option
-from fes_pin.data.units import factor_of, known_unit, own_unit, quantities_of, stated_unit
+from fes_pin.data.units import factor_of, known_unit, own_unit, quantities_of, stated_unit, turns_a_second
 from fes_pin.data.wanted import Wanted
 
 Source = Mapping[str, Any]
@@ -78,11 +78,17 @@ class NewColumns:
         The files of each trial.
     missing
         What nobody has said, as options, by `column NAME`.
+
+    Attributes
+    ----------
+    assumed
+        What no file and nobody says, and is taken so: sentences, in order.
     """
 
     def __init__(self, wanted: Wanted, trials: Sequence[FilesOfTrial], missing: dict[str, str]) -> None:
         self.wanted, self.schema, self.trials, self.missing = wanted, wanted.schema, trials, missing
         self.seen = Seen([one.proposal for one in trials])
+        self.assumed: dict[str, None] = {}
         check_known(wanted.columns, self.schema.columns, fault_at("--column"))
         self.derived = {n: rate for n, rate in INTEGRATED.items() if self._is_integrated(n, rate)}
 
@@ -176,11 +182,35 @@ class NewColumns:
         nothing = "" if is_needed else f"; or nothing: --column {column}="
         if len(candidates) == 1:
             return self._with_unit(column, candidates[0], seen, nothing)
-        could = listed(candidates, " or ") if candidates else f"one of {listed(seen.with_units())}"
+        free = self._free(column, seen)
+        last = next(iter(free)) if not candidates and len(free) == 1 else ""
+        if last and not seen.unit_of(last) and seen.values(last).size:
+            return self._with_unit(column, last, seen, nothing)
+        if not candidates and (levers := self._by_lever(column, seen)):
+            own = own_unit(column, self.wanted.revolute)
+            self._ask(column, f"NAME,scale=NUMBER ({listed(levers, ' or ')}; {own} for each unit of it{nothing})")
+            return None
+        could = listed(candidates, " or ") if candidates else f"one of {listed(list(free.values()))}"
+        if column == "time_s":
+            could += "; or rate=HZ of a file without times"
         if not candidates and (rate := INTEGRATED.get(column)) in self.schema.columns:
             could += f"; without one --column {rate}=NAME:UNIT is integrated"
         self._ask(column, f"NAME:UNIT ({could}{nothing})")
         return None
+
+    def _free(self, column: str, seen: Seen) -> dict[str, str]:
+        """All columns, in words with their units, but for those that another of the rig's takes; all where none is."""
+        others = [c for c in (*self.schema.columns, "time_s") if c != column]
+        said = {n for c in others for n in _named(self.wanted.columns.get(c, ""), seen.names)}
+        alone = {names[0] for c in others if len(names := seen.could_be(c)) == 1}
+        every = dict(zip(seen.names, seen.with_units(), strict=True))
+        return {name: words for name, words in every.items() if name not in said | alone} or every
+
+    def _by_lever(self, column: str, seen: Seen) -> list[str]:
+        """Columns of torques for a force, which is one over its lever."""
+        if quantities_of(column, self.wanted.revolute) != ("force",):
+            return []
+        return [n for n in seen.names if stated_unit(n, seen.unit_of(n))[0] == "torque"]
 
     def _with_unit(self, column: str, name: str, seen: Seen, nothing: str) -> Source | None:
         unit = stated_unit(name, seen.unit_of(name))[1] or seen.unit_of(name)
@@ -195,6 +225,8 @@ class NewColumns:
             return None
         if (found := known_unit(unit, quantities)) is not None:
             return {"name": name, "unit": found[1]}
+        if turns_a_second(column, name, unit, self.wanted.revolute):
+            return self._in_turns({"name": name})
         self._ask(column, f"{name},scale=NUMBER ({own} for each {unit}{nothing})")
         return None
 
@@ -222,9 +254,16 @@ class NewColumns:
             return source
         return self._in_its_unit(column, source, words, seen)
 
+    def _in_turns(self, source: Source) -> Source:
+        """A speed in Hz as one in turns a second, which is said."""
+        self.assumed[f"{source['name']} is in Hz: it is taken as turns a second, rev/s"] = None
+        return {**source, "unit": "rev/s"}
+
     def _check_unit(self, column: str, source: Source) -> None:
         own = own_unit(column, self.wanted.revolute)
         hint = f"; of another quantity NAME,scale=NUMBER ({own} for each)" if own else ""
+        if turns_a_second(column, "speed", source.get("unit", ""), self.wanted.revolute):
+            hint = f"; turns a second are rev/s{hint}"
         if "unit" in source:
             place = f"--column {column}"
             factor_of(source["unit"], column, self.wanted.revolute, lambda why: InputError(why + hint, column=place))
@@ -234,6 +273,8 @@ class NewColumns:
         own, quantities = own_unit(column, self.wanted.revolute), quantities_of(column, self.wanted.revolute)
         quantity, unit = stated_unit(source["name"], seen.unit_of(source["name"]))
         found = known_unit(unit, quantities)
+        if "scale" not in source and turns_a_second(column, source["name"], unit, self.wanted.revolute):
+            return self._in_turns(source)
         if found is None:
             if "scale" in source or not (quantity or unit) or column == "stim" or not quantities:
                 return source
@@ -256,7 +297,7 @@ class NewColumns:
                 sentences.append(f"no column of times: {proposal.rate_hz:g} Hz is what the header says")
             for sentence in sentences:
                 by_sentence.setdefault(sentence, []).append(proposal.recording.path.name)
-        return tuple(f"{listed(names)}: {sentence}" for sentence, names in by_sentence.items())
+        return (*(f"{listed(names)}: {sentence}" for sentence, names in by_sentence.items()), *self.assumed)
 
     def text(self, columns: Mapping[str, Source], times: Mapping[str, Source], looked_hz: float | None) -> list[str]:
         """Lines of [columns], or of a table [sources.NAME] for each source."""

@@ -332,15 +332,18 @@ def _held(trial: Trial, name: str) -> list[str]:
 
 def _rates(trials: Sequence[Trial]) -> Iterable[str]:
     """A measured velocity that is not the slope of its position, by the mean of each over pieces of a trial."""
-    wrong = []
+    wrong: dict[str, list[str]] = {"is": [], "has": []}
     for trial in trials:
         if not {"position", "velocity"} <= set(trial.columns) or len(trial) < FEW:
             continue
         ends = np.linspace(0, len(trial) - 1, PIECES + 1).astype(int)
         slopes = np.diff(trial["position"][ends]) / np.diff(trial.time[ends])
         means = np.array([trial["velocity"][a : b + 1].mean() for a, b in itertools.pairwise(ends)])
-        power = float(slopes @ slopes)
-        if power > 0.0 and not 1.0 / RATE_RATIO < float(slopes @ means) / power < RATE_RATIO:
-            wrong.append(trial.name)
-    if wrong:
-        yield f"velocity is not the slope of position in {trials_named(wrong)}: is one of them in another unit?"
+        power, both = float(slopes @ slopes), float(slopes @ means)
+        if power > 0.0 and not power / RATE_RATIO < both < power * RATE_RATIO:
+            wrong["has" if power / RATE_RATIO < -both < power * RATE_RATIO else "is"].append(trial.name)
+    if names := wrong["is"]:
+        yield f"velocity is not the slope of position in {trials_named(names)}: is one of them in another unit?"
+    if names := wrong["has"]:
+        turned = "does one of them count the other way (scale = -1 in [columns])?"
+        yield f"velocity has the other sign than the slope of position in {trials_named(names)}: {turned}"

@@ -27,6 +27,8 @@ _SPELLINGS: dict[str, str] = {}
 
 CURRENTS = frozenset({"current", "amps", "ampere", "amperes", "strom", "courant", "corrente", "corriente"})
 """Words for an electric current: no effort without a scale, and no pulse width."""
+SPEEDS = MEANT["velocity"] - {"rate"}
+"""Words for a speed: one in Hz is turns a second, while a rate in Hz is one of pulses or samples."""
 LONGEST = 12
 """Characters of the longest unit in a row that also has known ones; `revolutions` has 11."""
 SPELT_OUT = 4
@@ -41,8 +43,9 @@ _OF_A_JOINT = {"position": ("angle", "length"), "velocity": ("angular rate", "sp
 
 
 def _plain(unit: str) -> str:
-    """A unit without what writers vary: case, spaces, dots, signs of multiplication."""
+    """A unit without what writers vary: case, spaces, dots, signs of multiplication, ways to say "per second"."""
     text = unit.strip().replace("µ", "u").replace("μ", "u").replace("°", "deg").replace("º", "deg").lower()
+    text = re.sub(r"(?<=[a-z])[\s.*·⋅]*s\^?(?:-1|⁻¹)$|\s*(?:/|\bper\b)\s*(?:s|sec|seconds?)$", "/s", text)
     text = re.sub(r"[\s.*·⋅^_-]", "", text)
     return _SPELLINGS.get(text, text)
 
@@ -134,7 +137,16 @@ def may_be(column: str, name: str, unit: str = "", revolute: bool | None = None)
     quantity, stated = stated_unit(name, unit)
     if not quantity or known_unit(unit or stated, quantities_of(column, revolute)) is not None:
         return True
+    if turns_a_second(column, name, unit, revolute):
+        return True
     return quantity in ("voltage", "counts", "share") or (quantity == "current" and column == "effort")
+
+
+def turns_a_second(column: str, name: str, unit: str = "", revolute: bool | None = None) -> bool:
+    """Return whether a recorded column is the speed of what turns, in Hz: `Motor speed [Hz]`, but not `Pulse rate`."""
+    if column != "velocity" or revolute is False or stated_unit(name, unit) != ("frequency", "Hz"):
+        return False
+    return bool(SPEEDS & words_of(split_header(name)[0]))
 
 
 def words_of(name: str) -> frozenset[str]:
@@ -146,7 +158,7 @@ def words_of(name: str) -> frozenset[str]:
 def bare_unit(cell: str) -> str:
     """The unit that a cell of a row of units states; "" of one that has none."""
     bare = cell.strip("[](){} ")
-    return "" if bare in ("-", "1") else bare
+    return "" if bare in ("-", "1", "*") else bare
 
 
 def are_units(cells: Sequence[str], names: Sequence[str] = ()) -> bool:
@@ -199,7 +211,7 @@ def split_header(header: str) -> tuple[str, str]:
     (name, unit)
         The unit is empty where the header names none that is known.
     """
-    text = header.strip().strip("\"'")
+    text = re.sub(r"#\d+$", "", header.strip().strip("\"'"))  # the second of that name
     found = _BRACKETED.match(text)
     if found and found["unit"]:
         return found["name"].strip(), found["unit"]
@@ -210,8 +222,8 @@ def _apart(text: str) -> Iterator[tuple[str, str]]:
     """Ways to part a text into a name and what may be a unit at its end; the name is "" where there is none."""
     for separator in "/_ -.":
         name, _, unit = text.rpartition(separator)
-        if separator in "/_" and unit in ("s", "S"):  # rad_s, m/s: per second
-            before, _, per = name.rpartition(separator)
+        if separator in "/_" and unit.lower() in ("s", "sec"):  # rad_s, m/s: per second
+            before, _, per = (name.replace(" ", separator) if separator == "/" else name).rpartition(separator)
             yield before, f"{per}/{unit}"
         yield name, unit
     if len(text) > SPELT_OUT:  # Microseconds

@@ -177,7 +177,8 @@ def _swings(study: Study | ToPredict, model: Model) -> Iterable[str]:
     rests = {t.name: end[0] for t in free if (end := resting(t, "position", slice(-len(t) // 10, None)))}
     if off := {n: rest for n, rest in rests.items() if math.cos(rest - hangs) < math.cos(ASKEW)}:
         said = f"position comes to rest at {_ends(off)} rad, and by the URDF it hangs at {hangs + 0.0:.4g}, in"
-        yield f"{said} {trials_named([*off])}: is its zero elsewhere (zero in [columns]), or its sign another?"
+        zero = f"zero in [columns], {math.degrees(np.mean([*off.values()]) - hangs):.3g} of degrees"
+        yield f"{said} {trials_named([*off])}: is its zero elsewhere ({zero}), or its sign another?"
         return
     length = c["inertia"] * 9.81 / _weight(model)
     if length > LONGEST_M:

@@ -28,6 +28,8 @@ from fes_pin.data.recorded.clock import since_first
 from fes_pin.data.recorded.text import TextForm, read_text_recording, without_twins
 from fes_pin.data.table import MIN_ROWS, Table
 
+OFFERED = 4
+"""Vectors of a length that are listed: a time and three quantities."""
 UNREADABLE = {
     ".numbers": "a spreadsheet of Numbers; save it as .xlsx or CSV",
     **dict.fromkeys((".pkl", ".pickle"), "a pickle, which runs code when it is read; save it as CSV or Parquet"),
@@ -210,11 +212,16 @@ def by_length(path: Path, chosen: Collection[str]) -> tuple[tuple[str, ...], tup
     others = {n: names for n, names in groups.items() if n != count and len(names) > 1}
     if not others:
         return tuple(groups.get(count, ())), ()
-    parts = "; ".join(f"{n} samples: {listed(names)}" for n, names in list(others.items())[:MOST_LISTED])
+    parts = "; ".join(f"{n} samples: {_few(names)}" for n, names in list(others.items())[:MOST_LISTED])
     more = f" ... and {len(others) - MOST_LISTED} lengths more" if len(others) > MOST_LISTED else ""
     first = next(iter(others.values()))[0]
     how = f"--column COLUMN={first} takes those of its length"
     return tuple(groups[count]), (f"vectors of {count} samples are taken; there are also {parts}{more}; {how}",)
+
+
+def _few(names: Sequence[str]) -> str:
+    more = f" and {len(names) - OFFERED} more" if len(names) > OFFERED else ""
+    return ", ".join(names[:OFFERED]) + more
 
 
 def _vectors(content: Any, name: str = "") -> Iterator[tuple[str, np.ndarray]]:

@@ -5,6 +5,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from fes_pin.data.recorded.exports import channels_of
 from fes_pin.data.recorded.text import TextForm, cells_of
 from fes_pin.data.units import UNITS, are_units, bare_unit, is_unit_of, known_unit, split_header
 
@@ -12,7 +13,7 @@ NUMBER = re.compile(r"^[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$")
 _SAMPLING = r"(?:(?:data|sampl\w*|acquisition|analog|scan|frame|camera|recording)\s+)"
 _KEYS = {
     "names": re.compile(r"^(channel|signal)s?\s*(name|title|label)?s?$"),
-    "units": re.compile(r"^(channel\s+)?units?$"),
+    "units": re.compile(r"^(channel\s+)?units?\s?(names?)?$"),
     "interval": re.compile(rf"^({_SAMPLING}?(time\s+)?interval|{_SAMPLING}(time|period|step)|dt|delta t)$"),
     "rate": re.compile(rf"^({_SAMPLING}?(rate|frequency)|fs)$"),
 }
@@ -53,6 +54,8 @@ def header_of(lines: Sequence[str], form: TextForm, numbers: Sequence[Sequence[s
         Cells of the first two rows of numbers.
     """
     columns = len(numbers[0])
+    if (known := channels_of(lines, form, columns)) is not None:
+        return Header(known.row, known.names, known.units, known.rate_hz)
     keyed = _keyed(lines, form, columns)
     rate = next((rate for _, kind, cells in keyed if (rate := _rate(kind, cells)) is not None), None)
     of_rates = {row for row, kind, cells in keyed if _rate(kind, cells) is not None}
@@ -131,6 +134,8 @@ def ways(line: str, form: TextForm, others: bool) -> list[list[str]]:
     separators = [s for s in (",", ";", "\t") if s != form.delimiter and s in text] if others else []
     parted = [[n.strip(" \"'") for n in text.rstrip(f"{s} ").split(s)] for s in separators]
     own = [list(cells_in(line, form))]
+    if form.delimiter == " ":  # names that hold a blank stand in columns: `TIME   POS (ANAT)`
+        own += [re.split(r"\t|\s{2,}", text)] if re.search(r"\t|\s{2,}", text) else []
     return _script_list(text) + (parted + own if form.delimiter == " " else own + parted)
 
 
@@ -181,8 +186,9 @@ def _keyed(lines: Sequence[str], form: TextForm, columns: int) -> list[tuple[int
 
 
 def is_keyed(cells: Sequence[str]) -> bool:
-    """True of a line that begins with a key: `Interval,0.5`."""
-    return bool(cells) and bool(_kind_of(split_header(cells[0].rstrip("=: "))[0]))
+    """True of a line that begins with a key: `Interval,0.5`, `BottomValue=,-10`."""
+    key = cells[0] if cells else ""
+    return key.endswith(("=", ":")) or bool(_kind_of(split_header(key.rstrip("=: "))[0]))
 
 
 def _kind_of(key: str) -> str:

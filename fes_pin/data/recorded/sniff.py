@@ -14,6 +14,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+import numpy as np
+
 from fes_pin.data.errors import InputError, listed
 from fes_pin.data.files import as_path, read_bytes
 from fes_pin.data.recorded.clock import clock_seconds
@@ -22,7 +24,7 @@ from fes_pin.data.recorded.header import NUMBER, Header, cells_in, header_of, is
 from fes_pin.data.recorded.sheets import is_spreadsheet, sheets_of
 from fes_pin.data.recorded.text import DECIMALS, DELIMITERS, MISSING, TextForm, cells_of, read_text_recording
 from fes_pin.data.schema import MEANT, RigSchema, without_unit
-from fes_pin.data.table import Table
+from fes_pin.data.table import MIN_ROWS, Table
 from fes_pin.data.units import known_unit, may_be, quantities_of, split_header, words_of
 
 LOOKED_AT = 400
@@ -31,6 +33,13 @@ NEW_STUDY = "`fes-pin new-study` writes a [columns] table that reads it as it is
 WIDE = 10
 """Columns for each row, at least, of a table that looks transposed; the one with the fewest rows that is read has 3."""
 COMMENTS = ("#", "%", "//")
+WANTED = frozenset(
+    {"setpoint", "target", "goal", "desired", "demand", "demanded", "soll"}
+    | {"command", "commanded", "cmd", "reference", "ref"}
+)
+"""Words for what a controller wants, which is no reading."""
+OTHERS = frozenset({"acc", "accel", "acceleration", "temp", "temperature", "temperatur", "efficiency", "power"})
+"""Words for quantities that no rig reads."""
 _NUMBER = {".": NUMBER, ",": re.compile(r"^[+-]?\d+(,\d+)?([eE][+-]?\d+)?$")}
 Rows = list[tuple[int, list[bool]]]
 """Places of the rows of numbers, the last first, and of each cell whether it is a number."""
@@ -54,7 +63,8 @@ def sniffed(path: Path, stated: Mapping[str, Any] = MappingProxyType({})) -> tup
     first = int(stated.get("first_row", found + 1)) - 1
     above = lines[:first]
     turned = None if "transposed" in stated else _transposed(above, rows, form)
-    numbers = [cells_of(lines[place], form) for place, _ in reversed(rows[-2:])]
+    below = [place for place, _ in reversed(rows) if place >= first] or [rows[-1][0]]
+    numbers = [cells_of(lines[place], form) for place in below[:2]]
     header = turned or (Header() if stated.get("transposed") else header_of(above, form, numbers))
     if not turned and not header.row and not header.said and len(numbers[0]) >= WIDE * len(rows):
         odd = f"{len(rows)} rows of {len(numbers[0])} columns without names: is the table transposed?"
@@ -72,12 +82,39 @@ def _likeliest(path: Path, sheet: str) -> tuple[list[str], Rows, TextForm]:
     else:
         encoding = _encoding(path)
         forms = [TextForm(delimiter, decimal, encoding=encoding) for delimiter in DELIMITERS for decimal in DECIMALS]
-    lines = forms[0].lines(path)[:LOOKED_AT]
+    every = forms[0].lines(path)
+    lines = _first_block(every[:LOOKED_AT])
     rows, form = max(((_rows(lines, form), form) for form in forms), key=lambda pair: _likely(*pair))
     if not rows:
         raise InputError("expected rows of numbers, found none", file=path)
+    if len(rows) > 1 and _counts(cells_of(lines[rows[-1][0]], form), every[rows[-1][0] + 1 :]):
+        rows = rows[:-1]
     comment = next((c for line in lines for c in COMMENTS if line.lstrip().startswith(c)), "")
     return lines, rows, replace(form, comment=comment)
+
+
+def _first_block(lines: list[str]) -> list[str]:
+    """Lines before a header that comes again below its numbers."""
+    places: dict[str, int] = {}
+    for k, line in enumerate(lines):
+        text = line.strip()
+        if not text[:1].isalpha():
+            continue
+        between = lines[places.get(text, k) : k]
+        if sum(1 for one in between if one.strip() and one.lstrip()[0] in "+-.0123456789") >= MIN_ROWS:
+            return lines[:k]
+        places.setdefault(text, k)
+    return lines
+
+
+def _counts(cells: Sequence[str], below: Sequence[str]) -> bool:
+    """Return whether a first row says how many samples each channel has: whole numbers, the lines below at most."""
+    found = [cell for cell in cells if cell]
+    if not all(cell.isdecimal() for cell in found):
+        return False
+    count = sum(1 for line in below if line.strip())
+    most = max(map(int, found), default=0)
+    return most == count and min(map(int, found)) > 0.5 * most
 
 
 def _first_of(lines: list[str], rows: Rows, form: TextForm) -> int:
@@ -283,14 +320,35 @@ def propose(
         units.setdefault(name, split_header(name)[1])
     named = {c: tuple(_candidates(c, recording.columns, units, revolute)) for c in schema.columns}
     named = _without_doubles(named)
-    candidates = {c: found or _by_unit(c, named, units, revolute) for c, found in named.items()}
+    candidates = {
+        c: found if len(found) == 1 else (*found, *_by_unit(c, named, units, revolute)) for c, found in named.items()
+    }
     if revolute is not None:  # a torque in newtons wants a scale, and is no other column's
         either = {
             c: tuple(_candidates(c, recording.columns, units, None)) for c, found in candidates.items() if not found
         }
         taken = {name for found in candidates.values() for name in found}
         candidates |= {c: tuple(n for n in found if n not in taken) for c, found in either.items()}
+    candidates = {c: _readings(c, _without_copies(found, recording)) for c, found in candidates.items()}
     return Proposal(recording, form, _without_doubles(candidates), units, header.rate_hz, header.said)
+
+
+def _without_copies(names: Sequence[str], recording: Table) -> tuple[str, ...]:
+    """Columns of which no two hold the same numbers, as the times before each channel do; the first of them."""
+    read, kept = recording.columns, list[str]()
+    for name in names:
+        others = [read[other] for other in kept if other in read]
+        if name not in read or not any(np.array_equal(read[name], other, equal_nan=True) for other in others):
+            kept.append(name)
+    return tuple(kept)
+
+
+def _readings(column: str, names: tuple[str, ...]) -> tuple[str, ...]:
+    """Columns of a motion without those that say what was wanted of it, where others say what it was."""
+    if column not in ("position", "velocity"):
+        return names
+    words = {n: words_of(n) for n in names}
+    return tuple(n for n, found in words.items() if not (WANTED & found or {"set", "point"} <= found)) or names
 
 
 def _numbers(path: Path, form: TextForm) -> Table:
@@ -316,8 +374,21 @@ def _candidates(
         if not may_be(column, name, units.get(name, ""), revolute):
             continue  # another quantity
         words = words_of(bare)
-        if without_unit(column) == "_".join(words) or words & MEANT.get(column, frozenset()):
+        if without_unit(column) == "_".join(words) or _means(words, column):
             yield name
+
+
+def _means(words: frozenset[str], column: str) -> bool:
+    """Return whether words are for a rig's column; an axis or a letter is for none where a word is for another.
+
+    `Force_x` and `F_x` are no positions, nor is `AccX`.
+    """
+    meant = words & MEANT.get(column, frozenset())
+    if not meant or words & OTHERS:
+        return False
+    long = {word for word in words if len(word) > 1}
+    is_force = column not in ("effort", "force_n") and words & (MEANT["effort"] | MEANT["force_n"])
+    return bool(meant & long) or not (is_force or any(long & others for others in MEANT.values()))
 
 
 def _by_unit(

@@ -27,6 +27,8 @@ ENCODINGS = ("utf-8", "utf-16", "cp1252")
 _NUMBER = re.compile(r"^[+-]?[\d.,]+([eE][+-]?\d+)?$")
 MISSING = frozenset({"", "nan", "na", "n/a", "-", "--", "null", "none", "#n/a"})
 """What instruments write where there is no sample, in lower case."""
+REMARK = re.compile(r"[\t ,;]+#(\*|\d+)(\s.*)?$")
+"""What LabChart writes at the end of a row of numbers where somebody made a remark: `#* stimulus on`."""
 AFTER, AFTER_COMMENTS = "after comments", -1
 """`header_row` of files whose names stand in the first line that is neither a comment nor empty; in a form -1."""
 
@@ -107,8 +109,10 @@ class TextForm:
 def cells_of(line: str, form: TextForm) -> list[str]:
     """The cells of one line, without surrounding spaces.
 
-    Unless the form is strict also without quotes, and a delimiter at the end of the line begins no cell.
+    Unless the form is strict also without quotes and remarks, and a delimiter at the end of the line begins no cell.
     """
+    if "#" in line and not form.strict and line.lstrip()[:1] in "+-.0123456789":
+        line = REMARK.sub("", line)
     cells = line.split(None if form.delimiter == " " else form.delimiter)
     if form.strict:
         return [cell.strip() for cell in cells]
@@ -238,7 +242,10 @@ def table_of_lines(
 
     columns = dict(zip(chosen, values.T.copy(), strict=True))
     units = {**units_between(lines, names, form), **dict.fromkeys(clocks, "s")}
-    sentences = tuple(f"{name} holds {what}: it is read as seconds from its first row" for name, what in clocks.items())
+    sentences = (
+        *(f"{name} holds {what}: it is read as seconds from its first row" for name, what in clocks.items()),
+        *_passed_over(lines, body, rows, form),
+    )
     return Table(path, names, columns, rows, form.header_row, units, half_digit_of=half_digit, said=sentences)
 
 
@@ -299,9 +306,33 @@ def _body(lines: list[str], form: TextForm) -> tuple[list[str], np.ndarray]:
         found.pop()
     if not form.strict:
         found = [(row, line) for row, line in found if line.strip()]
+        above = lines[: form.first_row - 1]
+        found = [(row, line) for row, line in found if not _heads(above, form, line)]
     if form.comment:
         found = [(row, line) for row, line in found if not line.lstrip().startswith(form.comment)]
     return [line for _, line in found], np.array([row for row, _ in found], dtype=int)
+
+
+def _passed_over(lines: list[str], body: list[str], rows: np.ndarray, form: TextForm) -> list[str]:
+    """Sentences about what stands between the rows, or at their ends, and is no number."""
+    if form.strict or form.transposed:
+        return []
+    above, last = lines[: form.first_row - 1], int(rows[-1]) if len(rows) else 0
+    again = [line for line in lines[form.first_row - 1 : last] if _heads(above, form, line)]
+    noted = [line for line in body if "#" in line and REMARK.search(line)]
+    said = [f"its header comes again in {len(again)} lines, which are passed over"] if again else []
+    if noted:
+        remark = noted[0][noted[0].index("#") :][:40].strip()
+        said.append(f"{len(noted)} rows end in a remark, {remark!r}: it is passed over")
+    return said
+
+
+def _heads(above: Sequence[str], form: TextForm, line: str) -> bool:
+    """Return whether a line begins as one of those above the first numbers: a program wrote its header again."""
+    text = line.lstrip()
+    if not text[:1].isalpha() or text[:3].lower() == "nan":
+        return False
+    return cells_of(text, form)[0] in {cells_of(one, form)[0] for one in above if one.strip()}
 
 
 def _fast(body: list[str], form: TextForm, places: list[int], count: int) -> np.ndarray | None:

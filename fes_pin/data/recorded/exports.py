@@ -1,0 +1,78 @@
+"""Headers of programs whose exports describe each channel apart from the columns: AcqKnowledge, OpenSignals."""
+
+import json
+import re
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+from fes_pin.data.recorded.text import TextForm, cells_of
+from fes_pin.data.units import UNITS, known_unit
+
+_CHANNELS = re.compile(r"^(\d+) channels?$")
+_EACH = re.compile(r"^([\d.]+)\s*(\w+)/sample\b")
+
+
+class ChannelHeader(NamedTuple):
+    """Names of columns, by place the units that are stated, the sample rate in Hz, and the line of the names or 0."""
+
+    names: tuple[str, ...]
+    units: dict[int, str]
+    rate_hz: float | None
+    row: int
+
+
+def channels_of(lines: Sequence[str], form: TextForm, columns: int) -> ChannelHeader | None:
+    """What lines above the numbers describe of this many columns; None where they are of another program."""
+    return _acqknowledge(lines, form, columns) or _opensignals(lines, form, columns)
+
+
+def _acqknowledge(lines: Sequence[str], form: TextForm, columns: int) -> ChannelHeader | None:
+    """`0.5 msec/sample`, `2 channels`, then a label and a unit for each; a line `min  CH1  CH2` stands below."""
+    texts = [line.strip() for line in lines]
+    start = next((k for k, text in enumerate(texts) if _CHANNELS.match(text)), None)
+    if start is None:
+        return None
+    count = int(texts[start].split()[0])
+    pairs = texts[start + 1 : start + 1 + 2 * count]
+    below = [k for k in range(start + 1 + 2 * count, len(texts)) if texts[k]]
+    row = below[0] if below else start
+    cells = cells_of(lines[row], form)
+    ahead = columns - count
+    if len(pairs) < 2 * count or not below or ahead not in (0, 1) or len(cells) != columns:
+        return None
+    units = {k: unit for k, unit in enumerate(pairs[1::2], ahead) if unit}
+    each = next((found for text in texts[:start] if (found := _EACH.match(text))), None)
+    step = known_unit(each[2], ("time",)) if each else None
+    rate = 1.0 / (float(each[1]) * UNITS["time"][step[1]]) if each and step and float(each[1]) > 0.0 else None
+    names = (*["Time"] * ahead, *pairs[::2])
+    return ChannelHeader(names, {**({0: cells[0]} if ahead else {}), **units}, rate, row + 1)
+
+
+def _opensignals(lines: Sequence[str], form: TextForm, columns: int) -> ChannelHeader | None:
+    """A comment holds JSON: each device has the names of its columns, what its channels sense, and the sample rate."""
+    for row, line in enumerate(lines, 1):
+        text = line.strip().removeprefix(form.comment or "#").strip()
+        devices = _table(text) if text.startswith("{") else {}
+        known = [one for one in devices.values() if isinstance(one, dict) and isinstance(one.get("column"), list)]
+        names = [name for one in known for name in _sensed(one)]
+        rates = {one.get("sampling rate") for one in known}
+        if known and len(names) == columns:
+            rate = next(iter(rates)) if len(rates) == 1 else None
+            stated = float(rate) if isinstance(rate, int | float) and rate > 0.0 else None
+            return ChannelHeader(tuple(names), {}, stated, row)
+    return None
+
+
+def _table(text: str) -> dict[str, Any]:
+    try:
+        found = json.loads(text)
+    except (ValueError, RecursionError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def _sensed(device: dict[str, Any]) -> list[str]:
+    """Names of a device's columns; of its channels, which come last, with what they sense: `CH1 TORQUE`."""
+    names, sensors = ([str(each) for each in device.get(key) or []] for key in ("column", "sensor"))
+    ahead = max(len(names) - len(sensors), 0)
+    return [*names[:ahead], *(" ".join(each) for each in zip(names[ahead:], sensors, strict=False))]
