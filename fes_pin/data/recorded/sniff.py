@@ -29,6 +29,7 @@ WIDE = 10
 """Columns for each row, at least, of a table that looks transposed; the one with the fewest rows that is read has 3."""
 COMMENTS = ("#", "%", "//")
 _NUMBER = {".": NUMBER, ",": re.compile(r"^[+-]?\d+(,\d+)?([eE][+-]?\d+)?$")}
+_NUMBERED = re.compile(r"([a-z]{3,})\d+$")  # a word that counts channels: EMG2, Torque1
 Rows = list[tuple[int, list[bool]]]
 """Places of the rows of numbers, the last first, and of each cell whether it is a number."""
 
@@ -276,7 +277,8 @@ def _candidates(
         if not may_be(column, name, units.get(name, ""), revolute):
             continue  # another quantity
         words = words_of(bare)
-        if without_unit(column) == "_".join(words) or words & MEANT.get(column, frozenset()):
+        numbered = {n[1] for n in map(_NUMBERED.match, words) if n}
+        if without_unit(column) == "_".join(words) or (words | numbered) & MEANT.get(column, frozenset()):
             yield name
 
 

@@ -132,7 +132,8 @@ class Ankle(Rig):
     def trial_constants(self, trial: Trial) -> dict[str, float]:
         a, b = _foot_gravity(float(self.constants["foot_mass_kg"]), float(self.constants["com_distance_m"]))
         unstated = {"load_kg": 0.0, "torque_sign": 1.0} if trial.kind == IMPOSED else {}
-        known = {**unstated, **at_start(trial), **self.constants, **trial.conditions, "gravity_cos": a, "gravity_sin": b}
+        unstated |= {**at_start(trial), "gravity_cos": a, "gravity_sin": b}
+        known = {**unstated, **self.constants, **trial.conditions}
         return {name: float(known[name]) for name in self.constant_names(trial.kind)}
 
     def recruited(self, trial: Trial) -> np.ndarray:
