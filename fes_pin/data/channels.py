@@ -7,6 +7,8 @@ their rate. The threshold that a study states says by its unit which of them rec
 from collections.abc import Collection
 from dataclasses import dataclass
 
+import numpy as np
+
 from fes_pin.data.schema import NumberKey, not_negative, positive
 
 
@@ -55,10 +57,17 @@ RATE = "frequency_hz"
 """The column of a rate of pulses that varies, alone or in addition to one of the channels."""
 EMG, ENVELOPE = "emg", "emg_envelope"
 """Columns of a voluntary muscle: what electrodes read, in any unit, and its envelope, 1 at the largest effort."""
+VOLUNTARY = (EMG, ENVELOPE)
+"""Columns of a contraction that nobody stimulates."""
 EMG_KEYS = ("emg_cutoff_hz", "emg_mvc")
 """Constants of a study with EMG: the cut-off of its envelope, and what that is in a maximal voluntary contraction."""
-STIMULI = (*CHANNELS, "stim", RATE, EMG, ENVELOPE)
+STIMULI = (*CHANNELS, "stim", RATE, *VOLUNTARY)
 """Columns without which a muscle does not contract."""
+
+
+def until_next(values: np.ndarray) -> np.ndarray:
+    """Return the mean between each sample and the next, shape (n,), of what changes evenly in between."""
+    return np.r_[0.5 * (values[1:] + values[:-1]), values[-1:]]
 
 
 def channel_of(constants: Collection[str]) -> Channel | None:
@@ -66,8 +75,9 @@ def channel_of(constants: Collection[str]) -> Channel | None:
     return next((c for c in CHANNELS.values() if any(end in constants for end in c.ends)), None)
 
 
-def recruitment_ends() -> dict[str, NumberKey]:
-    """The ends of recruitment that a study of a muscle may state, by key; those of one channel."""
+def recruitment_keys() -> dict[str, NumberKey]:
+    """What a study of a muscle may state of its recruitment, by key: the ends of one channel, or those of an EMG."""
     pairs = [(c.ends, c.unit) for c in CHANNELS.values()]
     ends = [{low: not_negative(unit, False), high: positive(unit, False)} for (low, high), unit in pairs]
-    return {key: number for pair in ends for key, number in pair.items()}
+    of_emg = dict(zip(EMG_KEYS, (positive("Hz", False), positive("", False)), strict=True))
+    return {key: number for pair in (*ends, of_emg) for key, number in pair.items()}

@@ -12,6 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from fes_pin.data.channels import ENVELOPE, until_next
 from fes_pin.data.trial import Trial
 
 MOTION = ("imposed", "imposed_rate", "imposed_acceleration")
@@ -84,8 +85,13 @@ def moved_along(trial: Trial, values: np.ndarray) -> Trial:
 
 
 def driving_values(trial: Trial, name: str, columns: tuple[str, ...]) -> np.ndarray:
-    """What drives a model under one name, shape (n,): a column, or a part of the imposed motion."""
-    return imposed_motion(trial, columns).values[MOTION.index(name)] if name in MOTION else trial[name]
+    """What drives a model under one name, shape (n,): a column, or a part of the imposed motion.
+
+    A stimulus is held from one sample to the next. An EMG goes on: its mean until the next sample drives.
+    """
+    if name in MOTION:
+        return imposed_motion(trial, columns).values[MOTION.index(name)]
+    return until_next(trial[name]) if name == ENVELOPE else trial[name]
 
 
 def _smoothed(trial: Trial, columns: tuple[str, ...]) -> ImposedMotion:

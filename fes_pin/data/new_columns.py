@@ -135,9 +135,14 @@ class NewColumns:
         found = [c for c in stimuli if c in self.wanted.columns or self._could_be(c)]
         said = [c for c in found if self.wanted.columns.get(c)]
         pulses = [c for c in (WIDTH.column, AMPLITUDE.column) if c in found]
-        first = said or (pulses if len(pulses) == len((WIDTH, AMPLITUDE)) else found[:1])
+        first = said or (pulses if len(pulses) == len((WIDTH, AMPLITUDE)) else sorted(found, key=self._is_off)[:1])
         varies = RATE in found and RATE not in first and len(np.unique(self._values(RATE))) > 1
         return [*first, RATE] if varies else first
+
+    def _is_off(self, column: str) -> bool:
+        """Return whether a column is 0 throughout, as of a stimulator that is off while an EMG is recorded."""
+        values = self._values(column)
+        return len(values) > 0 and not np.any(values)
 
     def _values(self, column: str) -> np.ndarray:
         """What the files hold of one of the rig's columns, as they have it; empty where that is not known."""

@@ -54,10 +54,15 @@ class Unrepeated:
         return self.share > SHARE and self.size > ABOVE_NOISE * self.noise
 
 
-def effort_of_repeats(trial: Trial, schema: RigSchema) -> Unrepeated | None:
+def effort_of_repeats(trial: Trial, schema: RigSchema, left: np.ndarray | None = None) -> Unrepeated | None:
     """Compare the effort of a trial between equal cycles of its motion, without a trend from cycle to cycle.
 
     The first cycle is left out: a limb that was still relaxes in it.
+
+    Parameters
+    ----------
+    left
+        What a model leaves of the effort, shape (n,), to be compared in its place. Shares are of the effort.
 
     Returns
     -------
@@ -75,16 +80,17 @@ def effort_of_repeats(trial: Trial, schema: RigSchema) -> Unrepeated | None:
     if usual < 2 * BINS:
         return None
     moved, effort = (_binned(values, ends) for values in (position, trial[name]))
+    odd = effort if left is None else _binned(left, ends)
     apart = np.sqrt(np.mean((moved - np.median(moved, axis=0)) ** 2, axis=1)) / max(float(np.ptp(position)), 1e-300)
-    equal = (apart < SAME) & (np.abs(length - usual) < SAME * usual + 1.0)
+    equal = (apart < SAME) & (np.abs(length - usual) < SAME * usual + 1.0) & np.isfinite(effort + odd).all(axis=1)
     if np.count_nonzero(equal) < FEWEST:
         return None
-    count, rows = int(np.count_nonzero(equal)), effort[equal]
+    count, rows = int(np.count_nonzero(equal)), odd[equal]
     trend = np.column_stack([np.ones(count), ends[:-1][equal] - ends[0]])
     left = rows - trend @ np.linalg.lstsq(trend, rows, rcond=None)[0]
     size = float(np.sqrt(np.sum(left**2) / (BINS * (count - trend.shape[1]))))
-    white = float(np.std(np.diff(trial[name], 3))) / np.sqrt(20.0)
-    spread = float(np.std(rows))
+    white = float(np.nanstd(np.diff(trial[name], 3))) / np.sqrt(20.0)
+    spread = float(np.std(effort[equal]))
     return Unrepeated(size, size / max(spread, 1e-300), count, white / np.sqrt(usual / BINS))
 
 
@@ -99,7 +105,9 @@ def _upward(values: np.ndarray) -> np.ndarray:
 
 
 def _binned(values: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """Means over parts of each cycle, shape (cycles, BINS)."""
-    total = np.concatenate([[0.0], np.cumsum(values)])
+    """Means over parts of each cycle, shape (cycles, BINS); NaN of a cycle with samples that were not measured."""
+    total = np.concatenate([[0.0], np.cumsum(np.nan_to_num(values))])
     edges = np.stack([np.linspace(a, b, BINS + 1) for a, b in pairwise(ends)])
-    return np.diff(np.interp(edges, np.arange(len(total)), total), axis=1) / np.diff(edges, axis=1)
+    means = np.diff(np.interp(edges, np.arange(len(total)), total), axis=1) / np.diff(edges, axis=1)
+    means[[not np.isfinite(values[a:b]).all() for a, b in pairwise(ends)]] = np.nan
+    return means

@@ -46,6 +46,7 @@ from fes_pin.infer.scatter import with_honest_intervals
 from fes_pin.infer.text import WHOLE
 from fes_pin.infer.verdict import State, Verdict, Weighed
 from fes_pin.remainder.lack_of_fit import lack_of_fit
+from fes_pin.remainder.unrepeated import Voluntary, shares_of_voluntary, voluntary_effort
 
 WORSE = 2.0
 """Ratio of errors of free simulations from which a cause is refuted: those of two right models differ by less."""
@@ -67,11 +68,14 @@ class RigWeighed(Weighed):
         Process noise in the fit of the set.
     no_noise
         Why the error of a simulation cannot be measurement noise; None where it may be.
+    voluntary
+        Effort that the set leaves, and that differs between equal cycles of an imposed motion; None without such.
     """
 
     folds: Sequence[Fold] = ()
     random: tuple[RandomPart, ...] = ()
     no_noise: str | None = None
+    voluntary: Voluntary | None = None
 
 
 RigState = State[LikelihoodFit, LikelihoodModels, RigWeighed]
@@ -101,6 +105,7 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
         """Return the evidence of held-out trials and of the tests of lack of fit on a set."""
         folds = make_folds(found, self.models.trials, self.test, self.refitted)
         gains = gains_of(folds, found.without, self.models.judged_s, self.models.seed)
+        own = voluntary_effort(found.best)
         return RigWeighed(
             gains=gains if folds else self.gains_fitted(found),
             evidence=evidence_of(folds, found, self._alike),
@@ -111,6 +116,8 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
             folds=folds,
             random=random,
             no_noise=no_noise(found.best),
+            voluntary=own,
+            over_unrepeated={} if own is None else shares_of_voluntary(own, found.best, found.without),
         )
 
     def with_intervals(self, fitted: LikelihoodFit) -> LikelihoodFit:
@@ -156,6 +163,8 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
         have little power.
         """
         weighed, stages = state.weighed, {e.name: str(e.stage) for e in self.models.library.effects}
+        if weighed.voluntary is not None:
+            return replace(weighed.lack_of_fit, unexplained=True, where="effort", reason=weighed.voluntary.words)
         left = with_rejected_causes(weighed.lack_of_fit, weighed.random, state.rejected, stages)
         if not left.unexplained and weighed.no_noise is not None:
             return replace(left, unexplained=True, where="time", reason=weighed.no_noise)

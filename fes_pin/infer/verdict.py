@@ -26,6 +26,7 @@ CLAIMS = {
     "drop_errors_of_form": "process noise is large, and it gains no more than an error of form may",
     "drop_unsupported": "held-out data do not confirm it",
     "drop_not_carried": "it gains nothing on other parts of the data, where it must act too",
+    "drop_unrepeated": "it explains no more than what differs between equal repeats, which no candidate explains",
     "drop_that_predict_no_better": "the sets that folds choose predict no better than the nominal model",
     "drop_insignificant": "its gain is not significant",
     "settle": "the rivals of what remains were searched",
@@ -115,6 +116,8 @@ class Weighed:
         Whether the noise of the likelihood includes errors of the model, so that it judges a wrong model too.
     carried
         Gains, percent, on other parts of the data than a candidate was fitted to, of those that must act there too.
+    over_unrepeated
+        What a candidate explains over what no candidate does, as it differs between equal repeats; empty without such.
     is_random
         Whether process noise is more than a small share of what drives the system.
     is_moved
@@ -126,6 +129,7 @@ class Weighed:
     lack_of_fit: Remainder
     is_robust: bool = False
     carried: Mapping[str, float] = field(default_factory=dict)
+    over_unrepeated: Mapping[str, float] = field(default_factory=dict)
     is_random: bool = False
     is_moved: bool = True
 
@@ -284,6 +288,11 @@ class Verdict(ABC, Generic[F, M, W]):
     def drop_not_carried(self, state: State[F, M, W]) -> State[F, M, W] | None:
         """Reject the weakest of the candidates that gain nothing on other parts of the data, where they act too."""
         return self._without_weakest(state, [n for n, gain in state.weighed.carried.items() if not gain > 0.0])
+
+    def drop_unrepeated(self, state: State[F, M, W]) -> State[F, M, W] | None:
+        """Reject the weakest of the candidates that explain no more than what equal repeats do not share."""
+        over = state.weighed.over_unrepeated
+        return self._without_weakest(state, [n for n in state.weighed.gains if n in over and not over[n] > 1.0])
 
     def drop_that_predict_no_better(self, state: State[F, M, W]) -> State[F, M, W] | None:
         """Reject the weakest candidate if the sets that folds choose predict no better than the nominal model.

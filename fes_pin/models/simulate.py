@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from fes_pin.data.channels import VOLUNTARY
 from fes_pin.data.imposed import MOTION, driving_values
 from fes_pin.data.trial import Trial, derived_trial
 from fes_pin.models.accepted import accepted_trials
@@ -222,7 +223,8 @@ class Block:
     def _inputs(self, shift: tuple[int, ...]) -> np.ndarray:
         """Return inputs of all lanes, shape (count, inputs, width), each delayed by whole samples; zero before.
 
-        An imposed motion is never delayed: a delay is that of the response to a stimulus.
+        An imposed motion is never delayed: a delay is that of the response to a stimulus. An EMG was before as it is at
+        first.
         """
         u = np.zeros((self.count, len(self.inputs), self.width))
         for lane, trial in enumerate(self.trials):
@@ -230,6 +232,7 @@ class Block:
                 late = 0 if name in MOTION else min(shift[lane], len(trial))
                 values = driving_values(trial, name, self.rig.schema.imposed)
                 u[late : len(trial), j, lane] = values[: len(trial) - late]
+                u[:late, j, lane] = values[0] if name in VOLUNTARY else 0.0
         return u
 
     def _delayed(self, shift: tuple[int, ...]) -> np.ndarray:

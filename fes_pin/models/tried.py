@@ -13,7 +13,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from fes_pin.data.channels import CHANNELS, EMG, ENVELOPE, RATE, WIDTH
+from fes_pin.data.channels import CHANNELS, RATE, VOLUNTARY, WIDTH
 from fes_pin.data.errors import InputError
 from fes_pin.data.imposed import MOTION
 from fes_pin.data.numbers import shortened
@@ -38,7 +38,7 @@ EQUATIONS = ("apply", "rate", "update", "rest", "rates", "sample", "readings", "
 """Methods that return numbers or expressions."""
 FINITE = "finite numbers, by fes_pin.models.maths.sin and its like in place of math.sin"
 """What is expected of them: of an expression `math` gives NaN."""
-OTHER_UNITS = (*(n for n in CHANNELS if n != WIDTH.column), RATE, EMG, ENVELOPE)
+OTHER_UNITS = (*(n for n in CHANNELS if n != WIDTH.column), RATE, *VOLUNTARY)
 """Stimuli of which a rig is not tried: its equations are those of a pulse width."""
 POINTS = 16
 """Combinations of signals at which all must be finite."""

@@ -8,7 +8,11 @@ import fes_pin as fp
 from fes_pin.data.plausibility import implausible
 from fes_pin.data.repeats import effort_of_repeats
 from fes_pin.data.schema import schema_of
-from fes_pin.data.templates import rod
+from fes_pin.data.templates import rod, wheel
+from fes_pin.models.effects import PeriodicTorque
+from fes_pin.models.nominal import nominal_model
+from fes_pin.remainder.unrepeated import shares_of_voluntary, voluntary_effort
+from fes_pin.search.fit import fitted_alone
 
 DT = 0.005
 JOINT = schema_of("joint")
@@ -84,3 +88,40 @@ def test_a_check_says_it(tmp_path):
 def astuple(trial):
     """Kind, columns and time."""
     return trial.kind, trial.columns, trial.time
+
+
+def held(rng, own, lever=0.0):
+    """A weightless limb that a dynamometer moves, with damping, and a torque of its own at a frequency of its own."""
+    t, w, turns = DT * np.arange(4000), 2.0 * np.pi * rng.uniform(0.5, 0.8), rng.uniform(0.0, 6.0)
+    q = 0.4 * np.sin(w * t)
+    effort = 0.3 * 0.4 * w * np.cos(w * t) - 0.02 * 0.4 * w * w * np.sin(w * t) + 0.002 * rng.standard_normal(len(t))
+    effort += 0.2 * np.sin(0.37 * w * t + turns) + own * (1.0 + lever * q / 0.4)
+    columns = {"position": q + 1e-5 * rng.standard_normal(len(t)), "effort": effort}
+    return columns, t, 0.37 * w
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_what_a_cause_explains_is_not_voluntary(tmp_path, seed):
+    """A torque with a frequency of its own does not repeat with the motion; what a model with it leaves does."""
+    (tmp_path / "wheel.urdf").write_text(wheel(0.02))
+    for size in (0.0, 0.25):
+        rng = np.random.default_rng([seed, 5])
+        columns, time, rate = held(rng, wandering(rng, 4000, 0.8, size) + size)
+        study = fp.Study(
+            "a",
+            "joint",
+            {},
+            {"inertia_scale": 1.0, "damping": 0.3},
+            [fp.Trial("a", "imposed", columns, time)],
+            files={"urdf": tmp_path / "wheel.urdf"},
+        )
+        plain = nominal_model(study)
+        torque = PeriodicTorque(in_phase=0.05, quadrature=0.05, frequency_hz=rate / (2.0 * np.pi))
+        without, best = (fitted_alone(model, study.trials) for model in (plain, plain + torque))
+        assert voluntary_effort(without) is not None
+        assert (voluntary_effort(best) is not None) == (size > 0.0)
+        if size:
+            own = voluntary_effort(best)
+            assert "voluntary effort is likely" in own.words
+            over = shares_of_voluntary(own, best, {"periodic_torque": without})
+            assert over["periodic_torque"] < 1.0  # 0.14 N m beside 0.25

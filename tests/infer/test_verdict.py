@@ -166,9 +166,10 @@ def two_columns():
     [
         ({"gains": gain(-50.0), "evidence": None}, "drop_unsupported"),
         ({"carried": -1.0}, "drop_not_carried"),
+        ({"over_unrepeated": 0.9}, "drop_unrepeated"),
         ({"gains": NO_GAIN, "evidence": Evidence(-3.0, 0.0)}, "drop_unsupported"),
     ],
-    ids=["errors alone", "not on other parts", "the likelihood alone"],
+    ids=["errors alone", "not on other parts", "no more than repeats differ", "the likelihood alone"],
 )
 def test_every_claim_judges_what_a_front_end_weighs(two_columns, given, claim):
     """A front end judged by errors alone had dropped nothing."""

@@ -41,6 +41,7 @@ WANTED = frozenset(
 OTHERS = frozenset({"acc", "accel", "acceleration", "temp", "temperature", "temperatur", "efficiency", "power"})
 """Words for quantities that no rig reads."""
 _NUMBER = {".": NUMBER, ",": re.compile(r"^[+-]?\d+(,\d+)?([eE][+-]?\d+)?$")}
+_NUMBERED = re.compile(r"([a-z]{3,})\d+$")  # a word that counts channels: EMG2, Torque1
 Rows = list[tuple[int, list[bool]]]
 """Places of the rows of numbers, the last first, and of each cell whether it is a number."""
 
@@ -374,7 +375,8 @@ def _candidates(
         if not may_be(column, name, units.get(name, ""), revolute):
             continue  # another quantity
         words = words_of(bare)
-        if without_unit(column) == "_".join(words) or _means(words, column):
+        numbered = {n[1] for n in map(_NUMBERED.match, words) if n}
+        if without_unit(column) == "_".join(words) or _means(words | numbered, column):
             yield name
 
 

@@ -25,7 +25,7 @@ class PulseSummation(Effect):
     saturation: float = parameter(1.0, null=0.0, lower=-0.9, upper=200.0, scale=0.5)
     cooperation: float = refinement(0.0, lower=-0.5, upper=4.0, scale=0.5, grid=(1.0,), words="as a power of their sum")
 
-    name, stage, signal, rigs = "pulse_summation", Stage.MUSCLE, "activation", ("muscle",)
+    name, stage, signal, rigs = "pulse_summation", Stage.MUSCLE, "summation", ("muscle",)
 
     def apply(self, value: Scalar, s: Signals) -> Scalar:
         bound = value * power(value, self.cooperation, LEAST)

@@ -27,5 +27,8 @@ class SecondOrderActivation(Effect):
         s.unlagged = value
         return lag(value, s.own.lagged, self.second_s, s.step)[0]
 
+    def rest(self, s: Signals) -> ByName:
+        return {"lagged": s.x.act}
+
     def rate(self, s: Signals) -> ByName:
         return {"lagged": lag(s.unlagged, s.own.lagged, self.second_s, s.step)[1]}

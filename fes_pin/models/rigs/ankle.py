@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fes_pin.data.channels import RATE, recruitment_ends
+from fes_pin.data.channels import RATE, VOLUNTARY, recruitment_keys
 from fes_pin.data.imposed import imposed_motion
 from fes_pin.data.schema import IMPOSED, START_S, RigSchema, any_number, not_negative, positive
 from fes_pin.data.stimulus import is_stimulated
@@ -18,7 +18,7 @@ from fes_pin.models.least_squares import least_squares
 from fes_pin.models.maths import cos, exp, ramp, sin, where
 from fes_pin.models.rigs.base import GRAVITY, IMPOSED_STOPPING, Rig, imposed_now
 from fes_pin.models.rigs.rigid import gravity_coefficients, point_foot
-from fes_pin.models.rigs.stimuli import recruited_in, recruited_now, usual_period
+from fes_pin.models.rigs.stimuli import at_start, recruited_in, recruited_now, rest_muscle, usual_period
 from fes_pin.models.stage import Signals, parameter
 
 UPRIGHT = 1.5707963267948966
@@ -56,7 +56,7 @@ class Ankle(Rig):
             "com_distance_m": positive("m"),
             "moment_arm_m": positive("m"),
             "force_scale_n": positive("N"),
-            **recruitment_ends(),
+            **recruitment_keys(),
         },
         passive={"f0_n": not_negative("N"), "f1_per_rad": not_negative("1/rad"), "theta_r_rad": any_number("rad")},
         start={
@@ -73,7 +73,7 @@ class Ankle(Rig):
         only={"angle_rad": "isometric"},
         default_kind="motion",
         outputs={"motion": "angle_rad", "isometric": "force_n", IMPOSED: "torque_nm"},
-        inputs=("pulse_width_us", "amplitude_ma", "charge_uc", RATE),
+        inputs=("pulse_width_us", "amplitude_ma", "charge_uc", RATE, *VOLUNTARY),
         imposed=("angle_rad",),
     )
     needed = (*(n for n, number in schema.constants.items() if number.required), *schema.passive)
@@ -132,7 +132,8 @@ class Ankle(Rig):
     def trial_constants(self, trial: Trial) -> dict[str, float]:
         a, b = _foot_gravity(float(self.constants["foot_mass_kg"]), float(self.constants["com_distance_m"]))
         unstated = {"load_kg": 0.0, "torque_sign": 1.0} if trial.kind == IMPOSED else {}
-        known = {**unstated, **self.constants, **trial.conditions, "gravity_cos": a, "gravity_sin": b}
+        unstated |= {**at_start(trial), "gravity_cos": a, "gravity_sin": b}
+        known = {**unstated, **self.constants, **trial.conditions}
         return {name: float(known[name]) for name in self.constant_names(trial.kind)}
 
     def recruited(self, trial: Trial) -> np.ndarray:
@@ -166,10 +167,10 @@ class Ankle(Rig):
     def set_rest(self, s: Signals, z: Any) -> None:
         for name in vars(s.x):
             setattr(s.x, name, 0.0)
-        s.m.r = s.m.r_before = 0.0
+        rest_muscle(s)
         if s.kind == IMPOSED:
             s.q, s.v, s.force_scale = s.c.imposed_start, 0.0, self.gain * s.c.force_scale_n
-            s.sensed = s.c.torque_sign * self._joint_torque(s, 0.0)
+            s.sensed = s.c.torque_sign * self._joint_torque(s, s.force_scale * s.x.act)
             return
         if s.kind == "motion":
             s.x.q, s.x.v, s.m.rest = z, 0.0, z

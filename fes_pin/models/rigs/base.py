@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from fes_pin.data.channels import CHANNELS, ENVELOPE, RATE, Channel, channel_of
+from fes_pin.data.channels import CHANNELS, ENVELOPE, RATE, VOLUNTARY, Channel, channel_of
 from fes_pin.data.errors import InputError
 from fes_pin.data.imposed import MOTION, imposed_motion, same_motion
 from fes_pin.data.read_only import ReadOnly
@@ -16,7 +16,7 @@ from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial, derived_trial
 from fes_pin.models.in_channel import in_channel
 from fes_pin.models.parameters import ANY_NUMBER, ROTARY, ParameterInfo, check_parameters, checked_number, parameters_of
-from fes_pin.models.rigs.stimuli import shaped
+from fes_pin.models.rigs.stimuli import AT_START, shaped
 from fes_pin.models.session import Session, checked_session, past_of
 from fes_pin.models.stage import Effect, Signals
 
@@ -149,6 +149,7 @@ class Rig(ReadOnly):
     def steered(cls, study: Study) -> str | None:
         """The input column of a study that `driven` can give any shape; None if there is none."""
         unknown = {n for n, c in CHANNELS.items() if c.ends[0] not in study.constants}  # of which nobody knows the ends
+        unknown |= {*VOLUNTARY}  # nobody steers a voluntary muscle
         return next((n for n in cls.schema.inputs if n in study.trials[0] and n not in unknown), None)
 
     @classmethod
@@ -194,18 +195,24 @@ class Rig(ReadOnly):
         return in_channel(kind, self.channel)
 
     def ends(self) -> tuple[str, ...]:
-        """Names of the constants between which it recruits; none without a known threshold.
+        """Names of the constants between which it recruits; without a known threshold, what recruits at the start.
 
         A program is kept by its layout: what the equations read must stand there.
         """
-        return self.channel.ends if self.channel else ()
+        return self.channel.ends if self.channel else (AT_START,)
 
     def driven_signals(self, signals: tuple[str, ...], inputs: tuple[str, ...]) -> tuple[str, ...]:
-        """Return those of a muscle's signals that these inputs drive: recorded pulses have no size that recruits."""
+        """Return those of a muscle's signals that these inputs drive.
+
+        Recorded pulses have no size that recruits. A voluntary muscle has recruitment, and no pulses: none sum, and no
+        current spreads to other nerves.
+        """
         has_size = self.channel is not None and self.channel.column in inputs
         absent = set() if has_size else {"pulse_width", "recruitment"}
+        if ENVELOPE in inputs:
+            absent = {"pulse_width", "summation", "net_force"}
         if not has_size and not {"stim", RATE, ENVELOPE} & set(inputs):
-            absent |= {"delay", "time_constant", "sensitivity", "activation"}
+            absent |= {"delay", "time_constant", "sensitivity", "summation", "activation"}
         return tuple(s for s in signals if s not in absent)
 
     def states(self, kind: str) -> tuple[str, ...]:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fes_pin.data.channels import CHANNELS, EMG, EMG_KEYS, ENVELOPE, RATE, recruitment_ends
+from fes_pin.data.channels import CHANNELS, RATE, VOLUNTARY, recruitment_keys
 from fes_pin.data.errors import InputError
 from fes_pin.data.schema import IMPOSED, START_S, RigSchema, positive
 from fes_pin.data.stimulus import is_stimulated
@@ -15,7 +15,7 @@ from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.models.parameters import HELD, parameter
 from fes_pin.models.rigs.base import Rig, imposed_now
-from fes_pin.models.rigs.stimuli import recruited_in, recruited_now, trains, usual_period
+from fes_pin.models.rigs.stimuli import at_start, recruited_in, recruited_now, rest_muscle, trains, usual_period
 from fes_pin.models.stage import Signals
 
 
@@ -39,15 +39,12 @@ class Muscle(Rig):
 
     name = "muscle"
     schema = RigSchema(
-        constants={
-            **recruitment_ends(),
-            **dict(zip(EMG_KEYS, (positive("Hz", False), positive("", False)), strict=True)),
-        },
+        constants=recruitment_keys(),
         start={"gain": positive(""), "time_constant_s": positive("s")},
         conditions=START_S,
         default_kind="isometric",
         outputs={"isometric": "force_n", IMPOSED: "force_n"},
-        inputs=("pulse_width_us", "stim", "amplitude_ma", "charge_uc", RATE, EMG, ENVELOPE),
+        inputs=("pulse_width_us", "stim", "amplitude_ma", "charge_uc", RATE, *VOLUNTARY),
         imposed=("length_m",),
     )
     elsewhere = "record the same force with another sensor, or let the muscle move a joint"
@@ -71,8 +68,7 @@ class Muscle(Rig):
 
     @classmethod
     def other_stimuli(cls, study: Study, time: np.ndarray) -> Iterator[dict[str, np.ndarray]]:
-        if ENVELOPE not in study.trials[0]:  # nobody steers a voluntary muscle
-            yield from ({"stim": train} for train in trains(time))
+        yield from ({"stim": train} for train in trains(time))
 
     def driving_sizes(self, trials: Sequence[Trial]) -> dict[str, float]:
         forces = [t["force_n"] for t in trials if "force_n" in t.columns]
@@ -84,8 +80,9 @@ class Muscle(Rig):
     def signals(self, kind: str) -> tuple[str, ...]:
         nerve = ("pulse_width", "recruitment", "delay", "time_constant")
         if kind == IMPOSED:
-            return (*nerve, "sensitivity", "activation", "fibres", "force", "fibre", "torque", "pull", "reading")
-        return (*nerve, "activation", "force", "pull", "reading")
+            stretched = ("fibres", "force", "fibre", "torque", "pull", "reading")
+            return (*nerve, "sensitivity", "summation", "activation", *stretched)
+        return (*nerve, "summation", "activation", "force", "pull", "reading")
 
     def changeable(self, kind: str, inputs: tuple[str, ...]) -> tuple[str, ...]:
         return self.driven_signals(self.signals(kind), inputs)
@@ -101,15 +98,15 @@ class Muscle(Rig):
 
     def trial_constants(self, trial: Trial) -> dict[str, float]:
         period = pulse_period([trial] if "stim" in trial.columns else [])
-        known = {"pulse_period_s": period, "length_m": 0.0, **self.constants}
+        known = {"pulse_period_s": period, "length_m": 0.0, **at_start(trial), **self.constants}
         return {name: float(known[name]) for name in self.constant_names(trial.kind)}
 
     def recruited(self, trial: Trial) -> np.ndarray:
         return recruited_in(trial, self.channel, self.trial_constants(trial))
 
     def set_rest(self, s: Signals, z: Any) -> None:
-        s.x.act = s.m.r = s.m.r_before = 0.0
-        s.q = s.sensed = 0.0
+        rest_muscle(s)
+        s.q, s.sensed = 0.0, self.gain * s.x.act
 
     def sample(self, s: Signals) -> dict[str, Any]:
         return {"r": s.through("recruitment", recruited_now(s, self.channel)), "r_before": s.m.r}
@@ -123,7 +120,8 @@ class Muscle(Rig):
             s.stretching, s.bent = rate, s.q - s.c.length_m - in_series
         s.time_constant = s.through("time_constant", self.time_constant_s)
         s.act_rate = (s.r - s.act) / s.time_constant
-        s.drive = s.through("activation", s.through("sensitivity", s.act) if s.kind == IMPOSED else s.act)
+        felt = s.through("sensitivity", s.act) if s.kind == IMPOSED else s.act
+        s.drive = s.through("activation", s.through("summation", felt))
         if s.kind == IMPOSED:
             s.isometric = s.through("force", s.through("fibres", s.force_scale * s.drive))
             s.tendon = self._tendon_force(s)

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from fes_pin.data.channels import CHANNELS, ENVELOPE, RATE, Channel
+from fes_pin.data.channels import CHANNELS, ENVELOPE, RATE, Channel, until_next
 from fes_pin.data.stimulus import usual_rate
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
@@ -16,6 +16,9 @@ RATES_HZ = (8.0, 15.0, 31.0, 45.0)
 """Pulse rates that are proposed, from single twitches to a fused contraction."""
 ON_AND_PAUSE_S = ((7.0, 1.0), (1.0, 1.0), (0.3, 0.7))
 """Length of trains, and the pause after each, s."""
+AT_START = "recruited_at_start"
+"""Constant of a trial: its first recruitment, by an EMG. A muscle that nobody stimulates may hold when a trial begins;
+one that is stimulated rests until then."""
 LAST_S = 0.8
 """A proposed train ends so long before the trial does: the muscle's relaxation is seen."""
 
@@ -71,12 +74,23 @@ def recruited_in(trial: Trial, channel: Channel | None, constants: Mapping[str, 
     if "stim" in trial:
         return np.asarray(trial["stim"] * constants["pulse_period_s"] / trial.dt)
     if ENVELOPE in trial:
-        return trial[ENVELOPE]
+        return until_next(trial[ENVELOPE])
     recruited = np.full(len(trial), float(RATE in trial))
     if channel is not None and channel.column in trial:
         low, high = (float(constants[end]) for end in channel.ends)
         recruited = np.asarray(recruitment_of(trial[channel.column], low, high))
     return recruited * trial[RATE] * constants["pulse_period_s"] if RATE in trial else recruited
+
+
+def at_start(trial: Trial) -> dict[str, float]:
+    """The first recruitment of a trial, by its name."""
+    return {AT_START: float(trial[ENVELOPE][0]) if ENVELOPE in trial else 0.0}
+
+
+def rest_muscle(s: Signals) -> None:
+    """Put the muscle where its first recruitment, held for long, would have it."""
+    held = getattr(s.c, AT_START, None)
+    s.x.act = s.m.r = s.m.r_before = 0.0 if held is None else s.through("recruitment", held)
 
 
 def usual_period(trials: Sequence[Trial]) -> dict[str, float]:
