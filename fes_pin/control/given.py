@@ -71,7 +71,7 @@ class GivenAnkle:
         self.after = ca.Function("after", ins, [d.after])
         self.slopes = ca.Function("slopes", ins, [ca.densify(s) for s in (ca.jacobian(d.rates, d.x), into)])
         self.reading = ca.Function("reading", ins, [d.readings, ca.densify(ca.jacobian(d.readings, d.x))])
-        trial: Any = SimpleNamespace(kind="motion", conditions={"load_kg": dynamics.load_kg})
+        trial: Any = SimpleNamespace(kind="motion", columns={}, conditions={"load_kg": dynamics.load_kg})
         self.pieces = math.ceil(PULSE_S / max_step(self.model))
         timing = {"t0": 0.0, "dt": PULSE_S, "step": PULSE_S / self.pieces, "shift": 0.0}
         self.constants = dict.fromkeys(self.layout.constants, 0.0) | model.rig.trial_constants(trial) | timing

@@ -1,6 +1,6 @@
 """Effort that a model leaves and that differs between equal cycles of an imposed motion.
 
-What is left of such an effort by a model that contains all that acts is noise; a subject who does not relax leaves
+The residual of such an effort is noise where the model contains all that acts; a subject who does not relax leaves
 more. How much voluntary effort repeats with the motion nobody knows, so that the part that differs is a lower bound of
 what is not of the library.
 """

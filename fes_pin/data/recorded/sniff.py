@@ -41,7 +41,7 @@ WANTED = frozenset(
 OTHERS = frozenset({"acc", "accel", "acceleration", "temp", "temperature", "temperatur", "efficiency", "power"})
 """Words for quantities that no rig reads."""
 _NUMBER = {".": NUMBER, ",": re.compile(r"^[+-]?\d+(,\d+)?([eE][+-]?\d+)?$")}
-_NUMBERED = re.compile(r"([a-z]{3,})\d+$")  # a word that counts channels: EMG2, Torque1
+_NUMBERED = re.compile(r"([a-z]{3,})\d+$")
 Rows = list[tuple[int, list[bool]]]
 """Places of the rows of numbers, the last first, and of each cell whether it is a number."""
 
@@ -370,14 +370,14 @@ def _candidates(
     if column in names and may_be(column, column, units.get(column, ""), revolute):
         yield column  # a name that is the rig's own needs no words
         return
-    for name in names:
-        bare, _ = split_header(name)
-        if not may_be(column, name, units.get(name, ""), revolute):
-            continue  # another quantity
-        words = words_of(bare)
-        numbered = {n[1] for n in map(_NUMBERED.match, words) if n}
-        if without_unit(column) == "_".join(words) or _means(words | numbered, column):
-            yield name
+    words = {n: words_of(split_header(n)[0]) for n in names if may_be(column, n, units.get(n, ""), revolute)}
+    found = [n for n, some in words.items() if without_unit(column) == "_".join(some) or _means(some, column)]
+    yield from found or [n for n, some in words.items() if _means(_without_numbers(some), column)]
+
+
+def _without_numbers(words: frozenset[str]) -> frozenset[str]:
+    """Words without the numbers of channels: EMG2, Torque1."""
+    return words | {found[1] for found in map(_NUMBERED.match, words) if found}
 
 
 def _means(words: frozenset[str], column: str) -> bool:

@@ -84,7 +84,7 @@ def recruited_in(trial: Trial, channel: Channel | None, constants: Mapping[str, 
 
 def at_start(trial: Trial) -> dict[str, float]:
     """The first recruitment of a trial, by its name."""
-    return {AT_START: float(trial[ENVELOPE][0]) if ENVELOPE in trial else 0.0}
+    return {AT_START: float(trial[ENVELOPE][0]) if ENVELOPE in trial.columns else 0.0}
 
 
 def rest_muscle(s: Signals) -> None:
