@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from fes_pin.data.errors import MOST_LISTED, InputError, listed, optional_library
+from fes_pin.data.errors import MOST_LISTED, InputError, optional_library
 from fes_pin.data.files import as_path, read_bytes, read_json
 from fes_pin.data.markers import TIME, c3d_points, trc_points
 from fes_pin.data.motion import STORAGE, is_rotation, read_motion
