@@ -277,3 +277,29 @@ def test_a_torque_is_a_force_over_its_lever(tmp_path):
     path = written(tmp_path / "a.csv", "time [s],elbow_trq [Nm],stim_pw [us]", *lines_of(time, abs(values), ","))
     with pytest.raises(InputError, match=r"force_n=NAME,scale=NUMBER \(elbow_trq"):
         study_of(tmp_path, path, rig="muscle")
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("ends", ["", ","])
+@pytest.mark.parametrize("between", [",", ";", "\t"])
+def test_rows_above_one_whose_last_cell_is_empty_are_read(tmp_path, between, ends, seed):
+    """They were taken for a title, as that row has a cell less: all above it was lost in silence."""
+    rng = np.random.default_rng(seed)
+    time, values = drawn(seed, rows=int(rng.integers(20, 380)))
+    gone = rng.choice(len(time), 3, replace=False)
+    values[gone, 1] = np.nan
+    rows = [row.replace("nan", "") + ends.replace(",", between) for row in lines_of(time, values, between)]
+    for top in (["t [s]", "angle [deg]", "torque [Nm]"], None):
+        path = written(tmp_path / "a.csv", *([between.join(top)] if top else []), *rows)
+        table, header = read(path)
+        assert len(table) == len(time) and header.row == bool(top)
+        assert np.allclose([*table.columns.values()][2], values[:, 1], atol=1e-3, equal_nan=True)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_line_of_fewer_numbers_above_the_rows_is_still_no_row(tmp_path, seed):
+    time, values = drawn(seed)
+    path = written(tmp_path / "a.csv", "7,3", "t,angle,torque", *lines_of(time, values, ","))
+    assert len(read(path)[0]) == len(time)
+    bare = written(tmp_path / "b.csv", "7,3", *lines_of(time, values, ","))
+    assert sniffed(bare)[0].first_row == 2

@@ -61,7 +61,8 @@ def sniffed(path: Path, stated: Mapping[str, Any] = MappingProxyType({})) -> tup
     above = lines[:first]
     turned = None if "transposed" in stated else _transposed(above, rows, form)
     below = [place for place, _ in reversed(rows) if place >= first] or [rows[-1][0]]
-    numbers = [cells_of(lines[place], form) for place in below[:2]]
+    columns = len(rows[0][1])
+    numbers = [(cells_of(lines[place], form) + [""] * columns)[:columns] for place in below[:2]]
     header = turned or (Header() if stated.get("transposed") else header_of(above, form, numbers))
     if not turned and not header.row and not header.said and len(numbers[0]) >= WIDE * len(rows):
         odd = f"{len(rows)} rows of {len(numbers[0])} columns without names: is the table transposed?"
@@ -160,19 +161,28 @@ def _encoding(path: Path) -> str:
 
 
 def _rows(lines: list[str], form: TextForm) -> Rows:
-    """The rows at the end of the lines that are numbers read this way, last first; of each cell whether it is one."""
+    """The rows at the end of the lines that are numbers read this way, last first; of each cell whether it is one.
+
+    A delimiter at the end of a line ends its last cell, or begins one that is empty: as other lines have it.
+    """
     number = _NUMBER[form.decimal]
     rows: Rows = []
+    widths: set[int] = set()  # of lines that end in a cell
     for place in range(len(lines) - 1, -1, -1):
         line = lines[place]
         if not line.strip() or line.lstrip().startswith(COMMENTS):
             continue
         cells = cells_of(line, form)
         kinds = [_is_number(cell, number) or cell.lower() in MISSING for cell in cells]
-        if (rows and len(kinds) != len(rows[0][1])) or not any(_is_number(cell, number) for cell in cells):
+        is_open = form.delimiter != " " and line.rstrip(" \r").endswith(form.delimiter)
+        width = next(iter(widths), len(rows[0][1]) if rows else len(kinds))
+        fits = len(kinds) in ({width, width - 1} if is_open else {width} if widths else {width, width + 1})
+        if not (fits or not rows) or not any(_is_number(cell, number) for cell in cells):
             break
+        widths |= set() if is_open else {len(kinds)}
         rows.append((place, kinds))
-    return rows
+    width = max((len(kinds) for _, kinds in rows), default=0)
+    return [(place, kinds + [True] * (width - len(kinds))) for place, kinds in rows]
 
 
 def _likely(rows: Rows, form: TextForm) -> tuple[float, bool, int, bool]:

@@ -268,7 +268,10 @@ def names_of(path: Path, lines: list[str], form: TextForm) -> tuple[str, ...]:
     if form.names:
         return without_twins(list(form.names))
     if not form.header_row:
-        first = next((line for line in lines[form.first_row - 1 :] if line.strip()), "")
+        below = (line for line in lines[form.first_row - 1 :] if line.strip())
+        first = next(below, "")
+        if first.rstrip(" \r").endswith(form.delimiter):  # its last cell may be empty, or the delimiter ends it
+            first = next((line for line in below if not line.rstrip(" \r").endswith(form.delimiter)), first)
         return without_twins([""] * len(cells_of(first, form)))
     line = lines[form.header_row - 1] if form.header_row <= len(lines) else ""
     names = cells_of(line.removeprefix(form.comment), form)
