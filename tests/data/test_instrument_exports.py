@@ -303,3 +303,35 @@ def test_a_line_of_fewer_numbers_above_the_rows_is_still_no_row(tmp_path, seed):
     assert len(read(path)[0]) == len(time)
     bare = written(tmp_path / "b.csv", "7,3", *lines_of(time, values, ","))
     assert sniffed(bare)[0].first_row == 2
+
+
+FOOTERS = {
+    "words": ("End of data",),
+    "summary": ("", "Peak torque,12.5", "Mean,3.2"),
+    "comment": ("", "# saved 12:00"),
+    "stamp": ("Saved: 12.5.2020",),
+}
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("kind", FOOTERS)
+def test_lines_below_the_numbers_are_passed_over_and_said(tmp_path, kind, seed):
+    """They made the first column one of words: there was no time, or there were no rows at all."""
+    rng = np.random.default_rng(seed)
+    time, values = drawn(seed, int(rng.integers(1, 4)), rows=int(rng.integers(8, 900)))
+    names = ["t [s]", "angle [deg]", "torque [Nm]", "foo"][: 1 + values.shape[1]]
+    path = written(tmp_path / "a.csv", ",".join(names), *lines_of(time, values, ","), *FOOTERS[kind])
+    table = propose(path, JOINT, True).recording
+    assert table.names == tuple(names) and len(table) == len(time)
+    assert np.allclose(table.columns["angle [deg]"], values[:, 0], atol=1e-3)
+    assert table.said == () if kind == "comment" else "below the numbers" in table.said[0]
+    study, _ = study_of(tmp_path, path)
+    assert len(study.trials[0]) == len(time)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("last", ["1.0,oops,2.0", ",1.0,2.0", "nan,1.0,2.0"])
+def test_a_last_row_that_is_wrong_is_no_footer(tmp_path, last, seed):
+    time, values = drawn(seed)
+    path = written(tmp_path / "a.csv", "t,angle,torque", *lines_of(time, values, ","), last)
+    assert len(propose(path, JOINT, True).recording) == len(time) + 1

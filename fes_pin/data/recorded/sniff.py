@@ -77,7 +77,7 @@ def _likeliest(path: Path) -> tuple[list[str], Rows, TextForm]:
     """The first lines of a file, its rows of numbers, and the form in which these are likeliest, without a header."""
     encoding = _encoding(path)
     every = read_text(path, encoding).split("\n")
-    lines = _first_block(every[:LOOKED_AT])
+    lines = _without_footer(_first_block(every[:LOOKED_AT]))
     forms = [TextForm(delimiter, decimal, encoding=encoding) for delimiter in DELIMITERS for decimal in DECIMALS]
     rows, form = max(((_rows(lines, form), form) for form in forms), key=lambda pair: _likely(*pair))
     if not rows:
@@ -95,11 +95,21 @@ def _first_block(lines: list[str]) -> list[str]:
         text = line.strip()
         if not text[:1].isalpha():
             continue
-        between = lines[places.get(text, k) : k]
-        if sum(1 for one in between if one.strip() and one.lstrip()[0] in "+-.0123456789") >= MIN_ROWS:
+        if sum(map(_begins_a_row, lines[places.get(text, k) : k])) >= MIN_ROWS:
             return lines[:k]
         places.setdefault(text, k)
     return lines
+
+
+def _without_footer(lines: list[str]) -> list[str]:
+    """Lines down to the last that begins with a number, where some above it do so as well."""
+    last = max((k for k, line in enumerate(lines) if _begins_a_row(line)), default=0)
+    above = lines[max(last + 1 - MIN_ROWS, 0) : last + 1]
+    return lines[: last + 1] if len(above) == MIN_ROWS and all(map(_begins_a_row, above)) else lines
+
+
+def _begins_a_row(line: str) -> bool:
+    return line.lstrip(' \t"')[:1] in tuple("+-.0123456789")
 
 
 def _counts(cells: Sequence[str], below: Sequence[str]) -> bool:
