@@ -53,6 +53,7 @@ def study_of(folder, *files, rig="joint", **more):
 
 SPELT = {
     "deg/s": ("Deg/Sec", "DEG/SEC", "°/s", "° s-1", "deg·s⁻¹", "degrees per second", "deg/second"),
+    "deg": ("Grad", "grados", "°", "degrees"),
     "rad/s": ("rad s^-1", "radians/s", "rad·s-1"),
     "rpm": ("r/min", "rev/min", "U/min"),
     "lbf ft": ("FT-LBS", "ft·lb", "Foot-Pounds", "ft.lbs", "lb-ft"),
@@ -247,7 +248,7 @@ def test_what_is_asked_for_is_what_is_left(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "name", ["AccX (g)", "Force_x", "F_x", "Motor temperature", "Motor Efficiency (%)", "torque y"]
+    "name", ["AccX (g)", "gyr_x", "Force_x", "F_x", "Motor temperature", "Motor Efficiency (%)", "torque y"]
 )
 def test_an_axis_of_another_quantity_is_no_position_and_what_no_rig_reads_no_effort(tmp_path, name):
     time, values = drawn(4)
@@ -257,7 +258,7 @@ def test_an_axis_of_another_quantity_is_no_position_and_what_no_rig_reads_no_eff
     assert found["position"] == () and found["effort"] == ((name,) if is_effort and "F_x" not in name else ())
 
 
-@pytest.mark.parametrize("name", ["x", "cart x", "x_pos", "encoder_x", "q", "laser.x"])
+@pytest.mark.parametrize("name", ["x", "cart x", "x_pos", "encoder_x", "q", "laser.x", "pitch"])
 def test_an_axis_alone_or_of_a_thing_is_a_position(tmp_path, name):
     time, values = drawn(4)
     path = written(tmp_path / "a.csv", f"t,{name},foo", *lines_of(time, values, ","))
