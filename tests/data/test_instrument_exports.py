@@ -53,6 +53,7 @@ def study_of(folder, *files, rig="joint", **more):
 
 SPELT = {
     "deg/s": ("Deg/Sec", "DEG/SEC", "°/s", "° s-1", "deg·s⁻¹", "degrees per second", "deg/second"),
+    "deg": ("Grad", "grados", "°", "degrees"),
     "rad/s": ("rad s^-1", "radians/s", "rad·s-1"),
     "rpm": ("r/min", "rev/min", "U/min"),
     "lbf ft": ("FT-LBS", "ft·lb", "Foot-Pounds", "ft.lbs", "lb-ft"),
@@ -247,7 +248,7 @@ def test_what_is_asked_for_is_what_is_left(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "name", ["AccX (g)", "Force_x", "F_x", "Motor temperature", "Motor Efficiency (%)", "torque y"]
+    "name", ["AccX (g)", "gyr_x", "Force_x", "F_x", "Motor temperature", "Motor Efficiency (%)", "torque y"]
 )
 def test_an_axis_of_another_quantity_is_no_position_and_what_no_rig_reads_no_effort(tmp_path, name):
     time, values = drawn(4)
@@ -257,7 +258,7 @@ def test_an_axis_of_another_quantity_is_no_position_and_what_no_rig_reads_no_eff
     assert found["position"] == () and found["effort"] == ((name,) if is_effort and "F_x" not in name else ())
 
 
-@pytest.mark.parametrize("name", ["x", "cart x", "x_pos", "encoder_x", "q", "laser.x"])
+@pytest.mark.parametrize("name", ["x", "cart x", "x_pos", "encoder_x", "q", "laser.x", "pitch"])
 def test_an_axis_alone_or_of_a_thing_is_a_position(tmp_path, name):
     time, values = drawn(4)
     path = written(tmp_path / "a.csv", f"t,{name},foo", *lines_of(time, values, ","))
@@ -277,3 +278,61 @@ def test_a_torque_is_a_force_over_its_lever(tmp_path):
     path = written(tmp_path / "a.csv", "time [s],elbow_trq [Nm],stim_pw [us]", *lines_of(time, abs(values), ","))
     with pytest.raises(InputError, match=r"force_n=NAME,scale=NUMBER \(elbow_trq"):
         study_of(tmp_path, path, rig="muscle")
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("ends", ["", ","])
+@pytest.mark.parametrize("between", [",", ";", "\t"])
+def test_rows_above_one_whose_last_cell_is_empty_are_read(tmp_path, between, ends, seed):
+    """They were taken for a title, as that row has a cell less: all above it was lost in silence."""
+    rng = np.random.default_rng(seed)
+    time, values = drawn(seed, rows=int(rng.integers(20, 380)))
+    gone = rng.choice(len(time), 3, replace=False)
+    values[gone, 1] = np.nan
+    rows = [row.replace("nan", "") + ends.replace(",", between) for row in lines_of(time, values, between)]
+    for top in (["t [s]", "angle [deg]", "torque [Nm]"], None):
+        path = written(tmp_path / "a.csv", *([between.join(top)] if top else []), *rows)
+        table, header = read(path)
+        assert len(table) == len(time) and header.row == bool(top)
+        assert np.allclose([*table.columns.values()][2], values[:, 1], atol=1e-3, equal_nan=True)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_line_of_fewer_numbers_above_the_rows_is_still_no_row(tmp_path, seed):
+    time, values = drawn(seed)
+    path = written(tmp_path / "a.csv", "7,3", "t,angle,torque", *lines_of(time, values, ","))
+    assert len(read(path)[0]) == len(time)
+    bare = written(tmp_path / "b.csv", "7,3", *lines_of(time, values, ","))
+    assert sniffed(bare)[0].first_row == 2
+
+
+FOOTERS = {
+    "words": ("End of data",),
+    "summary": ("", "Peak torque,12.5", "Mean,3.2"),
+    "comment": ("", "# saved 12:00"),
+    "stamp": ("Saved: 12.5.2020",),
+}
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("kind", FOOTERS)
+def test_lines_below_the_numbers_are_passed_over_and_said(tmp_path, kind, seed):
+    """They made the first column one of words: there was no time, or there were no rows at all."""
+    rng = np.random.default_rng(seed)
+    time, values = drawn(seed, int(rng.integers(1, 4)), rows=int(rng.integers(8, 900)))
+    names = ["t [s]", "angle [deg]", "torque [Nm]", "foo"][: 1 + values.shape[1]]
+    path = written(tmp_path / "a.csv", ",".join(names), *lines_of(time, values, ","), *FOOTERS[kind])
+    table = propose(path, JOINT, True).recording
+    assert table.names == tuple(names) and len(table) == len(time)
+    assert np.allclose(table.columns["angle [deg]"], values[:, 0], atol=1e-3)
+    assert table.said == () if kind == "comment" else "below the numbers" in table.said[0]
+    study, _ = study_of(tmp_path, path)
+    assert len(study.trials[0]) == len(time)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("last", ["1.0,oops,2.0", ",1.0,2.0", "nan,1.0,2.0"])
+def test_a_last_row_that_is_wrong_is_no_footer(tmp_path, last, seed):
+    time, values = drawn(seed)
+    path = written(tmp_path / "a.csv", "t,angle,torque", *lines_of(time, values, ","), last)
+    assert len(propose(path, JOINT, True).recording) == len(time) + 1

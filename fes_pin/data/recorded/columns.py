@@ -189,7 +189,8 @@ class Columns:
         said = list(table.said)
         for name, values in table.columns.items():
             if np.isnan(values).any() and (name == "time_s" or not self.fills):
-                hint = f'a number, found nothing; missing = "{INTERPOLATE}" in [columns.file] fills in short gaps'
+                how = f'missing = "{INTERPOLATE}" in [columns.file], or --fill, fills in short gaps'
+                hint = f"a number, found nothing; {how}"
                 expected = "a time, found nothing" if name == "time_s" else hint
                 raise table.error(f"expected {expected}", name, int(np.argmax(np.isnan(values))))
         if self.events and self.resample_hz is not None:

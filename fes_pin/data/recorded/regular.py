@@ -104,7 +104,9 @@ def check_steps(table: Table, rate_hz: float) -> tuple[str, ...]:
 def _check_gaps(table: Table, there: np.ndarray, name: str) -> None:
     if not there[0] or not there[-1]:
         sample = 0 if not there[0] else int(np.flatnonzero(there)[-1]) + 1 if there.any() else 0
-        raise table.error("a sample is missing at an end of the recording; cut it there", name, sample)
+        raise table.error(
+            "a sample is missing at an end of the recording; cut it there: --set from=S, to=S", name, sample
+        )
     known = np.flatnonzero(there)
     steps = np.diff(known)
     if (most := int(steps.max())) > LONGEST_GAP:

@@ -65,7 +65,8 @@ def sniffed(path: Path, stated: Mapping[str, Any] = MappingProxyType({})) -> tup
     above = lines[:first]
     turned = None if "transposed" in stated else _transposed(above, rows, form)
     below = [place for place, _ in reversed(rows) if place >= first] or [rows[-1][0]]
-    numbers = [cells_of(lines[place], form) for place in below[:2]]
+    columns = len(rows[0][1])
+    numbers = [(cells_of(lines[place], form) + [""] * columns)[:columns] for place in below[:2]]
     header = turned or (Header() if stated.get("transposed") else header_of(above, form, numbers))
     if not turned and not header.row and not header.said and len(numbers[0]) >= WIDE * len(rows):
         odd = f"{len(rows)} rows of {len(numbers[0])} columns without names: is the table transposed?"
@@ -84,7 +85,7 @@ def _likeliest(path: Path, sheet: str) -> tuple[list[str], Rows, TextForm]:
         encoding = _encoding(path)
         forms = [TextForm(delimiter, decimal, encoding=encoding) for delimiter in DELIMITERS for decimal in DECIMALS]
     every = forms[0].lines(path)
-    lines = _first_block(every[:LOOKED_AT])
+    lines = _without_footer(_first_block(every[:LOOKED_AT]))
     rows, form = max(((_rows(lines, form), form) for form in forms), key=lambda pair: _likely(*pair))
     if not rows:
         raise InputError("expected rows of numbers, found none", file=path)
@@ -101,11 +102,21 @@ def _first_block(lines: list[str]) -> list[str]:
         text = line.strip()
         if not text[:1].isalpha():
             continue
-        between = lines[places.get(text, k) : k]
-        if sum(1 for one in between if one.strip() and one.lstrip()[0] in "+-.0123456789") >= MIN_ROWS:
+        if sum(map(_begins_a_row, lines[places.get(text, k) : k])) >= MIN_ROWS:
             return lines[:k]
         places.setdefault(text, k)
     return lines
+
+
+def _without_footer(lines: list[str]) -> list[str]:
+    """Lines down to the last that begins with a number, where some above it do so as well."""
+    last = max((k for k, line in enumerate(lines) if _begins_a_row(line)), default=0)
+    above = lines[max(last + 1 - MIN_ROWS, 0) : last + 1]
+    return lines[: last + 1] if len(above) == MIN_ROWS and all(map(_begins_a_row, above)) else lines
+
+
+def _begins_a_row(line: str) -> bool:
+    return line.lstrip(' \t"')[:1] in tuple("+-.0123456789")
 
 
 def _counts(cells: Sequence[str], below: Sequence[str]) -> bool:
@@ -167,19 +178,28 @@ def _encoding(path: Path) -> str:
 
 
 def _rows(lines: list[str], form: TextForm) -> Rows:
-    """The rows at the end of the lines that are numbers read this way, last first; of each cell whether it is one."""
+    """The rows at the end of the lines that are numbers read this way, last first; of each cell whether it is one.
+
+    A delimiter at the end of a line ends its last cell, or begins one that is empty: as other lines have it.
+    """
     number = _NUMBER[form.decimal]
     rows: Rows = []
+    widths: set[int] = set()  # of lines that end in a cell
     for place in range(len(lines) - 1, -1, -1):
         line = lines[place]
         if not line.strip() or line.lstrip().startswith(COMMENTS):
             continue
         cells = cells_of(line, form)
         kinds = [_is_number(cell, number) or cell.lower() in MISSING for cell in cells]
-        if (rows and len(kinds) != len(rows[0][1])) or not any(_is_number(cell, number) for cell in cells):
+        is_open = form.delimiter != " " and line.rstrip(" \r").endswith(form.delimiter)
+        width = next(iter(widths), len(rows[0][1]) if rows else len(kinds))
+        fits = len(kinds) in ({width, width - 1} if is_open else {width} if widths else {width, width + 1})
+        if not (fits or not rows) or not any(_is_number(cell, number) for cell in cells):
             break
+        widths |= set() if is_open else {len(kinds)}
         rows.append((place, kinds))
-    return rows
+    width = max((len(kinds) for _, kinds in rows), default=0)
+    return [(place, kinds + [True] * (width - len(kinds))) for place, kinds in rows]
 
 
 def _likely(rows: Rows, form: TextForm) -> tuple[float, bool, int, bool]:

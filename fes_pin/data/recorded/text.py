@@ -282,7 +282,10 @@ def names_of(path: Path, lines: list[str], form: TextForm) -> tuple[str, ...]:
     if form.names:
         return without_twins(list(form.names))
     if not form.header_row:
-        first = next((line for line in lines[form.first_row - 1 :] if line.strip()), "")
+        below = (line for line in lines[form.first_row - 1 :] if line.strip())
+        first = next(below, "")
+        if first.rstrip(" \r").endswith(form.delimiter):  # its last cell may be empty, or the delimiter ends it
+            first = next((line for line in below if not line.rstrip(" \r").endswith(form.delimiter)), first)
         return without_twins([""] * len(cells_of(first, form)))
     line = lines[form.header_row - 1] if form.header_row <= len(lines) else ""
     names = cells_of(line.removeprefix(form.comment), form)
@@ -310,6 +313,9 @@ def _body(lines: list[str], form: TextForm) -> tuple[list[str], np.ndarray]:
         found = [(row, line) for row, line in found if not _heads(above, form, line)]
     if form.comment:
         found = [(row, line) for row, line in found if not line.lstrip().startswith(form.comment)]
+    if not form.strict and found and _begins(found[0][1], form):
+        while not _begins(found[-1][1], form):  # a summary, `End of data`
+            found.pop()
     return [line for _, line in found], np.array([row for row, _ in found], dtype=int)
 
 
@@ -320,10 +326,15 @@ def _passed_over(lines: list[str], body: list[str], rows: np.ndarray, form: Text
     above, last = lines[: form.first_row - 1], int(rows[-1]) if len(rows) else 0
     again = [line for line in lines[form.first_row - 1 : last] if _heads(above, form, line)]
     noted = [line for line in body if "#" in line and REMARK.search(line)]
+    below = [line.strip() for line in lines[last:] if line.strip()] if len(rows) else []
+    below = [line for line in below if not line.startswith((form.comment or "#", "#", "%", "//"))]
     said = [f"its header comes again in {len(again)} lines, which are passed over"] if again else []
     if noted:
         remark = noted[0][noted[0].index("#") :][:40].strip()
         said.append(f"{len(noted)} rows end in a remark, {remark!r}: it is passed over")
+    if below:
+        lines_are = "1 line below the numbers is" if len(below) == 1 else f"{len(below)} lines below the numbers are"
+        said.append(f"{lines_are} passed over: {below[0][:40]!r}")
     return said
 
 
@@ -333,6 +344,12 @@ def _heads(above: Sequence[str], form: TextForm, line: str) -> bool:
     if not text[:1].isalpha() or text[:3].lower() == "nan":
         return False
     return cells_of(text, form)[0] in {cells_of(one, form)[0] for one in above if one.strip()}
+
+
+def _begins(line: str, form: TextForm) -> bool:
+    """Return whether the first cell of a line may be a sample: a number, a time, or nothing."""
+    cell = next(iter(cells_of(line, form)), "")
+    return bool(_NUMBER.match(cell)) or cell.lower() in MISSING or clock_seconds(cell) is not None
 
 
 def _fast(body: list[str], form: TextForm, places: list[int], count: int) -> np.ndarray | None:
