@@ -336,3 +336,46 @@ def test_a_last_row_that_is_wrong_is_no_footer(tmp_path, last, seed):
     time, values = drawn(seed)
     path = written(tmp_path / "a.csv", "t,angle,torque", *lines_of(time, values, ","), last)
     assert len(propose(path, JOINT, True).recording) == len(time) + 1
+
+
+WITHIN = {
+    "word": lambda row: "Sensor reconnected",
+    "comment": lambda row: "# marker 1",
+    "short": lambda row: row.partition(",")[0],
+    "long": lambda row: f"{row},1.0,2.0",
+    "names": lambda row: ",".join("xyz"),
+}
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("kind", WITHIN)
+def test_a_line_of_another_kind_among_the_rows_loses_none_of_them_in_silence(tmp_path, kind, seed):
+    """All rows above it were taken for a title."""
+    rng = np.random.default_rng(seed)
+    time, values = drawn(seed, rows=int(rng.integers(30, 700)))
+    values[rng.choice(len(time), 2), 1] = np.nan
+    rows = [row.replace("nan", "") for row in lines_of(time, values, ",")]
+    place = int(rng.integers(4, len(rows) - 4))
+    rows.insert(place, WITHIN[kind](rows[place]))
+    path = written(tmp_path / "a.csv", "t [s],angle [deg],torque [Nm]", *rows)
+    if kind == "long":
+        with pytest.raises(
+            InputError, match=rf"row {place + 2}, column .*: expected 3 values as in the header, found 5"
+        ):
+            propose(path, JOINT, True)
+        return
+    found = propose(path, JOINT, True)
+    if kind == "names" and place < 390:
+        assert "lines of numbers above line" in found.said[0] and len(found.recording) == len(time) - place
+    else:
+        assert len(found.recording) == len(time) + (kind in ("short", "names"))
+        said = ("1 line between the numbers, passed over: 'Sensor reconnected'",)
+        assert found.recording.said == (said if kind == "word" else ())
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_numbers_above_a_title_of_one_word_are_no_rows_where_it_is_a_key(tmp_path, seed):
+    time, values = drawn(seed)
+    above = lines_of(time[:5], values[:5], ",")
+    path = written(tmp_path / "a.csv", *above, "Data:", *lines_of(time, values, ","))
+    assert sniffed(path)[0].first_row == 7

@@ -68,6 +68,12 @@ def sniffed(path: Path, stated: Mapping[str, Any] = MappingProxyType({})) -> tup
     columns = len(rows[0][1])
     numbers = [(cells_of(lines[place], form) + [""] * columns)[:columns] for place in below[:2]]
     header = turned or (Header() if stated.get("transposed") else header_of(above, form, numbers))
+    lost = [line for line in above if not turned and _begins_a_row(line) and len(cells_of(line, form)) == columns]
+    if len(lost) >= MIN_ROWS and columns > 1:
+        words = (
+            f"{len(lost)} lines of numbers above line {first + 1} are not read: what stands between is taken as names"
+        )
+        header = replace(header, said=(*header.said, words))
     if not turned and not header.row and not header.said and len(numbers[0]) >= WIDE * len(rows):
         odd = f"{len(rows)} rows of {len(numbers[0])} columns without names: is the table transposed?"
         header = replace(header, said=(f"{odd} --transposed says so",))
@@ -195,11 +201,22 @@ def _rows(lines: list[str], form: TextForm) -> Rows:
         width = next(iter(widths), len(rows[0][1]) if rows else len(kinds))
         fits = len(kinds) in ({width, width - 1} if is_open else {width} if widths else {width, width + 1})
         if not (fits or not rows) or not any(_is_number(cell, number) for cell in cells):
+            if rows and len(cells) != width and not is_keyed(cells) and _goes_on(lines[:place], form, width):
+                continue  # a remark, or a row that lost a cell, is no header
             break
         widths |= set() if is_open else {len(kinds)}
         rows.append((place, kinds))
     width = max((len(kinds) for _, kinds in rows), default=0)
     return [(place, kinds + [True] * (width - len(kinds))) for place, kinds in rows]
+
+
+def _goes_on(above: Sequence[str], form: TextForm, width: int) -> bool:
+    """Return whether the nearest lines above one of another kind are rows of numbers, as wide as those below it."""
+    number = _NUMBER[form.decimal]
+    nearest = [cells_of(line, form) for line in above[-2 * MIN_ROWS :] if _begins_a_row(line)][-MIN_ROWS:]
+    numbers = [sum(_is_number(cell, number) for cell in cells) for cells in nearest]
+    fit = [width - 1 <= len(cells) <= width and 2 * n >= width for cells, n in zip(nearest, numbers, strict=True)]
+    return len(fit) == MIN_ROWS and all(fit)
 
 
 def _likely(rows: Rows, form: TextForm) -> tuple[float, bool, int, bool]:

@@ -309,8 +309,8 @@ def _body(lines: list[str], form: TextForm) -> tuple[list[str], np.ndarray]:
         found.pop()
     if not form.strict:
         found = [(row, line) for row, line in found if line.strip()]
-        above = lines[: form.first_row - 1]
-        found = [(row, line) for row, line in found if not _heads(above, form, line)]
+        between = set(_between([line for _, line in found], lines[: form.first_row - 1], form))
+        found = [(row, line) for row, line in found if line not in between]
     if form.comment:
         found = [(row, line) for row, line in found if not line.lstrip().startswith(form.comment)]
     if not form.strict and found and _begins(found[0][1], form):
@@ -324,18 +324,42 @@ def _passed_over(lines: list[str], body: list[str], rows: np.ndarray, form: Text
     if form.strict or form.transposed:
         return []
     above, last = lines[: form.first_row - 1], int(rows[-1]) if len(rows) else 0
-    again = [line for line in lines[form.first_row - 1 : last] if _heads(above, form, line)]
+    between = _between(lines[form.first_row - 1 : last], above, form)
+    again = [line for line in between if _heads(above, form, line)]
+    words = [
+        line.strip() for line in between if line not in again and not line.lstrip().startswith(form.comment or " ")
+    ]
     noted = [line for line in body if "#" in line and REMARK.search(line)]
     below = [line.strip() for line in lines[last:] if line.strip()] if len(rows) else []
     below = [line for line in below if not line.startswith((form.comment or "#", "#", "%", "//"))]
     said = [f"its header comes again in {len(again)} lines, which are passed over"] if again else []
+    if words:
+        said.append(f"{_lines(words)} between the numbers, passed over: {words[0][:40]!r}")
     if noted:
         remark = noted[0][noted[0].index("#") :][:40].strip()
         said.append(f"{len(noted)} rows end in a remark, {remark!r}: it is passed over")
     if below:
-        lines_are = "1 line below the numbers is" if len(below) == 1 else f"{len(below)} lines below the numbers are"
-        said.append(f"{lines_are} passed over: {below[0][:40]!r}")
+        said.append(f"{_lines(below)} below the numbers, passed over: {below[0][:40]!r}")
     return said
+
+
+def _lines(found: Sequence[str]) -> str:
+    return f"{len(found)} line{'s' * (len(found) > 1)}"
+
+
+def _between(found: Sequence[str], above: Sequence[str], form: TextForm) -> list[str]:
+    """The lines among those of numbers that are a header again, or words of another number of cells: a remark."""
+    width = len(cells_of(found[0], form)) if found else 0
+    out = []
+    for line in found:
+        text = line.lstrip()
+        if not text[:1].isalpha() and not text.startswith(("#", "%", "//")):
+            continue
+        cells = cells_of(text, form)
+        is_word = not any(_NUMBER.match(cell) or cell.lower() in MISSING for cell in cells)
+        if _heads(above, form, line) or (is_word and len(cells) not in (width, width + 1)):
+            out.append(line)
+    return out
 
 
 def _heads(above: Sequence[str], form: TextForm, line: str) -> bool:
