@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     **dict.fromkeys(
         (
             *("urdf", "rig", "name", "column", "setting", "role", "group", "resample", "fill", "library"),
-            *("source", "offset", "split", "names", "header_row", "first_row", "transposed"),
+            *("source", "offset", "split", "names", "header_row", "first_row", "transposed", "sheet"),
         ),
         "files",
     ),
@@ -94,6 +94,9 @@ def new_study(
     names: Annotated[str | None, typer.Option(help="Of the columns of text files: t,angle,torque.")] = None,
     header_row: Annotated[int | None, typer.Option(min=0, help="Line of the names; 0 for none.")] = None,
     first_row: Annotated[int | None, typer.Option(min=1, help="Line of the first numbers.")] = None,
+    sheet: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Of a spreadsheet, where one of several is meant.")
+    ] = None,
     transposed: Annotated[
         bool, typer.Option("--transposed", help="Each line of the files holds one quantity.")
     ] = False,
@@ -126,7 +129,7 @@ def new_study(
         typer.echo(f"wrote {(out or Path()) / template.name}")
         return
     catalogue, columns, settings = catalogue_with(library), pairs("--column", column), pairs("--set", setting)
-    form = _form(names, header_row, first_row, transposed)
+    form = _form(names, header_row, first_row, transposed, sheet)
     schema = _schema(rig, catalogue, believed, (columns, resample, fill, form))
     if resample == 0.0:
         raise InputError("expected a rate above 0 Hz", column="--resample")
@@ -232,7 +235,7 @@ def _schema(rig: str | None, catalogue: Catalogue, urdf: Path | None, of_rigs: S
 
 
 def _form(
-    names: str | None, header_row: int | None, first_row: int | None, transposed: bool
+    names: str | None, header_row: int | None, first_row: int | None, transposed: bool, sheet: str | None
 ) -> dict[str, str | int | bool | tuple[str, ...]]:
     """What was said of how text files are written, by the keys of [columns.file]."""
     given = {
@@ -240,6 +243,7 @@ def _form(
         "header_row": header_row,
         "first_row": first_row,
         "transposed": transposed or None,
+        "sheet": sheet,
     }
     if header_row is not None and first_row is not None and first_row <= header_row:
         raise InputError(f"expected a line below the header in line {header_row}", column="--first-row")

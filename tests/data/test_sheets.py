@@ -133,6 +133,22 @@ def test_a_wrong_cell_is_named_by_its_row_and_column(tmp_path):
     assert caught.value.row == 51 and caught.value.column == "Angle, left"
 
 
+@pytest.mark.parametrize("sheet", ["one", "two"])
+def test_one_sheet_may_be_meant(tmp_path, sheet):
+    rows = {name: recording(seed)[2:] for name, seed in (("one", 4), ("two", 5))}  # without names
+    path = xlsx(tmp_path / "a.xlsx", rows)
+    said = {"columns": {"time_s": "column1:ms", "position": "column2:deg"}}
+    with pytest.raises(InputError, match="one, two hold columns without names: expected --sheet NAME"):
+        study_of(tmp_path / "s", path, **said)
+    study, _ = study_of(tmp_path / "s", path, form={"sheet": sheet}, **said)
+    (trial,) = study.trials
+    assert trial.name == f"a-{sheet}"
+    assert np.allclose(trial["position"], swing(4 if sheet == "one" else 5)[1], rtol=0.0, atol=1e-12)
+    named = {"names": ("t_ms", "angle_deg")}
+    both, _ = study_of(tmp_path / "t", path, form=named, columns={"time_s": "t_ms:ms", "position": "angle_deg:deg"})
+    assert {t.name for t in both} == {"a-one", "a-two"}
+
+
 def test_a_text_file_has_no_sheets(tmp_path):
     folder = tmp_path / "s"
     path = xlsx(tmp_path / "a.xlsx", {"one": recording(4), "two": recording(5)})

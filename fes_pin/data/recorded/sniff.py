@@ -302,25 +302,34 @@ def proposals_of(
     Raises
     ------
     InputError
-        As `propose`.
+        As `propose`; several sheets whose columns have no names, so that none says what it holds.
     """
     sheets = sheets_of(path) if is_spreadsheet(path) else ()
+    if "sheet" in stated:
+        return [_of_sheet(propose(path, schema, revolute, stated, chosen), str(stated["sheet"]))]
     if len(sheets) < 2:
         return [propose(path, schema, revolute, stated, chosen)]
     alike: dict[Any, list[Proposal]] = defaultdict(list)
     for sheet in sheets:
         with suppress(InputError):  # a title page, a drawing
-            one = propose(path, schema, revolute, {**stated, "sheet": sheet}, chosen)
-            one = replace(one, form=replace(one.form or TextForm(), sheet=""), sheet=sheet)
+            one = _of_sheet(propose(path, schema, revolute, {**stated, "sheet": sheet}, chosen), sheet)
             alike[one.recording.names, one.form].append(one)
     if not alike:
         raise InputError(f"expected rows of numbers in one of its sheets, {listed(sheets)}", file=path)
     taken = max(alike.values(), key=lambda some: sum(len(one.recording) for one in some))
-    names = [one.sheet for one in taken]
+    names, form = [one.sheet for one in taken], taken[0].form or TextForm()
+    if names[1:] and not form.names and not form.header_row:
+        message = f"{listed(names)} hold columns without names: expected --sheet NAME, or --names where they are alike"
+        raise InputError(message, file=path)
     left = [sheet for sheet in sheets if sheet not in names]
     words = f"{path.name}: {listed(names)} of its {len(sheets)} sheets {'are trials' if names[1:] else 'is a trial'}"
     said = words + (f", not {listed(left)}: without numbers, or with other columns" if left else "")
     return [replace(taken[0], said=(*taken[0].said, said)), *taken[1:]]
+
+
+def _of_sheet(one: Proposal, sheet: str) -> Proposal:
+    """A proposal of a sheet, which its trial states; its form is that of other sheets too."""
+    return replace(one, form=replace(one.form or TextForm(), sheet=""), sheet=sheet)
 
 
 def propose(
