@@ -256,9 +256,13 @@ class Verdict(ABC, Generic[F, M, W]):
                 return state
 
     def significant(self, state: State[F, M, W]) -> State[F, M, W]:
-        """Return the state without the candidates that are not significant; no other claim is asked."""
-        while (fewer := self.drop_insignificant(state)) is not None:
-            state = _noted(fewer, "drop_insignificant")
+        """Return the state without candidates that are not significant, or that chance explains between equal repeats.
+
+        No other claim is asked.
+        """
+        for claim in ("drop_unrepeated", "drop_insignificant"):
+            while (fewer := getattr(self, claim)(state)) is not None:
+                state = _noted(fewer, claim)
         return state
 
     def drop_unmoved(self, state: State[F, M, W]) -> State[F, M, W] | None:
