@@ -117,7 +117,8 @@ class Weighed:
     carried
         Gains, percent, on other parts of the data than a candidate was fitted to, of those that must act there too.
     over_unrepeated
-        What a candidate explains beside a constant, in deviations of a mean over repeats; empty where these are alike.
+        What a candidate explains in addition to a constant, in deviations of a mean over repeats; empty where these are
+        alike.
     is_random
         Whether process noise is more than a small share of what drives the system.
     is_moved

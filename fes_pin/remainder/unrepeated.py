@@ -1,8 +1,7 @@
 """Effort that a model leaves and that differs between equal cycles of an imposed motion.
 
-What is left of such an effort by a model that contains all that acts is noise; a subject who does not relax leaves
-more. How much voluntary effort repeats with the motion nobody knows, so that the part that differs is a lower bound of
-what is not of the library.
+A model that contains all that acts leaves noise of such an effort; a subject who does not relax leaves more. Nobody
+knows how much voluntary effort repeats with the motion. The part that differs is a lower bound of what is no cause.
 """
 
 from dataclasses import dataclass
@@ -67,7 +66,7 @@ def voluntary_effort(fitted: LikelihoodFit) -> Voluntary | None:
 
 
 def over_voluntary(voluntary: Voluntary, best: LikelihoodFit) -> dict[str, float]:
-    """Return what each cause of a fit adds beside a constant effort, in deviations of a mean over the cycles, by cause.
+    """Return what each cause of a fit adds to a constant effort, in deviations of a mean over the cycles, by cause.
 
     A subject who does not relax may hold: a constant effort in each trial is voluntary too. What differs between cycles
     repeats with the motion by chance alone.

@@ -83,8 +83,9 @@ def recruited_in(trial: Trial, channel: Channel | None, constants: Mapping[str, 
 
 
 def at_start(trial: Trial) -> dict[str, float]:
-    """The first recruitment of a trial, by its name."""
-    return {AT_START: float(trial[ENVELOPE][0]) if ENVELOPE in trial else 0.0}
+    """The first recruitment of a trial, by its name; 0 of one without columns, as a controller begins."""
+    columns = getattr(trial, "columns", {})
+    return {AT_START: float(columns[ENVELOPE][0]) if ENVELOPE in columns else 0.0}
 
 
 def rest_muscle(s: Signals) -> None:
