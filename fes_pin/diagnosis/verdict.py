@@ -46,7 +46,7 @@ from fes_pin.infer.scatter import with_honest_intervals
 from fes_pin.infer.text import WHOLE
 from fes_pin.infer.verdict import State, Verdict, Weighed
 from fes_pin.remainder.lack_of_fit import lack_of_fit
-from fes_pin.remainder.unrepeated import Voluntary, shares_of_voluntary, voluntary_effort
+from fes_pin.remainder.unrepeated import Voluntary, over_voluntary, voluntary_effort
 
 WORSE = 2.0
 """Ratio of errors of free simulations from which a cause is refuted: those of two right models differ by less."""
@@ -117,7 +117,7 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
             random=random,
             no_noise=no_noise(found.best),
             voluntary=own,
-            over_unrepeated={} if own is None else shares_of_voluntary(own, found.best, found.without),
+            over_unrepeated={} if own is None else over_voluntary(own, found.best),
         )
 
     def with_intervals(self, fitted: LikelihoodFit) -> LikelihoodFit:

@@ -14,7 +14,7 @@ from typing import Any, Generic, TypeVar
 
 from fes_pin.infer.fits import F
 from fes_pin.infer.held_out import Errors, is_supported
-from fes_pin.infer.levels import FORM_SHARE
+from fes_pin.infer.levels import CONFIDENCE_95, FORM_SHARE
 from fes_pin.infer.result import FITTED, Evidence, Gain, Remainder, p_shown
 from fes_pin.infer.search import M, Search, SearchResult
 from fes_pin.infer.text import WHOLE, probability
@@ -26,7 +26,7 @@ CLAIMS = {
     "drop_errors_of_form": "process noise is large, and it gains no more than an error of form may",
     "drop_unsupported": "held-out data do not confirm it",
     "drop_not_carried": "it gains nothing on other parts of the data, where it must act too",
-    "drop_unrepeated": "it explains no more than what differs between equal repeats, which no candidate explains",
+    "drop_unrepeated": "equal repeats differ, and by chance or a constant that explains as much",
     "drop_that_predict_no_better": "the sets that folds choose predict no better than the nominal model",
     "drop_insignificant": "its gain is not significant",
     "settle": "the rivals of what remains were searched",
@@ -117,7 +117,8 @@ class Weighed:
     carried
         Gains, percent, on other parts of the data than a candidate was fitted to, of those that must act there too.
     over_unrepeated
-        What a candidate explains over what no candidate does, as it differs between equal repeats; empty without such.
+        What a candidate explains in addition to a constant, in deviations of a mean over repeats; empty where these are
+        alike.
     is_random
         Whether process noise is more than a small share of what drives the system.
     is_moved
@@ -256,9 +257,13 @@ class Verdict(ABC, Generic[F, M, W]):
                 return state
 
     def significant(self, state: State[F, M, W]) -> State[F, M, W]:
-        """Return the state without the candidates that are not significant; no other claim is asked."""
-        while (fewer := self.drop_insignificant(state)) is not None:
-            state = _noted(fewer, "drop_insignificant")
+        """Return the state without candidates that are not significant, or that chance explains between equal repeats.
+
+        No other claim is asked.
+        """
+        for claim in ("drop_unrepeated", "drop_insignificant"):
+            while (fewer := getattr(self, claim)(state)) is not None:
+                state = _noted(fewer, claim)
         return state
 
     def drop_unmoved(self, state: State[F, M, W]) -> State[F, M, W] | None:
@@ -290,9 +295,10 @@ class Verdict(ABC, Generic[F, M, W]):
         return self._without_weakest(state, [n for n, gain in state.weighed.carried.items() if not gain > 0.0])
 
     def drop_unrepeated(self, state: State[F, M, W]) -> State[F, M, W] | None:
-        """Reject the weakest of the candidates that explain no more than what equal repeats do not share."""
+        """Reject the weakest of the candidates that explain no more than equal repeats differ by in the mean."""
         over = state.weighed.over_unrepeated
-        return self._without_weakest(state, [n for n in state.weighed.gains if n in over and not over[n] > 1.0])
+        weak = [n for n in state.weighed.gains if n in over and not over[n] > CONFIDENCE_95]
+        return self._without_weakest(state, weak)
 
     def drop_that_predict_no_better(self, state: State[F, M, W]) -> State[F, M, W] | None:
         """Reject the weakest candidate if the sets that folds choose predict no better than the nominal model.

@@ -95,7 +95,10 @@ def test_the_delay_from_emg_to_torque_is_found(how):
     assert found.parameters["time_constant_s"] == pytest.approx(true["time_constant_s"], abs=0.003)
 
 
-@pytest.mark.parametrize(("how", "cause", "seed"), [("free", "parallel_stiffness", 5), ("isokinetic", "", 6)])
+@pytest.mark.parametrize(
+    ("how", "cause", "seed"),
+    [pytest.param("free", "parallel_stiffness", 5, marks=pytest.mark.long), ("isokinetic", "", 6)],
+)
 def test_what_is_hidden_is_named_and_no_cause_of_pulses_is_tried(how, cause, seed):
     study, _ = made(seed, how, cause)
     found = fp.diagnose(study)
