@@ -11,10 +11,10 @@ import numpy as np
 
 from fes_pin.data.channels import AMPLITUDE, CHANNELS, RATE, WIDTH, Channel, channel_of
 from fes_pin.data.errors import InputError, fault_at, listed
+from fes_pin.data.new_recording import Proposal
 from fes_pin.data.new_view import APART, FilesOfTrial
 from fes_pin.data.recorded.columns import INTERPOLATE
 from fes_pin.data.recorded.events import EVENTS, looking_period
-from fes_pin.data.recorded.sniff import Proposal
 from fes_pin.data.recorded.text import TextForm, after_comments
 from fes_pin.data.recorded.view import INTEGRATED
 from fes_pin.data.schema import IMPOSED, check_known

@@ -15,8 +15,8 @@ from fes_pin.data.channels import EMG, EMG_KEYS
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import inside, read_bytes
 from fes_pin.data.new_columns import NewColumns, Source
+from fes_pin.data.new_recording import Proposal, proposals_of
 from fes_pin.data.new_view import FilesOfTrial, WantedView, grouped_files, trial_view
-from fes_pin.data.recorded.sniff import Proposal, proposals_of
 from fes_pin.data.schema import NumberKey, any_number, one_of, unknown
 from fes_pin.data.study_text import HEADER, source_in_words, toml_table
 from fes_pin.data.wanted import Wanted, labels_of, number_set, of_files

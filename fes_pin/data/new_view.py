@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 from fes_pin.data.errors import InputError
+from fes_pin.data.new_recording import Proposal
 from fes_pin.data.numbers import number_in
 from fes_pin.data.recorded.free_part import free_from
 from fes_pin.data.recorded.parts import HOLES, RESTARTS, holes, restarts
-from fes_pin.data.recorded.sniff import Proposal
 from fes_pin.data.recorded.view import FITTED, INTEGRATED
 from fes_pin.data.schema import MEANT, RigSchema
 from fes_pin.data.table import MIN_ROWS, STEP_TOLERANCE, check_times

@@ -6,7 +6,7 @@ from cli.test_own import fails, run
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.motion import read_motion
-from fes_pin.data.recorded.sniff import propose
+from fes_pin.data.new_recording import propose
 from fes_pin.data.schema import known_rigs
 from fes_pin.data.study import read_study
 

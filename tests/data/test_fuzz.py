@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.motion import read_coordinates, read_ground_reaction
-from fes_pin.data.recorded.sniff import propose
+from fes_pin.data.new_recording import propose
 from fes_pin.data.schema import known_rigs
 from fes_pin.data.study import read_study
 from fes_pin.models.effects import effects_for

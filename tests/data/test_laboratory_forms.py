@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from fes_pin.data.errors import InputError, listed
+from fes_pin.data.new_recording import propose
 from fes_pin.data.new_study import new_study
 from fes_pin.data.recorded.formats import read_recording
-from fes_pin.data.recorded.sniff import propose, sniffed
+from fes_pin.data.recorded.sniff import sniffed
 from fes_pin.data.schema import known_rigs
 from fes_pin.data.study import read_study
 from fes_pin.data.templates import pendulum

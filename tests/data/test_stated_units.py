@@ -6,8 +6,8 @@ from data.test_laboratory_forms import drawn, study_of, written
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.motion import read_coordinates, read_motion
+from fes_pin.data.new_recording import propose
 from fes_pin.data.recorded.formats import read_recording
-from fes_pin.data.recorded.sniff import propose
 from fes_pin.data.schema import known_rigs
 from fes_pin.data.study import read_study
 from fes_pin.data.units import split_header

@@ -1,31 +1,24 @@
-"""What form a text file seems to have, and which column of a recording is probably which of the rig's, in which unit.
+"""What form a text file seems to have: its delimiter, its header, its first row of numbers.
 
-The form is proposed to a person, or named by an error, and never used unseen. Columns are known from names, never from
-numbers.
+The form is proposed to a person, or named by an error, and never used unseen.
 """
 
 import operator
 import re
-from collections import defaultdict
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from contextlib import suppress
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-import numpy as np
-
-from fes_pin.data.errors import InputError, listed
+from fes_pin.data.errors import InputError
 from fes_pin.data.files import as_path, read_bytes
 from fes_pin.data.recorded.clock import clock_seconds
-from fes_pin.data.recorded.formats import by_length, check_suffix, is_nested, is_text, read_recording
+from fes_pin.data.recorded.formats import check_suffix, is_text
 from fes_pin.data.recorded.header import NUMBER, Header, cells_in, header_of, is_keyed, ways
-from fes_pin.data.recorded.sheets import is_spreadsheet, sheets_of
+from fes_pin.data.recorded.sheets import is_spreadsheet
 from fes_pin.data.recorded.text import DECIMALS, DELIMITERS, MISSING, TextForm, cells_of, read_text_recording
-from fes_pin.data.schema import MEANT, RigSchema, without_unit
 from fes_pin.data.table import MIN_ROWS, Table
-from fes_pin.data.units import known_unit, may_be, quantities_of, split_header, words_of
 
 LOOKED_AT = 400
 """Lines that are looked at; no preamble of an instrument is nearly as long."""
@@ -33,15 +26,7 @@ NEW_STUDY = "`fes-pin new-study` writes a [columns] table that reads it as it is
 WIDE = 10
 """Columns for each row, at least, of a table that looks transposed; the one with the fewest rows that is read has 3."""
 COMMENTS = ("#", "%", "//")
-WANTED = frozenset(
-    {"setpoint", "target", "goal", "desired", "demand", "demanded", "soll"}
-    | {"command", "commanded", "cmd", "reference", "ref"}
-)
-"""Words for what a controller wants, which is no reading."""
-OTHERS = frozenset({"acc", "accel", "acceleration", "temp", "temperature", "temperatur", "efficiency", "power"})
-"""Words for quantities that no rig reads."""
 _NUMBER = {".": NUMBER, ",": re.compile(r"^[+-]?\d+(,\d+)?([eE][+-]?\d+)?$")}
-_NUMBERED = re.compile(r"([a-z]{3,})\d+$")
 Rows = list[tuple[int, list[bool]]]
 """Places of the rows of numbers, the last first, and of each cell whether it is a number."""
 
@@ -259,199 +244,3 @@ def _hint(path: Path) -> str:
         return ""
     words = form.in_words()
     return f"it seems to have {words}: {NEW_STUDY}" if words else ""
-
-
-@dataclass(frozen=True)
-class Proposal:
-    """What a file seems to hold.
-
-    Parameters
-    ----------
-    recording
-        The file with all of its columns that are numbers.
-    form
-        Of a text file; None of another.
-    candidates
-        Names of columns that could be each of the rig's.
-    units
-        Unit of each of the file's columns as its name or the file itself states it; "" where neither does.
-    rate_hz
-        Of the samples, where lines above the numbers state it.
-    said
-        What is odd about the file and how it is taken, a sentence each.
-    sheet
-        Of a spreadsheet that has several.
-    """
-
-    recording: Table
-    form: TextForm | None
-    candidates: Mapping[str, tuple[str, ...]]
-    units: Mapping[str, str]
-    rate_hz: float | None = None
-    said: tuple[str, ...] = ()
-    sheet: str = ""
-
-
-def proposals_of(
-    path: Path, schema: RigSchema, revolute: bool | None, stated: Mapping[str, Any], chosen: Collection[str] = ()
-) -> list[Proposal]:
-    """What the recordings in a file seem to hold, as `propose`: one, or the sheets of a spreadsheet that are alike.
-
-    Of sheets with other columns those with most rows are taken.
-
-    Raises
-    ------
-    InputError
-        As `propose`; several sheets whose columns have no names, so that none says what it holds.
-    """
-    sheets = sheets_of(path) if is_spreadsheet(path) else ()
-    if "sheet" in stated:
-        return [_of_sheet(propose(path, schema, revolute, stated, chosen), str(stated["sheet"]))]
-    if len(sheets) < 2:
-        return [propose(path, schema, revolute, stated, chosen)]
-    alike: dict[Any, list[Proposal]] = defaultdict(list)
-    for sheet in sheets:
-        with suppress(InputError):  # a title page, a drawing
-            one = _of_sheet(propose(path, schema, revolute, {**stated, "sheet": sheet}, chosen), sheet)
-            alike[one.recording.names, one.form].append(one)
-    if not alike:
-        raise InputError(f"expected rows of numbers in one of its sheets, {listed(sheets)}", file=path)
-    taken = max(alike.values(), key=lambda some: sum(len(one.recording) for one in some))
-    names, form = [one.sheet for one in taken], taken[0].form or TextForm()
-    if names[1:] and not form.names and not form.header_row:
-        message = f"{listed(names)} hold columns without names: expected --sheet NAME, or --names where they are alike"
-        raise InputError(message, file=path)
-    left = [sheet for sheet in sheets if sheet not in names]
-    words = f"{path.name}: {listed(names)} of its {len(sheets)} sheets {'are trials' if names[1:] else 'is a trial'}"
-    said = words + (f", not {listed(left)}: without numbers, or with other columns" if left else "")
-    return [replace(taken[0], said=(*taken[0].said, said)), *taken[1:]]
-
-
-def _of_sheet(one: Proposal, sheet: str) -> Proposal:
-    """A proposal of a sheet, which its trial states; its form is that of other sheets too."""
-    return replace(one, form=replace(one.form or TextForm(), sheet=""), sheet=sheet)
-
-
-def propose(
-    path: Path,
-    schema: RigSchema,
-    revolute: bool | None,
-    stated: Mapping[str, Any] = MappingProxyType({}),
-    chosen: Collection[str] = (),
-) -> Proposal:
-    """What a file seems to hold for a rig.
-
-    Parameters
-    ----------
-    stated
-        What a person says of the form of a text file, by its keys.
-    chosen
-        What a person says of columns: a name begins it.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read, or holds no numbers.
-    """
-    if is_text(path):
-        form, header = sniffed(path, stated)
-        recording = _numbers(path, form)
-        units = {name: header.units[k] for k, name in enumerate(recording.names) if k in header.units}
-    else:
-        form, header = None, Header()
-        names, said = by_length(path, chosen) if is_nested(path) else (None, ())
-        recording, header = read_recording(path, wanted=names), Header(said=said)
-        units = {}
-    units = {**recording.units, **units}
-    for name in recording.columns:
-        units.setdefault(name, split_header(name)[1])
-    named = {c: tuple(_candidates(c, recording.columns, units, revolute)) for c in schema.columns}
-    named = _without_doubles(named)
-    candidates = {
-        c: found if len(found) == 1 else (*found, *_by_unit(c, named, units, revolute)) for c, found in named.items()
-    }
-    if revolute is not None:  # a torque in newtons wants a scale, and is no other column's
-        either = {
-            c: tuple(_candidates(c, recording.columns, units, None)) for c, found in candidates.items() if not found
-        }
-        taken = {name for found in candidates.values() for name in found}
-        candidates |= {c: tuple(n for n in found if n not in taken) for c, found in either.items()}
-    candidates = {c: _readings(c, _without_copies(found, recording)) for c, found in candidates.items()}
-    return Proposal(recording, form, _without_doubles(candidates), units, header.rate_hz, header.said)
-
-
-def _without_copies(names: Sequence[str], recording: Table) -> tuple[str, ...]:
-    """Columns of which no two hold the same numbers, as the times before each channel do; the first of them."""
-    read, kept = recording.columns, list[str]()
-    for name in names:
-        others = [read[other] for other in kept if other in read]
-        if name not in read or not any(np.array_equal(read[name], other, equal_nan=True) for other in others):
-            kept.append(name)
-    return tuple(kept)
-
-
-def _readings(column: str, names: tuple[str, ...]) -> tuple[str, ...]:
-    """Columns of a motion without those that say what was wanted of it, where others say what it was."""
-    if column not in ("position", "velocity"):
-        return names
-    words = {n: words_of(n) for n in names}
-    return tuple(n for n, found in words.items() if not (WANTED & found or {"set", "point"} <= found)) or names
-
-
-def _numbers(path: Path, form: TextForm) -> Table:
-    """A text file's columns of numbers; columns of words are among its names only."""
-    names = read_text_recording(path, form, ()).names
-    while True:
-        try:
-            return read_recording(path, form, names)
-        except InputError as error:
-            if error.column not in names:
-                raise
-            names = tuple(n for n in names if n != error.column)
-
-
-def _candidates(
-    column: str, names: Sequence[str] | Mapping[str, object], units: Mapping[str, str], revolute: bool | None
-) -> Iterator[str]:
-    if column in names and may_be(column, column, units.get(column, ""), revolute):
-        yield column  # a name that is the rig's own needs no words
-        return
-    words = {n: words_of(split_header(n)[0]) for n in names if may_be(column, n, units.get(n, ""), revolute)}
-    found = [n for n, some in words.items() if without_unit(column) == "_".join(some) or _means(some, column)]
-    yield from found or [n for n, some in words.items() if _means(_without_numbers(some), column)]
-
-
-def _without_numbers(words: frozenset[str]) -> frozenset[str]:
-    """Words without the numbers of channels: EMG2, Torque1."""
-    return words | {found[1] for found in map(_NUMBERED.match, words) if found}
-
-
-def _means(words: frozenset[str], column: str) -> bool:
-    """Return whether words are for a rig's column; an axis or a letter is for none where a word is for another.
-
-    `Force_x` and `F_x` are no positions, nor is `AccX`.
-    """
-    meant = words & MEANT.get(column, frozenset())
-    if not meant or words & OTHERS:
-        return False
-    long = {word for word in words if len(word) > 1}
-    is_force = column not in ("effort", "force_n") and words & (MEANT["effort"] | MEANT["force_n"])
-    return bool(meant & long) or not (is_force or any(long & others for others in MEANT.values()))
-
-
-def _by_unit(
-    column: str, named: Mapping[str, tuple[str, ...]], units: Mapping[str, str], revolute: bool | None
-) -> tuple[str, ...]:
-    """Columns that no word of theirs gives away and whose unit is one of this quantity: `Kniewinkel [deg]`."""
-    taken = {name for names in named.values() for name in names}
-    quantities = quantities_of(column, revolute)
-    return tuple(n for n, unit in units.items() if unit and n not in taken and known_unit(unit, quantities))
-
-
-def _without_doubles(candidates: Mapping[str, tuple[str, ...]]) -> dict[str, tuple[str, ...]]:
-    """A name that is the only candidate of one column is none of another's."""
-    out = dict(candidates)
-    for _ in out:
-        sole = {names[0]: c for c, names in out.items() if len(names) == 1}
-        out = {c: tuple(n for n in names if sole.get(n, c) == c) for c, names in out.items()}
-    return out
