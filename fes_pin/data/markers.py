@@ -7,7 +7,8 @@ import numpy as np
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import read_text
-from fes_pin.data.recorded.text import TextForm, table_of_lines
+from fes_pin.data.recorded.form import TextForm
+from fes_pin.data.recorded.text import table_of_lines
 
 METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 """What the units of a file are in metres."""

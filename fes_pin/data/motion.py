@@ -9,7 +9,8 @@ import numpy as np
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import read_text
-from fes_pin.data.recorded.text import TextForm, names_of, read_csv, table_of_lines
+from fes_pin.data.recorded.form import TextForm
+from fes_pin.data.recorded.text import names_of, read_csv, table_of_lines
 from fes_pin.data.schema import is_like, unknown
 from fes_pin.data.table import Table, check_time
 

@@ -15,7 +15,8 @@ from fes_pin.data.new_recording import Proposal
 from fes_pin.data.new_view import APART, FilesOfTrial
 from fes_pin.data.recorded.columns import INTERPOLATE
 from fes_pin.data.recorded.events import EVENTS, looking_period
-from fes_pin.data.recorded.text import TextForm, after_comments
+from fes_pin.data.recorded.form import TextForm
+from fes_pin.data.recorded.text import after_comments
 from fes_pin.data.recorded.view import INTEGRATED
 from fes_pin.data.schema import IMPOSED, check_known
 from fes_pin.data.stimulus import varying

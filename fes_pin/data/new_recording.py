@@ -17,11 +17,12 @@ from typing import Any
 import numpy as np
 
 from fes_pin.data.errors import InputError, listed
+from fes_pin.data.recorded.form import TextForm
 from fes_pin.data.recorded.formats import by_length, is_nested, is_text, read_recording
 from fes_pin.data.recorded.header import Header
 from fes_pin.data.recorded.sheets import is_spreadsheet, sheets_of
 from fes_pin.data.recorded.sniff import sniffed
-from fes_pin.data.recorded.text import TextForm, read_text_recording
+from fes_pin.data.recorded.text import read_text_recording
 from fes_pin.data.schema import MEANT, RigSchema, without_unit
 from fes_pin.data.table import Table
 from fes_pin.data.units import known_unit, may_be, quantities_of, split_header, words_of

@@ -219,9 +219,7 @@ def trial_view(
     seconds = {source: _seconds(one, times[source]) for source, one in files.files.items()}
     main, name = next(iter(seconds.values())), files.path.name
     keys, said = dict[str, Any](wanted.ends), list[str]()
-    split, sentence = (wanted.split or "", "")
-    if not wanted.ends and wanted.split is None:
-        split, sentence = _split(files, main, wanted.rate_hz)
+    split, sentence = _split(files, main, wanted)
     keys |= {"split": split} if split not in ("", "none") else {}
     said += [f"{name}: {sentence}"] if sentence else []
     if files.is_joined:
@@ -272,8 +270,11 @@ def _own_rate(
     return rate_of(time, str(view.get("split", "")), half_digit)
 
 
-def _split(files: FilesOfTrial, time: np.ndarray, rate_hz: float | None) -> tuple[str, str]:
-    """At what a recording must be split, and why; "" of one that is one trial."""
+def _split(files: FilesOfTrial, time: np.ndarray, wanted: WantedView) -> tuple[str, str]:
+    """At what a recording is split, as a person said, else as it must be, and why; "" of one that is one trial."""
+    if wanted.ends or wanted.split is not None:
+        return wanted.split or "", ""
+    rate_hz = wanted.rate_hz
     rows = next(iter(files.files.values())).recording.rows
     if len(again := restarts(time)):
         return RESTARTS, f"{len(again) + 1} recordings in one file: time starts again in row {rows[again[0]]}"

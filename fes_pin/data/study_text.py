@@ -17,7 +17,7 @@ from fes_pin.data.files import hold, read_json
 from fes_pin.data.numbers import in_full, number_in
 from fes_pin.data.recorded.columns import Columns
 from fes_pin.data.recorded.columns_table import SOURCE_KEYS, columns_of
-from fes_pin.data.recorded.text import AFTER, AFTER_COMMENTS, TextForm
+from fes_pin.data.recorded.form import AFTER, AFTER_COMMENTS, TextForm
 from fes_pin.data.schema import Rigs, RigSchema, check_known, number_or_none, one_of, positive
 from fes_pin.data.toml import Document
 from fes_pin.data.units import own_unit

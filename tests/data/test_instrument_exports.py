@@ -193,6 +193,18 @@ def test_channels_that_opensignals_describes(tmp_path, seed):
     assert read(other)[0].names == ("column1", "column2", "column3", "column4")
 
 
+@pytest.mark.parametrize("rate", ["[100]", "1" + "0" * 400, "Infinity", "null", '"fast"', "-5", "{}"])
+def test_a_rate_that_is_none_is_left_out(tmp_path, rate):
+    rows = [f"{k % 16}\t0\t{x:.0f}\t{y:.0f}\t" for k, (x, y) in enumerate(1e3 * drawn(1)[1])]
+    about = f'"sensor": ["TORQUE", "EMG"], "column": ["nSeq", "DI", "CH1", "CH2"], "sampling rate": {rate}'
+    for devices in (f'{{"one": {{{about}}}}}', f'{{"one": {{{about}, "column": []}}, "two": {{{about}}}}}'):
+        table, header = read(written(tmp_path / "a.txt", f"# {devices}", "# EndOfHeader", *rows))
+        assert table.names == ("nSeq", "DI", "CH1 TORQUE", "CH2 EMG") and header.rate_hz is None
+    time, values = drawn(1)
+    broken = [line.replace("10 msec", "..5 msec") for line in acqknowledge(time, values, clock="min", counts=0)]
+    assert read(written(tmp_path / "b.txt", *broken))[1].rate_hz is None
+
+
 @pytest.mark.parametrize("name", ["Motor speed [Hz]", "velocity measured (Hz)", "omega_Hz"])
 def test_a_speed_in_hz_is_turns_a_second_and_said(tmp_path, name):
     time, values = drawn(1, rows=200)

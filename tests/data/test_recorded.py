@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from fes_pin.data.errors import InputError
+from fes_pin.data.recorded.form import TextForm
 from fes_pin.data.recorded.formats import UNREADABLE, read_recording
 from fes_pin.data.recorded.sniff import sniffed
-from fes_pin.data.recorded.text import TextForm, read_text_recording
+from fes_pin.data.recorded.text import read_text_recording
 from fes_pin.data.schema import known_rigs
 from fes_pin.data.study import read_columns, read_study
 from fes_pin.data.templates import pendulum

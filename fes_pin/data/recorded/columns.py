@@ -9,9 +9,9 @@ import numpy as np
 
 from fes_pin.data.errors import listed
 from fes_pin.data.recorded.events import sampled_events
+from fes_pin.data.recorded.form import TextForm
 from fes_pin.data.recorded.formats import read_recording
 from fes_pin.data.recorded.regular import check_steps, filled, resampled
-from fes_pin.data.recorded.text import TextForm
 from fes_pin.data.recorded.wraps import table_without_wraps
 from fes_pin.data.schema import RigSchema
 from fes_pin.data.table import Table

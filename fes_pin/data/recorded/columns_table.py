@@ -8,7 +8,7 @@ from typing import Any
 from fes_pin.data.errors import KeyFault
 from fes_pin.data.recorded.columns import INTERPOLATE, Columns, ColumnSource, unsaid
 from fes_pin.data.recorded.events import EVENTS
-from fes_pin.data.recorded.text import AFTER, AFTER_COMMENTS, DECIMALS, DELIMITERS, ENCODINGS, TextForm
+from fes_pin.data.recorded.form import AFTER, AFTER_COMMENTS, DECIMALS, DELIMITERS, ENCODINGS, TextForm
 from fes_pin.data.schema import RigSchema, any_number, check_known, one_of, positive, unknown
 from fes_pin.data.units import factor_of
 

@@ -5,11 +5,13 @@ import re
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from fes_pin.data.recorded.text import TextForm, cells_of
+from fes_pin.data.recorded.form import TextForm, cells_of
 from fes_pin.data.units import UNITS, known_unit
 
 _CHANNELS = re.compile(r"^(\d+) channels?$")
-_EACH = re.compile(r"^([\d.]+)\s*(\w+)/sample\b")
+_EACH = re.compile(r"^(\d+(?:\.\d*)?)\s*(\w+)/sample\b")
+FASTEST_HZ = 1e9
+"""No logger samples faster (a round figure): what a header states beyond is no rate."""
 
 
 class ChannelHeader(NamedTuple):
@@ -40,12 +42,16 @@ def _acqknowledge(lines: Sequence[str], form: TextForm, columns: int) -> Channel
     ahead = columns - count
     if len(pairs) < 2 * count or not below or ahead not in (0, 1) or len(cells) != columns:
         return None
-    units = {k: unit for k, unit in enumerate(pairs[1::2], ahead) if unit}
-    each = next((found for text in texts[:start] if (found := _EACH.match(text))), None)
+    units = {k: unit for k, unit in enumerate([*cells[:ahead], *pairs[1::2]]) if unit}
+    return ChannelHeader((*["Time"] * ahead, *pairs[::2]), units, _rate_hz(texts[:start]), row + 1)
+
+
+def _rate_hz(texts: Sequence[str]) -> float | None:
+    """The rate that a line like `0.5 msec/sample` states, Hz."""
+    each = next((found for text in texts if (found := _EACH.match(text))), None)
     step = known_unit(each[2], ("time",)) if each else None
-    rate = 1.0 / (float(each[1]) * UNITS["time"][step[1]]) if each and step and float(each[1]) > 0.0 else None
-    names = (*["Time"] * ahead, *pairs[::2])
-    return ChannelHeader(names, {**({0: cells[0]} if ahead else {}), **units}, rate, row + 1)
+    seconds = float(each[1]) * UNITS["time"][step[1]] if each and step else 0.0
+    return 1.0 / seconds if seconds > 0.0 else None
 
 
 def _opensignals(lines: Sequence[str], form: TextForm, columns: int) -> ChannelHeader | None:
@@ -55,10 +61,10 @@ def _opensignals(lines: Sequence[str], form: TextForm, columns: int) -> ChannelH
         devices = _table(text) if text.startswith("{") else {}
         known = [one for one in devices.values() if isinstance(one, dict) and isinstance(one.get("column"), list)]
         names = [name for one in known for name in _sensed(one)]
-        rates = {one.get("sampling rate") for one in known}
+        rates = [one.get("sampling rate") for one in known]
         if known and len(names) == columns:
-            rate = next(iter(rates)) if len(rates) == 1 else None
-            stated = float(rate) if isinstance(rate, int | float) and rate > 0.0 else None
+            rate = rates[0] if rates.count(rates[0]) == len(rates) else None
+            stated = float(rate) if isinstance(rate, int | float) and 0.0 < rate < FASTEST_HZ else None
             return ChannelHeader(tuple(names), {}, stated, row)
     return None
 

@@ -25,7 +25,8 @@ from fes_pin.data.files import as_path, read_bytes, read_json
 from fes_pin.data.markers import TIME, c3d_points, trc_points
 from fes_pin.data.motion import STORAGE, is_rotation, read_motion
 from fes_pin.data.recorded.clock import since_first
-from fes_pin.data.recorded.text import TextForm, read_text_recording, without_twins
+from fes_pin.data.recorded.form import TextForm
+from fes_pin.data.recorded.text import read_text_recording, without_twins
 from fes_pin.data.table import MIN_ROWS, Table
 
 OFFERED = 4

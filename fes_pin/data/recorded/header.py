@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from fes_pin.data.recorded.exports import channels_of
-from fes_pin.data.recorded.text import TextForm, cells_of
+from fes_pin.data.recorded.form import TextForm, cells_of
 from fes_pin.data.units import UNITS, are_units, bare_unit, is_unit_of, known_unit, split_header
 
 NUMBER = re.compile(r"^[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$")

@@ -14,10 +14,11 @@ from typing import Any
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import as_path, read_bytes
 from fes_pin.data.recorded.clock import clock_seconds
+from fes_pin.data.recorded.form import COMMENTS, DECIMALS, DELIMITERS, MISSING, TextForm, cells_of
 from fes_pin.data.recorded.formats import check_suffix, is_text
 from fes_pin.data.recorded.header import NUMBER, Header, cells_in, header_of, is_keyed, ways
 from fes_pin.data.recorded.sheets import is_spreadsheet
-from fes_pin.data.recorded.text import DECIMALS, DELIMITERS, MISSING, TextForm, cells_of, read_text_recording
+from fes_pin.data.recorded.text import read_text_recording
 from fes_pin.data.table import MIN_ROWS, Table
 
 LOOKED_AT = 400
@@ -25,7 +26,6 @@ LOOKED_AT = 400
 NEW_STUDY = "`fes-pin new-study` writes a [columns] table that reads it as it is"
 WIDE = 10
 """Columns for each row, at least, of a table that looks transposed; the one with the fewest rows that is read has 3."""
-COMMENTS = ("#", "%", "//")
 _NUMBER = {".": NUMBER, ",": re.compile(r"^[+-]?\d+(,\d+)?([eE][+-]?\d+)?$")}
 Rows = list[tuple[int, list[bool]]]
 """Places of the rows of numbers, the last first, and of each cell whether it is a number."""
@@ -53,19 +53,24 @@ def sniffed(path: Path, stated: Mapping[str, Any] = MappingProxyType({})) -> tup
     columns = len(rows[0][1])
     numbers = [(cells_of(lines[place], form) + [""] * columns)[:columns] for place in below[:2]]
     header = turned or (Header() if stated.get("transposed") else header_of(above, form, numbers))
-    lost = [line for line in above if not turned and _begins_a_row(line) and len(cells_of(line, form)) == columns]
-    if len(lost) >= MIN_ROWS and columns > 1:
-        words = (
-            f"{len(lost)} lines of numbers above line {first + 1} are not read: what stands between is taken as names"
-        )
-        header = replace(header, said=(*header.said, words))
-    if not turned and not header.row and not header.said and len(numbers[0]) >= WIDE * len(rows):
-        odd = f"{len(rows)} rows of {len(numbers[0])} columns without names: is the table transposed?"
-        header = replace(header, said=(f"{odd} --transposed says so",))
+    if not turned:
+        header = replace(header, said=(*header.said, *_odd_of_table(header, above, form, (len(rows), columns))))
     if {"names", "header_row", "transposed"} & set(stated):
         header = Header(int(stated.get("header_row", header.row)), rate_hz=header.rate_hz)
     form = replace(form, header_row=header.row, names=header.names, transposed=turned is not None, first_row=first + 1)
     return replace(form, **stated), header
+
+
+def _odd_of_table(header: Header, above: Sequence[str], form: TextForm, shape: tuple[int, int]) -> list[str]:
+    """Sentences about a table of so many rows and columns that may be another than it seems."""
+    count, columns = shape
+    lost = [line for line in above if _begins_a_row(line) and len(cells_of(line, form)) == columns]
+    if len(lost) >= MIN_ROWS and columns > 1:
+        place = f"above line {len(above) + 1}"
+        return [f"{len(lost)} lines of numbers {place} are not read: what stands between is taken as names"]
+    if not header.row and not header.said and columns >= WIDE * count:
+        return [f"{count} rows of {columns} columns without names: is the table transposed? --transposed says so"]
+    return []
 
 
 def _likeliest(path: Path, sheet: str) -> tuple[list[str], Rows, TextForm]:
@@ -181,18 +186,23 @@ def _rows(lines: list[str], form: TextForm) -> Rows:
         if not line.strip() or line.lstrip().startswith(COMMENTS):
             continue
         cells = cells_of(line, form)
-        kinds = [_is_number(cell, number) or cell.lower() in MISSING for cell in cells]
         is_open = form.delimiter != " " and line.rstrip(" \r").endswith(form.delimiter)
-        width = next(iter(widths), len(rows[0][1]) if rows else len(kinds))
-        fits = len(kinds) in ({width, width - 1} if is_open else {width} if widths else {width, width + 1})
-        if not (fits or not rows) or not any(_is_number(cell, number) for cell in cells):
-            if rows and len(cells) != width and not is_keyed(cells) and _goes_on(lines[:place], form, width):
-                continue  # a remark, or a row that lost a cell, is no header
-            break
-        widths |= set() if is_open else {len(kinds)}
-        rows.append((place, kinds))
+        width = next(iter(widths), len(rows[0][1]) if rows else len(cells))
+        fits = not rows or len(cells) in _widths_like(width, is_open, bool(widths))
+        if fits and any(_is_number(cell, number) for cell in cells):
+            widths |= set() if is_open else {len(cells)}
+            rows.append((place, [_is_number(cell, number) or cell.lower() in MISSING for cell in cells]))
+        elif not rows or len(cells) == width or is_keyed(cells) or not _goes_on(lines[:place], form, width):
+            break  # else a remark, or a row that lost a cell, which is no header
     width = max((len(kinds) for _, kinds in rows), default=0)
     return [(place, kinds + [True] * (width - len(kinds))) for place, kinds in rows]
+
+
+def _widths_like(width: int, is_open: bool, is_known: bool) -> set[int]:
+    """How many cells a row may have; `is_open`: a delimiter ends it; `is_known`: a row without one has this width."""
+    if is_open:
+        return {width, width - 1}
+    return {width} if is_known else {width, width + 1}
 
 
 def _goes_on(above: Sequence[str], form: TextForm, width: int) -> bool:

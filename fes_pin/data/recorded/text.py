@@ -3,11 +3,10 @@
 They are read fast where they are clean, and cell by cell to say where they are not.
 """
 
-import csv
 import math
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -16,112 +15,10 @@ import numpy as np
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import as_path
 from fes_pin.data.recorded.clock import clock_seconds, from_first
-from fes_pin.data.recorded.sheets import lines_in
+from fes_pin.data.recorded.form import AFTER_COMMENTS, MISSING, NUMERIC, TextForm, cells_of
+from fes_pin.data.recorded.passed_over import begins_with_sample, lines_between, passed_over
 from fes_pin.data.table import MIN_ROWS, Table
 from fes_pin.data.units import are_units, bare_unit
-
-DELIMITERS = (";", "\t", ",", " ")
-"""Semicolon, tab, comma, and any white space."""
-DECIMALS = (".", ",")
-ENCODINGS = ("utf-8", "utf-16", "cp1252")
-_NUMBER = re.compile(r"^[+-]?[\d.,]+([eE][+-]?\d+)?$")
-MISSING = frozenset({"", "nan", "na", "n/a", "-", "--", "null", "none", "#n/a"})
-"""What instruments write where there is no sample, in lower case."""
-REMARK = re.compile(r"[\t ,;]+#(\*|\d+)(\s.*)?$")
-"""What LabChart writes at the end of a row of numbers where somebody made a remark: `#* stimulus on`."""
-AFTER, AFTER_COMMENTS = "after comments", -1
-"""`header_row` of files whose names stand in the first line that is neither a comment nor empty; in a form -1."""
-
-
-@dataclass(frozen=True)
-class TextForm:
-    """How a text file writes its numbers.
-
-    Parameters
-    ----------
-    delimiter
-        Of `DELIMITERS`.
-    decimal
-        "." or ",".
-    header_row
-        Line of the column names, from 1, or `AFTER_COMMENTS`, with the numbers below it; 0 if the file has none, and
-        columns are then called column1, column2 ...
-    first_row
-        Line of the first numbers; what stands between it and the header (a row of units) is passed over.
-    names
-        Of the columns, instead of those in the header; () for those.
-    transposed
-        Whether each line holds one quantity: its name, unless `names` or the header have the names, then its samples.
-    comment
-        What a line begins with that is passed over; "" for nothing.
-    encoding
-        Of `ENCODINGS`.
-    sheet
-        Of a spreadsheet; "" for its first one.
-    strict
-        Whether each line must hold as many numbers as there are names, none of them missing and no two names alike, as
-        the study format has it.
-    """
-
-    delimiter: str = ","
-    decimal: str = "."
-    header_row: int = 1
-    first_row: int = 2
-    comment: str = ""
-    encoding: str = "utf-8"
-    names: tuple[str, ...] = ()
-    transposed: bool = False
-    sheet: str = ""
-    strict: bool = False
-
-    def lines(self, path: Path) -> list[str]:
-        """Lines of a file, or of a sheet of a spreadsheet.
-
-        Raises
-        ------
-        InputError
-            As `lines_in`.
-        """
-        return lines_in(path, self.encoding, self.delimiter, self.sheet)
-
-    def in_words(self) -> str:
-        """What sets this form apart from that of the study format; "" if nothing does."""
-        plain, said = TextForm(), []
-        if self.delimiter != plain.delimiter:
-            said.append({";": "semicolons", "\t": "tabs", " ": "white space"}[self.delimiter] + " between values")
-        if self.decimal != plain.decimal:
-            said.append("decimal commas")
-        if self.transposed:
-            said.append("one quantity in each line")
-        if self.header_row == 0:
-            said.append("no header")
-        elif self.header_row > 1:
-            said.append(f"a header in row {self.header_row}")
-        if self.header_row > 0 and self.first_row > self.header_row + 1:
-            said.append("a row of units")
-        if self.comment:
-            said.append(f"comments after {self.comment}")
-        if self.encoding != plain.encoding:
-            said.append(f"{self.encoding} text")
-        return ", ".join(said)
-
-
-def cells_of(line: str, form: TextForm) -> list[str]:
-    """The cells of one line, without surrounding spaces.
-
-    Unless the form is strict also without quotes and remarks, and a delimiter at the end of the line begins no cell.
-    """
-    if "#" in line and not form.strict and line.lstrip()[:1] in "+-.0123456789":
-        line = REMARK.sub("", line)
-    cells = line.split(None if form.delimiter == " " else form.delimiter)
-    if form.strict:
-        return [cell.strip() for cell in cells]
-    if form.delimiter == " ":
-        return [cell.strip('"') for cell in cells]
-    if '"' in line:
-        cells = next(csv.reader([line], delimiter=form.delimiter, skipinitialspace=True), [])
-    out = [cell.strip() for cell in cells]
-    return out[:-1] if len(out) > 1 and not out[-1] else out
 
 
 def without_twins(names: list[str]) -> tuple[str, ...]:
@@ -193,7 +90,7 @@ def _transposed(path: Path, lines: list[str], form: TextForm, wanted: Sequence[s
     cells = _equal_lines(path, lines, form)
     if form.names or form.header_row:
         names = names_of(path, lines, form)
-    elif all(_NUMBER.match(row[0]) for row in cells):
+    elif all(NUMERIC.match(row[0]) for row in cells):
         names = without_twins([""] * len(cells))
     else:
         names, cells = without_twins([row[0] for row in cells]), [row[1:] for row in cells]
@@ -244,7 +141,7 @@ def table_of_lines(
     units = {**units_between(lines, names, form), **dict.fromkeys(clocks, "s")}
     sentences = (
         *(f"{name} holds {what}: it is read as seconds from its first row" for name, what in clocks.items()),
-        *_passed_over(lines, body, rows, form),
+        *(() if form.strict or form.transposed else passed_over(lines, body, int(rows[-1]), form)),
     )
     return Table(path, names, columns, rows, form.header_row, units, half_digit_of=half_digit, said=sentences)
 
@@ -309,71 +206,14 @@ def _body(lines: list[str], form: TextForm) -> tuple[list[str], np.ndarray]:
         found.pop()
     if not form.strict:
         found = [(row, line) for row, line in found if line.strip()]
-        between = set(_between([line for _, line in found], lines[: form.first_row - 1], form))
+        between = set(lines_between([line for _, line in found], lines[: form.first_row - 1], form))
         found = [(row, line) for row, line in found if line not in between]
     if form.comment:
         found = [(row, line) for row, line in found if not line.lstrip().startswith(form.comment)]
-    if not form.strict and found and _begins(found[0][1], form):
-        while not _begins(found[-1][1], form):  # a summary, `End of data`
+    if not form.strict and found and begins_with_sample(found[0][1], form):
+        while not begins_with_sample(found[-1][1], form):  # a summary, `End of data`
             found.pop()
     return [line for _, line in found], np.array([row for row, _ in found], dtype=int)
-
-
-def _passed_over(lines: list[str], body: list[str], rows: np.ndarray, form: TextForm) -> list[str]:
-    """Sentences about what stands between the rows, or at their ends, and is no number."""
-    if form.strict or form.transposed:
-        return []
-    above, last = lines[: form.first_row - 1], int(rows[-1]) if len(rows) else 0
-    between = _between(lines[form.first_row - 1 : last], above, form)
-    again = [line for line in between if _heads(above, form, line)]
-    words = [
-        line.strip() for line in between if line not in again and not line.lstrip().startswith(form.comment or " ")
-    ]
-    noted = [line for line in body if "#" in line and REMARK.search(line)]
-    below = [line.strip() for line in lines[last:] if line.strip()] if len(rows) else []
-    below = [line for line in below if not line.startswith((form.comment or "#", "#", "%", "//"))]
-    said = [f"its header comes again in {len(again)} lines, which are passed over"] if again else []
-    if words:
-        said.append(f"{_lines(words)} between the numbers, passed over: {words[0][:40]!r}")
-    if noted:
-        remark = noted[0][noted[0].index("#") :][:40].strip()
-        said.append(f"{len(noted)} rows end in a remark, {remark!r}: it is passed over")
-    if below:
-        said.append(f"{_lines(below)} below the numbers, passed over: {below[0][:40]!r}")
-    return said
-
-
-def _lines(found: Sequence[str]) -> str:
-    return f"{len(found)} line{'s' * (len(found) > 1)}"
-
-
-def _between(found: Sequence[str], above: Sequence[str], form: TextForm) -> list[str]:
-    """The lines among those of numbers that are a header again, or words of another number of cells: a remark."""
-    width = len(cells_of(found[0], form)) if found else 0
-    out = []
-    for line in found:
-        text = line.lstrip()
-        if not text[:1].isalpha() and not text.startswith(("#", "%", "//")):
-            continue
-        cells = cells_of(text, form)
-        is_word = not any(_NUMBER.match(cell) or cell.lower() in MISSING for cell in cells)
-        if _heads(above, form, line) or (is_word and len(cells) not in (width, width + 1)):
-            out.append(line)
-    return out
-
-
-def _heads(above: Sequence[str], form: TextForm, line: str) -> bool:
-    """Return whether a line begins as one of those above the first numbers: a program wrote its header again."""
-    text = line.lstrip()
-    if not text[:1].isalpha() or text[:3].lower() == "nan":
-        return False
-    return cells_of(text, form)[0] in {cells_of(one, form)[0] for one in above if one.strip()}
-
-
-def _begins(line: str, form: TextForm) -> bool:
-    """Return whether the first cell of a line may be a sample: a number, a time, or nothing."""
-    cell = next(iter(cells_of(line, form)), "")
-    return bool(_NUMBER.match(cell)) or cell.lower() in MISSING or clock_seconds(cell) is not None
 
 
 def _fast(body: list[str], form: TextForm, places: list[int], count: int) -> np.ndarray | None:
