@@ -2,6 +2,8 @@
 
 from collections.abc import Iterator, Sequence
 
+import numpy as np
+
 from fes_pin.data.recorded.clock import clock_seconds
 from fes_pin.data.recorded.form import COMMENTS, MISSING, NUMERIC, REMARK, TextForm, cells_of
 
@@ -19,6 +21,8 @@ def lines_between(found: Sequence[str], above: Sequence[str], form: TextForm) ->
     width = len(cells_of(found[0], form)) if found else 0
     out = []
     for line in found:
+        if line[:1].isdigit() or line[:1] in ("-", "+", "."):  # most are numbers
+            continue
         text = line.lstrip()
         if not text[:1].isalpha() and not text.startswith(COMMENTS):
             continue
@@ -35,18 +39,20 @@ def begins_with_sample(line: str, form: TextForm) -> bool:
     return bool(NUMERIC.match(cell)) or cell.lower() in MISSING or clock_seconds(cell) is not None
 
 
-def passed_over(lines: Sequence[str], body: Sequence[str], last: int, form: TextForm) -> Iterator[str]:
+def passed_over(lines: Sequence[str], body: Sequence[str], rows: np.ndarray, form: TextForm) -> Iterator[str]:
     """Sentences about what stands between the rows of numbers, at their ends and below them, and is no number.
 
     Parameters
     ----------
     lines, body
         All lines of the file, and those of its rows.
-    last
-        The line of the last row, from 1.
+    rows
+        Which lines these are, from 1, (n,).
     """
-    above = lines[: form.first_row - 1]
-    between = lines_between(lines[form.first_row - 1 : last], above, form)
+    above, last = lines[: form.first_row - 1], int(rows[-1])
+    is_skipped = np.ones(last, dtype=bool)
+    is_skipped[: form.first_row - 1], is_skipped[rows - 1] = False, False
+    between = [lines[k] for k in np.flatnonzero(is_skipped).tolist() if lines[k].strip()]
     again = [line for line in between if _heads(above, form, line)]
     if again:
         yield f"its header comes again in {len(again)} lines, which are passed over"

@@ -141,7 +141,7 @@ def table_of_lines(
     units = {**units_between(lines, names, form), **dict.fromkeys(clocks, "s")}
     sentences = (
         *(f"{name} holds {what}: it is read as seconds from its first row" for name, what in clocks.items()),
-        *(() if form.strict or form.transposed else passed_over(lines, body, int(rows[-1]), form)),
+        *(() if form.strict or form.transposed else passed_over(lines, body, rows, form)),
     )
     return Table(path, names, columns, rows, form.header_row, units, half_digit_of=half_digit, said=sentences)
 
@@ -206,8 +206,8 @@ def _body(lines: list[str], form: TextForm) -> tuple[list[str], np.ndarray]:
         found.pop()
     if not form.strict:
         found = [(row, line) for row, line in found if line.strip()]
-        between = set(lines_between([line for _, line in found], lines[: form.first_row - 1], form))
-        found = [(row, line) for row, line in found if line not in between]
+        if between := set(lines_between([line for _, line in found], lines[: form.first_row - 1], form)):
+            found = [(row, line) for row, line in found if line not in between]
     if form.comment:
         found = [(row, line) for row, line in found if not line.lstrip().startswith(form.comment)]
     if not form.strict and found and begins_with_sample(found[0][1], form):
