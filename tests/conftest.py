@@ -34,6 +34,12 @@ EACH_FILE_S, ONE_S = 3.0, 20.0
 """Of each file the quickest tests always run, as many as take 3 s together, and one of up to 20 s; others are `long`.
 Of 9500 tests, 2 h 20 min of one processor, that leaves 14 minutes on two, of the 20 that .ci/run may take."""
 
+WHOLE = {
+    "cli/test_invocations.py": "how command lines end is counted over all of them",
+    "test_readme.py": "the blocks of a page go on from those above",
+}
+"""Files of which all tests always run, and why."""
+
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Take the option that measures which tests are long."""
@@ -42,9 +48,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_configure() -> None:
     """Say where a file that must be run again, or only when asked for, was moved or renamed."""
-    places = [place.partition("::")[0] for place in (*ROUNDING, *SECONDS)]
+    places = [place.partition("::")[0] for place in (*ROUNDING, *SECONDS, *WHOLE)]
     if gone := [place for place in places if not (Path(__file__).parent / place).exists()]:
-        raise pytest.UsageError(f"tests/conftest.py, ROUNDING, or seconds.json: there is no {', '.join(gone)}")
+        raise pytest.UsageError(f"tests/conftest.py, ROUNDING or WHOLE, or seconds.json: there is no {', '.join(gone)}")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -60,7 +66,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 @functools.cache
 def _long_of(file: str) -> frozenset[str]:
     """Names of the tests of a file that are long."""
-    slow = sorted(SECONDS.get(file, {}).items(), key=lambda one: one[1])
+    slow = sorted(SECONDS.get(file, {}).items(), key=lambda one: one[1]) if file not in WHOLE else []
     together = itertools.accumulate(seconds for _, seconds in slow)
     limits = itertools.chain([ONE_S], itertools.repeat(EACH_FILE_S))
     return frozenset(name for (name, _), sum_s, most in zip(slow, together, limits, strict=False) if sum_s > most)
