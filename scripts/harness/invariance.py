@@ -204,6 +204,13 @@ def difference(study: fp.Study, other: fp.Study) -> float:
     return worst
 
 
+def alike(study: fp.Study, other: fp.Study) -> bool:
+    """Whether a diagnosis begins from the same numbers to the last bit, and so ends in the same verdict."""
+    pairs = zip(study.trials, other.trials, strict=True)
+    stated = all(one.conditions == two.conditions and one.time[0] == two.time[0] for one, two in pairs)
+    return stated and difference(study, other) == 0.0
+
+
 def verdict(study: fp.Study) -> tuple[Any, ...]:
     """What a diagnosis says of a study, without numbers."""
     found = fp.diagnose(study)
@@ -229,7 +236,7 @@ def main(
                     place = Path(name) / f"{item.key} {way}"
                     other = recorded_as(study, way, place)
                     off = difference(study, other)
-                    is_kept = not diagnose or verdict(other) == said
+                    is_kept = not diagnose or alike(study, other) or verdict(other) == said
                     same, asked, kept = same + (off <= SAME), asked + 1, kept + is_kept
                     if off > SAME or not is_kept:
                         print(f"{generator} {item.key} {way}: differs by {off:.3g}, verdict kept {is_kept}", flush=True)
