@@ -22,7 +22,7 @@ from scipy.signal import savgol_filter
 import fes_pin as fp
 from fes_pin.data.trial import derived_trial
 from fes_pin.models.simulate import Simulator, max_step, substeps
-from harness.regression import plain
+from harness.regression import Regressed, plain
 
 HORIZONS_S = (0.3, 1.0)
 RANDOM, RANDOM_S = 0.02, 0.05
@@ -157,6 +157,22 @@ def errors_against(study: fp.Study, found: Any, unseen: Sequence[fp.Trial]) -> d
         names = [n for n in both[0] if all(n in one for one in both) and not (falls and n == "free")]
         out |= {f"{n}, {word}": (both[0][n], both[1][n], both[2][n]) for n in names}
     return out
+
+
+def errors_of_truth(
+    study: fp.Study, hidden: Sequence[str], truth: Mapping[str, float], unseen: Sequence[fp.Trial]
+) -> dict[str, float]:
+    """Errors E of the true model, percent, by measure; none where its values do not state a model of the library."""
+    from fes_pin.models.effects import effect_named  # noqa: PLC0415
+
+    if not all(name in truth and _has_one_value(effect_named(name)) for name in hidden):
+        return {}
+    true = Regressed(tuple(hidden), {}, {n: {"value": value} for n, value in truth.items()})
+    return {n: errors[0] for n, errors in errors_against(study, true, unseen).items()}
+
+
+def _has_one_value(cause: Any) -> bool:
+    return len(cause.amplitudes()) + len(cause.shapes()) == 1
 
 
 def _moved(model: fp.Model, trials: Sequence[fp.Trial]) -> dict[str, float]:

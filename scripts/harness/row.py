@@ -42,6 +42,8 @@ class Row:
         See `Truth`.
     against
         Errors of the answer's model, of the believed model and of a regression, percent; see `never_worse`.
+    true
+        Errors of the true model by the same measures, percent, where the answer's are worse than another's.
     """
 
     key: str
@@ -60,6 +62,7 @@ class Row:
     unseen: float | None = None
     nearest: tuple[str, ...] | None = None
     against: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
+    true: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
     def of(cls, stored: Mapping[str, Any]) -> Row:

@@ -25,6 +25,7 @@ from harness import never_worse
 from harness.generator import Generator, Item, Truth
 from harness.generators import generator_of
 from harness.row import Row, judged
+from harness.table import is_worse
 
 TRUTH = "truth.json"
 REGRESSION, TEN_LINES, EFFORT = "regression", "ten lines", "effort"
@@ -180,6 +181,8 @@ def answered(
         known["unseen"] = unseen_percent(found, truth)
         if withholds:
             known["against"] = never_worse.errors_against(study, found, unseen)
+            if is_worse(known["against"]):
+                known["true"] = never_worse.errors_of_truth(study, item.hidden, truth.parameters, unseen)
     return judged(item, truth, json.loads(found.to_json()), cpu_s=round(seconds, 2), **known)
 
 

@@ -208,24 +208,40 @@ def against(ours: Sequence[Row], others: Sequence[Row]) -> list[str]:
     return [*lines, *(f"  {one_line(row)}: E {a:.3g} %, ten lines {b:.3g} %" for row, a, b in odd)]
 
 
+def ratios_of(errors: Mapping[str, Sequence[float]]) -> dict[tuple[str, str], float]:
+    """Errors of a model over those of the believed model and of the regression, by measure and the name of the other.
+
+    Errors below `LEAST_PERCENT` are taken for it. A measure is passed over where each of the models leaves more than
+    `NO_MODEL_PERCENT`: there is nothing to choose.
+    """
+    out = {}
+    for measure, (ours, *others) in errors.items():
+        if min(ours, *others) > NO_MODEL_PERCENT:
+            continue
+        for name, theirs in zip(("believed", "regression"), others, strict=True):
+            out[measure, name] = _percent(ours) / _percent(theirs) if ours < float("inf") else ours
+    return out
+
+
+def is_worse(errors: Mapping[str, Sequence[float]]) -> bool:
+    """Whether a model is worse than the believed one or the regression in one of its errors."""
+    return max(ratios_of(errors).values(), default=0.0) > WORSE_ERROR
+
+
 def never_worse(rows: Sequence[Row]) -> list[str]:
     """Errors of our models over those of the believed model and of the regression, by measure, lines of text.
 
-    Errors below `LEAST_PERCENT` are taken for it. A measure is passed over where each of the models leaves more than
-    `NO_MODEL_PERCENT`: there is nothing to choose. A study without an answer counts as worse.
+    A study without an answer counts as worse. What is worse is printed with the largest ratio of the true model, which
+    may be worse than a regression too: free motion adds up a random effort, and an offset may happen to cancel that.
     """
     ratios: dict[str, list[tuple[float, Row]]] = {}
     worst: dict[str, float] = {}
     for row in rows:
         if row.error is not None:
             worst[row.key] = float("inf")
-        for measure, (ours, *others) in row.against.items():
-            if min(ours, *others) > NO_MODEL_PERCENT:
-                continue
-            for name, theirs in zip(("believed", "regression"), others, strict=True):
-                ratio = _percent(ours) / _percent(theirs) if ours < float("inf") else ours
-                ratios.setdefault(f"{measure}, ours over {name}", []).append((ratio, row))
-                worst[row.key] = max(worst.get(row.key, 0.0), ratio)
+        for (measure, name), ratio in ratios_of(row.against).items():
+            ratios.setdefault(f"{measure}, ours over {name}", []).append((ratio, row))
+            worst[row.key] = max(worst.get(row.key, 0.0), ratio)
     lines = []
     for name, some in sorted(ratios.items()):
         most, where = max(some, key=lambda one: one[0])
@@ -238,10 +254,17 @@ def never_worse(rows: Sequence[Row]) -> list[str]:
         lines.append(
             f"every error at most {WORSE_ERROR} times: {interval(good, len(worst))}; largest {max(worst.values()):.3g}"
         )
-    return [
-        *lines,
-        *(f"  {one_line(row)}: {worst[row.key]:.3g}" for row in rows if worst.get(row.key, 0.0) > WORSE_ERROR),
-    ]
+    return [*lines, *(_of_truth(row, worst[row.key]) for row in rows if worst.get(row.key, 0.0) > WORSE_ERROR)]
+
+
+def _of_truth(row: Row, worst: float) -> str:
+    """A study whose answer is worse than another, with what the true model is in the same measures."""
+    line = f"  {one_line(row)}: {worst:.3g}"
+    if row.true:
+        theirs = ratios_of({n: (row.true[n], *errors[1:]) for n, errors in row.against.items() if n in row.true})
+        own = {n: ratio for n, ratio in ratios_of(row.against).items() if ratio > WORSE_ERROR}
+        line += "; the true model " + ", ".join(f"{theirs[n]:.3g} in {n[0]}" for n in own if n in theirs)
+    return line
 
 
 def _percent(unseen: float | None) -> float:

@@ -9,7 +9,7 @@ import pytest
 from driven_rigs.draw import draw
 from driven_rigs.laboratory import draw_laboratory
 from harness import measured
-from harness.never_worse import errors_against, model_of, withheld
+from harness.never_worse import errors_against, errors_of_truth, model_of, withheld
 from harness.regression import plain
 from harness.table import never_worse
 from test_harness import row
@@ -57,6 +57,18 @@ def test_free_motion_is_left_out_where_the_answer_prints_no_error_of_it(drawn):
     study, _ = drawn
     answer = SimpleNamespace(model=fp.nominal_model(study), extended_error=(None, None))
     assert {*errors_against(study, answer, ())} == {f"{m}, fitted" for m in MEASURES if m != "free"}
+
+
+def test_the_errors_of_the_true_model_are_those_of_its_values(drawn):
+    study, truth = drawn
+    shown, unseen = withheld(study)
+    found = errors_of_truth(shown, ("coulomb_friction",), truth, unseen)
+    known = errors_against(shown, SimpleNamespace(model=true_model(shown, truth)), unseen)
+    assert {*found} == {*known}
+    for name, (true, believed, _) in known.items():
+        assert found[name] == pytest.approx(true, rel=0.2) and found[name] < 0.3 * believed
+    assert errors_of_truth(shown, ("joint_stop",), {**truth, "joint_stop": 5.0}, unseen) == {}  # two values
+    assert errors_of_truth(shown, ("effort_offset",), truth, unseen) == {}  # no value
 
 
 def test_the_believed_model_has_its_own_errors(drawn):
@@ -118,6 +130,14 @@ def test_ratios_are_counted():
     assert text[2].startswith("free, unseen, ours over believed: median inf, at most 1.02 in 1 of 2")
     assert text[4].startswith("every error at most 1.02 times: 1 of 4") and text[4].endswith("largest inf")
     assert [line.split(":")[0].strip() for line in text[5:]] == ["a", "c", "d"]
+
+
+def test_what_is_worse_is_printed_with_what_the_true_model_is():
+    errors = {"free, unseen": (2.0, 4.0, 1.0), "effort, unseen": (1.0, 2.0, 2.0)}
+    (line,) = never_worse([row("a", against=errors, true={"free, unseen": 1.9, "effort, unseen": 0.9})])[-1:]
+    assert line.endswith(": 2; the true model 1.9 in free, unseen")
+    (line,) = never_worse([row("a", against=errors)])[-1:]
+    assert line.endswith(": 2")
 
 
 def test_a_study_of_ones_own_has_a_table(tmp_path, capsys):
