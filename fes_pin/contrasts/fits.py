@@ -15,6 +15,7 @@ from fes_pin.infer.optimum import minimise
 from fes_pin.infer.problem import Unknowns
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
+from fes_pin.search.approach import approach
 from fes_pin.search.likelihood_fits import FIRST_NOISE_SCALES, MEASUREMENT, PROCESS, LikelihoodFits
 from fes_pin.search.likelihood_maxima import SCREEN_ITERATIONS, likeliest, process_noises
 from fes_pin.workers import in_parallel
@@ -95,7 +96,7 @@ class GroupedFits:
         best = min(self._each.values(), key=lambda f: f.misfit(f.fits[()]))
         if not best.is_far(best.fits[()]):
             return None
-        found = best.least_squares.fits[best.least_squares.approach()].model
+        found = best.least_squares.fits[approach(best.least_squares)].model
         effects = [e for e in found.effects if not e.each_trial]
         if not effects:
             return None

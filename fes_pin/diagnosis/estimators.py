@@ -13,6 +13,7 @@ from fes_pin.infer.estimators import Estimator
 from fes_pin.infer.held_out import held_out_gain
 from fes_pin.infer.levels import NOTHING_PERCENT
 from fes_pin.infer.search import Policy
+from fes_pin.search.approach import approach
 from fes_pin.search.likelihood_fits import MEASUREMENT
 from fes_pin.workers import attempted, in_parallel
 
@@ -60,7 +61,7 @@ class LeastSquares(RigEstimator):
 
         def chosen() -> Found:
             if len(models.trials) < FEWEST:
-                return other.settle(other.models.approach(0.0 if models.noise == MEASUREMENT else NOTHING_PERCENT))
+                return other.settle(approach(other.models, 0.0 if models.noise == MEASUREMENT else NOTHING_PERCENT))
             return other.result(best_predicting(other, other.run().best.names))
 
         return _ended(other, attempted(chosen, None, search.seconds_left))

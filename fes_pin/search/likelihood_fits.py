@@ -17,18 +17,19 @@ from fes_pin.identify.likelihood_fit import LikelihoodFit, at_noise, fit_of, max
 from fes_pin.identify.process_noise import first_guess, stilled, without_memory
 from fes_pin.infer.covariance import step_gain
 from fes_pin.infer.fits import Candidate, FittedSets, Names
-from fes_pin.infer.levels import FAR_PERCENT, MOST_CAUSES, NOTHING_PERCENT, SMALL_SHARE
+from fes_pin.infer.levels import FAR_PERCENT, NOTHING_PERCENT
 from fes_pin.infer.maximise import ROUNDS
 from fes_pin.infer.optimize import WORTH
 from fes_pin.infer.optimum import minimise
 from fes_pin.infer.problem import Unknowns, normal_equations
 from fes_pin.infer.scoring import LITTLE
+from fes_pin.infer.search import FITTED
 from fes_pin.infer.text import WHOLE
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import StateSpaceNoise
 from fes_pin.models.stage import Effect
+from fes_pin.search.approach import MORE, approach
 from fes_pin.search.library import Library
-from fes_pin.search.likelihood_forms import refined_form
 from fes_pin.search.likelihood_maxima import less, likeliest, look, maximum_from_afar, process_noises
 from fes_pin.search.possible import is_certain, is_possible
 from fes_pin.search.score import Scored, best_by_effect
@@ -54,12 +55,6 @@ RESTART_SETS = 3
 """Sets that are fitted further from little process noise: those of lowest criterion after one alternation. Without that
 alternation the best cause of a muscle, by 20 000 in twice the log-likelihood, was not among the first eight of
 twenty."""
-
-NEAREST, FITTED = 3, 8
-"""Sets of a size that are extended by least squares, and candidates by which each but the nearest is; see
-`infer.search.Policy`."""
-MORE = 2.0
-"""Ratio of the errors E of two fits above which one is farther from the data."""
 
 
 def first_noise(trials: Sequence[Trial], answered: bool) -> str:
@@ -303,7 +298,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
             return begun
         if self.noise == WHITE or not self.is_far(self.fits[()]):
             return ()
-        best, rough = self.least_squares.approach(), self.least_squares.fits
+        best, rough = approach(self.least_squares), self.least_squares.fits
         for names in sorted((n for n in rough if n and set(n) <= set(best)), key=len):
             self.fits[names] = self._from_least_squares(rough[names])
         return best
@@ -330,57 +325,6 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         while (better := self.better_form(self.fits[best.names])) is not None:
             self.fits[best.names] = better
         return best.names
-
-    def approach(self, least: float = NOTHING_PERCENT) -> Names:
-        """Return the smallest set whose E is no more than the least, or the nearest set of at most `MOST_CAUSES`.
-
-        Forms of the sets of several causes that are about as near as the nearest are refined before a further cause is
-        tried. Causes that the others came to replace are dropped at the end.
-        """
-        best: Names = ()
-        fits = self.fits
-        self.nominal()
-        while self.misfit(fits[best]) > least and len(best) < MOST_CAUSES:
-            for k, names in enumerate(self._nearest(len(best))):
-                self.extend(names, FITTED if k else None)
-            larger = self._nearest(len(best) + 1, FITTED)
-            if best and larger and self.is_far(fits[larger[0]]):
-                near = MORE * self.misfit(fits[larger[0]])
-                in_parallel(self._refine, [n for n in larger if self.misfit(fits[n]) <= near])
-                larger = self._nearest(len(best) + 1)
-            if not (larger and self._is_nearer(fits[larger[0]], fits[best])):
-                break
-            best = larger[0]
-        if best:
-            self._refine(best)
-        return self._without_replaced(best, least)
-
-    def _without_replaced(self, names: Names, least: float) -> Names:
-        """Return a set without each cause that no longer lessens E, or without which E is no more than the least."""
-        while len(names) > 1:
-            left = {n: self.without(names, n) for n in names}
-            gone = min(names, key=lambda n: self.misfit(left[n]))
-            if self.misfit(left[gone]) > least and self._is_nearer(self.fits[names], left[gone]):
-                break
-            names = tuple(n for n in names if n != gone)
-        return names
-
-    def _is_nearer(self, larger: LikelihoodFit, smaller: LikelihoodFit) -> bool:
-        """Return whether a larger set lessens E by a tenth, or an E that is negligible by half."""
-        now = self.misfit(smaller)
-        return self.misfit(larger) <= (now / MORE if now < NOTHING_PERCENT else (1.0 - SMALL_SHARE) * now)
-
-    def _nearest(self, size: int, count: int = NEAREST) -> list[Names]:
-        """Return the sets of a size of least E whose causes are physically possible; on the way none may be a model."""
-        own = (n for n in self.fits if len(n) == size)
-        possible = [n for n in own if not n or is_possible(self.fits[n], self.library.measured)]
-        return sorted(possible, key=lambda n: (self.misfit(self.fits[n]), n))[:count]
-
-    def _refine(self, names: Names) -> None:
-        """Replace the fit of a set by that of a refined form where E is half as large."""
-        refined = refined_form(self.fits[names], self.library.measured)
-        if refined is not None and MORE * self.misfit(refined) < self.misfit(self.fits[names]):
-            self.fits[names] = refined
 
     def _begin_far(self, base: LikelihoodFit, starts: Mapping[Names, Starts]) -> dict[Names, LikelihoodFit]:
         """Return first fits of sets that extend one far from the data: by least squares, begun by a filter."""

@@ -7,6 +7,7 @@ import fes_pin as fp
 from fes_pin.diagnosis.likelihood_models import LikelihoodModels
 from fes_pin.models.nominal import nominal_model
 from fes_pin.prepare.measured import split
+from fes_pin.search.approach import approach
 from fes_pin.search.likelihood_fits import WHITE
 
 
@@ -21,7 +22,7 @@ def test_the_nearest_set_has_no_cause_that_the_others_replace(seed, tmp_path):
     study = study_of(seed, tmp_path)
     sets = LikelihoodModels(nominal_model(study), split(study)[0], None, False, noise=WHITE)
     sets.nominal()
-    friction, other = sets.approach()
+    friction, other = approach(sets)
     assert friction == "coulomb_friction" and other in ("base_tilt", "effort_offset", "sensor_offset")
 
 
