@@ -315,7 +315,21 @@ class NewColumns:
             its = {c: s for c, s in columns.items() if str(s.get("name", "")).startswith(before)}
             own = {"time_s": time, **{c: {**s, "name": s["name"].removeprefix(before)} for c, s in its.items()}}
             names = [n.removeprefix(before) for n in self.seen.names if n.startswith(before)]
-            lines += columns_text(own, names, self._one_form(source), options, where, is_plain)
+            form = self._one_form(source)
+            lines += self._beside(own, form, options) or columns_text(own, names, form, options, where, is_plain)
+        return lines
+
+    def _beside(self, own: Mapping[str, Source], form: TextForm | None, options: Mapping[str, Any]) -> list[str]:
+        """Lines of a table [sources.NAME] for each of the trials that stand side by side in their files."""
+        names: dict[str, dict[str, None]] = {}
+        called: dict[str, Mapping[str, str]] = {}
+        for beside in (p.beside for p in self.seen.proposals if p.beside is not None):
+            names[beside.name] = names.get(beside.name, {}) | dict.fromkeys(beside.names)
+            called[beside.name] = beside.called
+        lines = list[str]()
+        for name, its in called.items():
+            columns = {c: {**s, "name": its.get(s["name"], s["name"])} if "name" in s else s for c, s in own.items()}
+            lines += columns_text(columns, [*names[name]], form, options, f"sources.{name}")
         return lines
 
     def _one_form(self, source: str) -> TextForm | None:

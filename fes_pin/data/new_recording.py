@@ -38,6 +38,25 @@ _NUMBERED = re.compile(r"([a-z]{3,})\d+$")
 
 
 @dataclass(frozen=True)
+class Beside:
+    """The columns of a trial among others that stand beside it.
+
+    Parameters
+    ----------
+    name
+        Of the table of sources that says how they are read.
+    called
+        The file's names of them, by those of the first trial.
+    names
+        All columns of the file.
+    """
+
+    name: str
+    called: Mapping[str, str]
+    names: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Proposal:
     """What a file seems to hold.
 
@@ -57,6 +76,8 @@ class Proposal:
         What is odd about the file and how it is taken, a sentence each.
     sheet
         Of a spreadsheet that has several.
+    beside
+        Of a trial with others beside it in the columns of one file; None of others.
     """
 
     recording: Table
@@ -66,6 +87,7 @@ class Proposal:
     rate_hz: float | None = None
     said: tuple[str, ...] = ()
     sheet: str = ""
+    beside: Beside | None = None
 
 
 def proposals_of(
@@ -138,7 +160,20 @@ def propose(
         names, said = by_length(path, chosen) if is_nested(path) else (None, ())
         recording, header = read_recording(path, wanted=names), Header(said=said)
         units = {}
-    units = {**recording.units, **units}
+    return as_seen(recording, form, {**recording.units, **units}, schema, revolute, header.rate_hz, header.said)
+
+
+def as_seen(
+    recording: Table,
+    form: TextForm | None,
+    stated: Mapping[str, str],
+    schema: RigSchema,
+    revolute: bool | None,
+    rate_hz: float | None,
+    said: tuple[str, ...] = (),
+) -> Proposal:
+    """What columns of numbers seem to hold for a rig, by their names and the units that are stated apart from these."""
+    units = dict(stated)
     for name in recording.columns:
         units.setdefault(name, split_header(name)[1])
     named = {c: tuple(_candidates(c, recording.columns, units, revolute)) for c in schema.columns}
@@ -153,7 +188,7 @@ def propose(
         taken = {name for found in candidates.values() for name in found}
         candidates |= {c: tuple(n for n in found if n not in taken) for c, found in either.items()}
     candidates = {c: _readings(c, _without_copies(found, recording)) for c, found in candidates.items()}
-    return Proposal(recording, form, _without_doubles(candidates), units, header.rate_hz, header.said)
+    return Proposal(recording, form, _without_doubles(candidates), units, rate_hz, said)
 
 
 def _without_copies(names: Sequence[str], recording: Table) -> tuple[str, ...]:

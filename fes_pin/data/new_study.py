@@ -18,6 +18,7 @@ from fes_pin.data.new_columns import NewColumns, Source
 from fes_pin.data.new_recording import Proposal, proposals_of
 from fes_pin.data.new_view import FilesOfTrial, WantedView, grouped_files, trial_view
 from fes_pin.data.schema import NumberKey, any_number, one_of, unknown
+from fes_pin.data.side_by_side import COLUMNS, SideBySide
 from fes_pin.data.study_text import HEADER, source_in_words, toml_table
 from fes_pin.data.wanted import Wanted, labels_of, number_set, of_files
 
@@ -90,7 +91,9 @@ class _Making:
         self.own = of_files(wanted.files, "--set", wanted.settings)
         chosen = tuple(wanted.columns.values())
         found = [proposals_of(p, self.schema, wanted.revolute, wanted.form, chosen) for p in wanted.files]
-        each = [one for some in found for one in some]
+        split = "none" if wanted.sources else wanted.split
+        apart = SideBySide(self.schema, wanted.revolute, split, chosen)
+        each = [part for some in found for one in some for part in apart.parts(one)]
         self.trials = grouped_files(each, self.schema, wanted.sources)
         self.columns = NewColumns(wanted, self.trials, self.missing)
 
@@ -144,7 +147,9 @@ class _Making:
 
     def _trial_keys(self, one: FilesOfTrial, files: Mapping[str, str], kind: str) -> dict[str, Any]:
         """Its files, its kind where that is not open, and its labels."""
+        beside = one.proposal.beside
         whole = {"sources": files} if one.is_joined else {"file": files[""]}
+        whole = {"sources": {beside.name: files[""]}} if beside else whole
         known = {"sheet": one.proposal.sheet} if one.proposal.sheet else {}
         known |= {} if self._is_open(one.proposal, kind) else {"kind": kind}
         return {**whole, **known, **labels_of(self.wanted, *(p.recording.path for p in one.files.values()))}
@@ -158,7 +163,8 @@ class _Making:
         """What a person said of the part of a recording that a trial is."""
         texts = {key: self.own.get((path, key)) or self.wanted.settings.get(key) for key in ("from", "to")}
         ends = {key: number_set(key, text, any_number("s", False)) for key, text in texts.items() if text is not None}
-        split = self.wanted.split if self.wanted.split is not None or not looked_hz else "none"  # rows come with events
+        split = None if self.wanted.split == COLUMNS else self.wanted.split
+        split = "none" if split is None and looked_hz else split  # rows come with events
         rate_hz, derived = self.wanted.resample_hz, self.columns.derived
         return WantedView(ends, split, self.wanted.offsets, rate_hz, derived, is_regular=bool(rate_hz or looked_hz))
 

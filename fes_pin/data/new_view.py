@@ -70,6 +70,8 @@ def grouped_files(proposals: Sequence[Proposal], schema: RigSchema, stated: Mapp
         A pattern of no file, a file of no pattern, trials that do not have a file of each source.
     """
     proposals = [_with_time(one) for one in proposals]
+    if any(one.beside is not None for one in proposals):
+        return [FilesOfTrial({"": one}, one) for one in proposals]
     by_path = {one.recording.path: one for one in proposals}
     groups = _stated(tuple(by_path), stated) if stated else _by_name(proposals, schema)
     if not groups:
@@ -113,7 +115,7 @@ def _by_name(proposals: Sequence[Proposal], schema: RigSchema) -> list[dict[str,
     paths = [one.recording.path for one in proposals]
     words = [re.findall(r"[a-z]+|\d+|[^a-z\d]+", path.stem.lower()) for path in paths]
     found = {_quantities(one, some, schema) for one, some in zip(proposals, words, strict=True)}
-    alike = len(found) == 1 or all(_is_whole(one, schema) for one in found)
+    alike = len(found) == 1 or all(is_whole(one, schema) for one in found)
     if alike or len({len(some) for some in words}) > 1:
         return []
     return next((trials for k in range(len(words[0])) if (trials := _apart_in(k, paths, words))), [])
@@ -136,7 +138,7 @@ def _quantities(proposal: Proposal, of_name: Sequence[str], schema: RigSchema) -
     return frozenset(found or {n for n in schema.columns if MEANT.get(n, frozenset()) & set(of_name)})
 
 
-def _is_whole(found: frozenset[str], schema: RigSchema) -> bool:
+def is_whole(found: frozenset[str], schema: RigSchema) -> bool:
     """Return whether a file with these columns is a trial by itself."""
     found |= {n for n, source in INTEGRATED.items() if source in found}
     kinds = ({schema.outputs[kind], *schema.motion(kind)[:1]} for kind in schema.outputs)

@@ -1,0 +1,226 @@
+"""Trials that stand side by side in the columns of one file: told from instruments that recorded at once."""
+
+import numpy as np
+import pytest
+
+from fes_pin.data.as_read import HeldFile
+from fes_pin.data.errors import InputError
+from fes_pin.data.new_study import new_study
+from fes_pin.data.schema import known_rigs
+from fes_pin.data.study import read_study
+from fes_pin.data.templates import pendulum
+from fes_pin.data.wanted import Wanted
+
+SEEDS = range(5)
+UNITS = {"time_s": "time_s=time:s", "position": "position={}:deg", "effort": "effort={}:N m"}
+REPEATED = "Time [s],Angle [deg],Torque [Nm]"
+
+
+def swing(seed, count=200):
+    """Times, angles in degrees and torques of a trial."""
+    time, random = np.arange(count) * 0.01, np.random.default_rng(seed)
+    angle = random.uniform(20.0, 35.0) * np.cos(6.0 * time + random.uniform(0.0, 1.0))
+    return np.round([time, angle, random.uniform(0.5, 1.0) * np.sin(3.0 * time)], 6)
+
+
+def text(columns, *header):
+    """Lines of a file; a column that is shorter than others ends in empty cells."""
+    count = max(map(len, columns))
+    cells = [[repr(float(v)) for v in one] + [""] * (count - len(one)) for one in columns]
+    return "\n".join([*header, *map(",".join, zip(*cells, strict=True))]) + "\n"
+
+
+def wanted(folder, content, *columns, rig="joint", **more):
+    files = content if isinstance(content, dict) else {"a.csv": content}
+    for name, one in files.items():
+        (folder / name).write_text(one)
+    believed = HeldFile.holding("p.urdf", pendulum(0.3, 1.0).encode()) if rig == "joint" else None
+    said = dict(words.split("=", 1) for words in columns)
+    paths = tuple(folder / name for name in files)
+    return Wanted(paths, known_rigs()[rig], folder / "s", "a", believed, columns=said, **more)
+
+
+def made(folder, content, *columns, **more):
+    start = {"inertia_scale": 1.0, "damping": 0.01}
+    if more.get("rig") == "muscle":
+        start = {"gain": 30.0, "time_constant_s": 0.05}
+    out = new_study(wanted(folder, content, *columns, **more), lambda rig, columns: start)
+    for place, one in out.contents.items():
+        path = folder / "s" / place
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(one if isinstance(one, bytes) else one.encode())
+    return read_study(folder / "s"), out
+
+
+def refused(folder, content, *columns, **more):
+    with pytest.raises(InputError) as caught:
+        made(folder, content, *columns, **more)
+    return str(caught.value)
+
+
+def check(study, trials):
+    """Compare a study with the trials that were written: (time, angle, torque) of each, by name."""
+    assert [t.name for t in study] == [*trials]
+    for name, (time, angle, torque) in trials.items():
+        assert np.array_equal(study[name].time, time)
+        assert np.allclose(study[name]["position"], np.radians(angle), rtol=0.0, atol=1e-12)
+        if torque is not None:
+            assert np.array_equal(study[name]["effort"], torque)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("counts", [(200, 200), (200, 150), (150, 200), (90, 200, 140)])
+@pytest.mark.parametrize("word", ["Trial", "Run", "Messung"])
+def test_names_that_are_repeated_below_words_for_a_trial(tmp_path, seed, counts, word):
+    trials = [swing(10 * seed + k, count) for k, count in enumerate(counts)]
+    heads = ",".join(f"{word} {k + 1},," for k in range(len(counts)))
+    study, out = made(tmp_path, text([c for one in trials for c in one], heads, ",".join([REPEATED] * len(counts))))
+    check(study, {f"a-{k + 1}": one for k, one in enumerate(trials)})
+    (said,) = [words for words in out.said if "side by side" in words]
+    assert f"{len(counts)} trials side by side, Time [s], Angle [deg], Torque [Nm] and Time [s]#2" in said
+    left = {f"a-{k + 1}": max(counts) - n for k, n in enumerate(counts)}
+    for trial in study:
+        rows = f"{left[trial.name]} rows of the file below its last sample are left out"
+        assert (rows in trial.remarks) == (left[trial.name] > 0)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize(
+    "form", ["trial{}_{}", "{1}_trial{0}", "{1} (run {0})", "Trial {}: {}", "{1}Trial{0}", "{1}_rep_{0:02}", "TEST {} {}"]
+)
+def test_numbers_behind_words_for_a_trial_with_one_time(tmp_path, seed, form):
+    trials = [swing(10 * seed + k, count) for k, count in enumerate((200, 200, 120))]
+    names = [form.format(k, what) for k in (1, 2, 3) for what in ("angle", "torque")]
+    columns = [trials[0][0], *(c for one in trials for c in one[1:])]
+    said = [UNITS["time_s"], UNITS["position"].format(names[0]), UNITS["effort"].format(names[1])]
+    study, _ = made(tmp_path, text(columns, ",".join(["time", *names])), *said)
+    check(study, {f"a-{k}": one for k, one in enumerate(trials, 1)})
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("names", ["t,angle,torque|t#,angle#,torque#", "t_#,angle_#,torque_#", "time#,pos#,tau#"])
+@pytest.mark.parametrize("has_times", [True, False])
+def test_sets_that_end_apart_are_trials(tmp_path, seed, names, has_times):
+    trials = [swing(10 * seed + k, count) for k, count in enumerate((200, 120, 160))]
+    first, _, others = names.partition("|")
+    own = [(first if k == 1 else others or first).replace("#", str(k)).split(",") for k in (1, 2, 3)]
+    every = [[*zip(some, one, strict=True)] for some, one in zip(own, trials, strict=True)]
+    flat = [c for one in every for c in one] if has_times else [every[0][0], *(c for one in every for c in one[1:])]
+    if not has_times:
+        flat[0] = ("time", flat[0][1])
+    said = [f"time_s={flat[0][0]}:s", UNITS["position"].format(own[0][1]), UNITS["effort"].format(own[0][2])]
+    study, out = made(tmp_path, text([c for _, c in flat], ",".join(n for n, _ in flat)), *said)
+    check(study, {f"a-{k}": one for k, one in enumerate(trials, 1)})
+    assert any("they begin at once and end apart" in words for words in out.said)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_one_column_a_trial_beside_the_time(tmp_path, seed):
+    trials = [swing(10 * seed + k) for k in range(3)]
+    content = text([trials[0][0], *(one[1] for one in trials)], "Time [s],Trial 1,Trial 2,Trial 3")
+    assert "--column position=Trial 1:UNIT" in refused(tmp_path, content)
+    study, _ = made(tmp_path, content, "position=Trial 1:deg")
+    check(study, {f"a-{k}": (*one[:2], None) for k, one in enumerate(trials, 1)})
+
+
+@pytest.mark.parametrize("names", ["angle_1,torque_1,angle_2,torque_2", "position1,effort1,position2,effort2"])
+def test_two_joints_of_a_robot_are_asked_for_and_may_be_said_to_be_trials(tmp_path, names):
+    trials = [swing(1), swing(2)]
+    content = text([trials[0][0], *trials[0][1:], *trials[1][1:]], f"time,{names}")
+    said = refused(tmp_path, content)
+    one, effort, other, _ = names.split(",")
+    assert "may be 2 trials side by side or 2 instruments at once: --split columns" in said
+    assert f"--column position=NAME:UNIT ({one} or {other})" in said
+    units = [UNITS["time_s"], UNITS["position"].format(one), UNITS["effort"].format(effort)]
+    study, _ = made(tmp_path, content, *units, split="columns")
+    check(study, {f"a-{k}": one for k, one in enumerate(trials, 1)})
+    (alone,) = made(tmp_path, content, *units, split="none")[0]
+    assert alone.name == "a" and np.array_equal(alone["effort"], trials[0][2])
+
+
+NO_TRIALS = {
+    "two sensors of one joint": "time,angle_1,angle_2,torque",
+    "two sensors, also with times": "time_1,angle_1,time_2,angle_2,torque",
+    "eight muscles": "time,angle,torque," + ",".join(f"emg_{k}" for k in range(1, 9)),
+    "two plates": "time,angle,torque,Fz1,Mx1,Fz2,Mx2",
+    "sides": "time,angle_left,torque_left,angle_right,torque_right",
+    "a set that lacks a column": "time,angle_1,torque_1,angle_2",
+    "a test that has a name": "time,test_angle_1,test_angle_2,test_torque",
+    "another unit": "time,angle_1 [deg],torque_1 [Nm],angle_2 [rad],torque_2 [Nm]",
+}
+
+
+@pytest.mark.parametrize("ends_apart", [False, True])
+@pytest.mark.parametrize("names", NO_TRIALS.values(), ids=NO_TRIALS.keys())
+def test_instruments_are_no_trials(tmp_path, names, ends_apart):
+    count, random = names.count(","), np.random.default_rng(3)
+    time = swing(0)[0]
+    columns = [time if "time" in name else random.normal(size=200) for name in names.split(",")]
+    if ends_apart:
+        columns[count - 1 :] = [c[:150] for c in columns[count - 1 :]]
+    rig = wanted(tmp_path, text(columns, names))
+    try:
+        out = new_study(rig, lambda rig, columns: {"inertia_scale": 1.0, "damping": 0.01})
+    except InputError as error:
+        assert "trials side by side" not in str(error)
+    else:
+        assert "sources" not in out.contents["study.toml"]
+
+
+def test_a_stimulus_may_be_that_of_all_trials_where_words_say_what_they_are(tmp_path):
+    time, random = np.arange(200) * 0.01, np.random.default_rng(5)
+    stim, forces = (np.arange(200) % 20 == 0).astype(float), random.uniform(1.0, 30.0, (2, 200))
+    shared = text([time, stim, *forces], "time_s,stim,force_n_1,force_n_2")
+    assert "trials side by side" not in refused(tmp_path, shared, rig="muscle")
+    named = text([time, stim, *forces], "time_s,stim,trial1_force_n,trial2_force_n")
+    study, _ = made(tmp_path, named, rig="muscle")
+    assert [np.array_equal(t["force_n"], one) for t, one in zip(study, forces, strict=True)] == [True, True]
+    assert all(np.array_equal(t["stim"], stim) for t in study)
+
+
+def test_copies_are_no_trials(tmp_path):
+    time, angle, torque = swing(1)
+    content = text([time, angle, torque] * 2, "Trial 1,,,Trial 2,,", ",".join([REPEATED] * 2))
+    study, out = made(tmp_path, content)
+    check(study, {"a": (time, angle, torque)})
+    assert not any("side by side" in words for words in out.said)
+
+
+def test_a_column_of_another_trial_that_is_named_leaves_the_file_whole(tmp_path):
+    trials = [swing(1), swing(2)]
+    content = text([c for one in trials for c in one], "Trial 1,,,Trial 2,,", ",".join([REPEATED] * 2))
+    study, _ = made(tmp_path, content, "position=Angle [deg]#2", "effort=Torque [Nm]#2", "time_s=Time [s]")
+    check(study, {"a": trials[1]})
+
+
+def test_numbers_may_go_on_in_another_file(tmp_path):
+    trials = [swing(k) for k in range(4)]
+    files = {
+        f"{name}.csv": text(
+            [trials[first][0], *trials[first][1:], *trials[first + 1][1:]],
+            f"time,{','.join(f'trial{first + k}_{what}' for k in (1, 2) for what in ('angle', 'torque'))}",
+        )
+        for name, first in (("a", 0), ("b", 2))
+    }
+    said = [UNITS["time_s"], "position=trial1_angle:deg", "effort=trial1_torque:N m"]
+    study, out = made(tmp_path, files, *said)
+    check(study, dict(zip(("a-1", "a-2", "b-1", "b-2"), trials, strict=True)))
+    assert 'trial3 = "b.csv"' in out.contents["study.toml"] or 'trial3 = "trials/b.csv"' in out.contents["study.toml"]
+
+
+def test_a_file_that_is_said_to_hold_trials_must(tmp_path):
+    content = text([swing(1)[0], *swing(1)[1:]], "time,angle,torque")
+    said = refused(tmp_path, content, split="columns")
+    assert "--split columns: expected names that are the same but for a number" in said
+    assert "time, angle, torque" in said
+
+
+def test_two_trials_must_not_read_one_column(tmp_path):
+    trials = [swing(1), swing(2)]
+    made(tmp_path, text([c for one in trials for c in one], "Trial 1,,,Trial 2,,", ",".join([REPEATED] * 2)))
+    file = tmp_path / "s/study.toml"
+    before, _, after = file.read_text().rpartition("[sources.trial2]")
+    after = after.replace('"Angle [deg]"', '""').replace('"Angle [deg]#2"', '"Angle [deg]"').replace('""', '"Angle [deg]#2"')
+    file.write_text(f"{before}[sources.trial2]{after}")
+    with pytest.raises(InputError, match="the same file as trial.0..sources.trial1; expected from and to"):
+        read_study(tmp_path / "s")
