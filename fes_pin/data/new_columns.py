@@ -123,7 +123,7 @@ class NewColumns:
     def _time_of(self, source: str) -> Source | None:
         seen = Seen([one.files[source] for one in self.trials])
         option = self.wanted.columns.get("time_s")
-        if option is not None and (not source or option.startswith("rate=") or _named(option, seen.names)):
+        if option is not None and (not source or option.startswith("rate=") or column_named(option, seen.names)):
             return self.stated("time_s", option, seen)
         rates = {p.rate_hz for p in seen.proposals}
         if not seen.could_be("time_s") and len(rates) == 1 and None not in rates:
@@ -148,7 +148,7 @@ class NewColumns:
     def _values(self, column: str) -> np.ndarray:
         """What the files hold of one of the rig's columns, as they have it; empty where that is not known."""
         said = self.wanted.columns.get(column)
-        names = self._could_be(column) if said is None else _named(said, self.seen.names)
+        names = self._could_be(column) if said is None else column_named(said, self.seen.names)
         return self.seen.values(names[0]) if len(names) == 1 else np.zeros(0)
 
     def channel(self, sources: Collection[str]) -> Channel | None:
@@ -172,7 +172,7 @@ class NewColumns:
     def _could_be(self, column: str) -> tuple[str, ...]:
         """Columns of the files that could be this one, without those that a person named for another."""
         others = [words for other, words in self.wanted.columns.items() if other != column]
-        taken = {name for words in others for name in _named(words, self.seen.names)}
+        taken = {name for words in others for name in column_named(words, self.seen.names)}
         return tuple(n for n in self.seen.could_be(column) if n not in taken)
 
     def _source(self, column: str, is_needed: bool) -> Source | None:
@@ -207,7 +207,7 @@ class NewColumns:
     def _free(self, column: str, seen: Seen) -> dict[str, str]:
         """All columns, in words with their units, but for those that another of the rig's takes; all where none is."""
         others = [c for c in (*self.schema.columns, "time_s") if c != column]
-        said = {n for c in others for n in _named(self.wanted.columns.get(c, ""), seen.names)}
+        said = {n for c in others for n in column_named(self.wanted.columns.get(c, ""), seen.names)}
         alone = {names[0] for c in others if len(names := seen.could_be(c)) == 1}
         every = dict(zip(seen.names, seen.with_units(), strict=True))
         return {name: words for name, words in every.items() if name not in said | alone} or every
@@ -316,16 +316,16 @@ class NewColumns:
             own = {"time_s": time, **{c: {**s, "name": s["name"].removeprefix(before)} for c, s in its.items()}}
             names = [n.removeprefix(before) for n in self.seen.names if n.startswith(before)]
             form = self._one_form(source)
-            lines += self._beside(own, form, options) or columns_text(own, names, form, options, where, is_plain)
+            lines += self._renamed(own, form, options) or columns_text(own, names, form, options, where, is_plain)
         return lines
 
-    def _beside(self, own: Mapping[str, Source], form: TextForm | None, options: Mapping[str, Any]) -> list[str]:
+    def _renamed(self, own: Mapping[str, Source], form: TextForm | None, options: Mapping[str, Any]) -> list[str]:
         """Lines of a table [sources.NAME] for each of the trials that stand side by side in their files."""
         names: dict[str, dict[str, None]] = {}
         called: dict[str, Mapping[str, str]] = {}
-        for beside in (p.beside for p in self.seen.proposals if p.beside is not None):
-            names[beside.name] = names.get(beside.name, {}) | dict.fromkeys(beside.names)
-            called[beside.name] = beside.called
+        for renamed in (p.renamed for p in self.seen.proposals if p.renamed is not None):
+            names[renamed.name] = names.get(renamed.name, {}) | dict.fromkeys(renamed.names)
+            called[renamed.name] = renamed.called
         lines = list[str]()
         for name, its in called.items():
             columns = {c: {**s, "name": its.get(s["name"], s["name"])} if "name" in s else s for c, s in own.items()}
@@ -343,7 +343,7 @@ class NewColumns:
         return next(iter(forms))
 
 
-def _named(words: str, names: Sequence[str]) -> tuple[str, ...]:
+def column_named(words: str, names: Sequence[str]) -> tuple[str, ...]:
     """The column that an option names, `NAME[:UNIT][,key=number ...]`: at most one."""
     found = [n for n in names if words == n or words.startswith((f"{n}:", f"{n},"))]
     return (max(found, key=len),) if found else ()

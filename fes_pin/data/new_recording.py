@@ -38,8 +38,8 @@ _NUMBERED = re.compile(r"([a-z]{3,})\d+$")
 
 
 @dataclass(frozen=True)
-class Beside:
-    """The columns of a trial among others that stand beside it.
+class Renamed:
+    """The columns of a trial among others that stand next to it.
 
     Parameters
     ----------
@@ -76,8 +76,8 @@ class Proposal:
         What is odd about the file and how it is taken, a sentence each.
     sheet
         Of a spreadsheet that has several.
-    beside
-        Of a trial with others beside it in the columns of one file; None of others.
+    renamed
+        Of a trial with others next to it in the columns of one file; None of others.
     """
 
     recording: Table
@@ -87,7 +87,7 @@ class Proposal:
     rate_hz: float | None = None
     said: tuple[str, ...] = ()
     sheet: str = ""
-    beside: Beside | None = None
+    renamed: Renamed | None = None
 
 
 def proposals_of(

@@ -147,9 +147,9 @@ class _Making:
 
     def _trial_keys(self, one: FilesOfTrial, files: Mapping[str, str], kind: str) -> dict[str, Any]:
         """Its files, its kind where that is not open, and its labels."""
-        beside = one.proposal.beside
-        whole = {"sources": files} if one.is_joined else {"file": files[""]}
-        whole = {"sources": {beside.name: files[""]}} if beside else whole
+        renamed = one.proposal.renamed
+        sources = {renamed.name: files[""]} if renamed is not None else files
+        whole: dict[str, Any] = {"sources": sources} if "" not in sources else {"file": files[""]}
         known = {"sheet": one.proposal.sheet} if one.proposal.sheet else {}
         known |= {} if self._is_open(one.proposal, kind) else {"kind": kind}
         return {**whole, **known, **labels_of(self.wanted, *(p.recording.path for p in one.files.values()))}

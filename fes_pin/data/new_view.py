@@ -70,7 +70,7 @@ def grouped_files(proposals: Sequence[Proposal], schema: RigSchema, stated: Mapp
         A pattern of no file, a file of no pattern, trials that do not have a file of each source.
     """
     proposals = [_with_time(one) for one in proposals]
-    if any(one.beside is not None for one in proposals):
+    if any(one.renamed is not None for one in proposals):
         return [FilesOfTrial({"": one}, one) for one in proposals]
     by_path = {one.recording.path: one for one in proposals}
     groups = _stated(tuple(by_path), stated) if stated else _by_name(proposals, schema)

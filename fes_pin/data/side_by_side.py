@@ -9,14 +9,15 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
 
 from fes_pin.data.errors import InputError, listed
-from fes_pin.data.new_recording import Beside, Proposal, as_seen
+from fes_pin.data.new_columns import column_named
+from fes_pin.data.new_recording import Renamed, Proposal, as_seen
 from fes_pin.data.new_view import is_whole
 from fes_pin.data.recorded.form import cells_of
 from fes_pin.data.recorded.parts import without_empty_end
@@ -50,23 +51,23 @@ class _Set:
         The file's names by what is left of them without the number.
     proposal
         What they, and the columns that all sets share, seem to hold.
-    beside
+    renamed
         How the study calls them.
     """
 
     number: str
     names: Mapping[str, str]
     proposal: Proposal
-    beside: Beside
+    renamed: Renamed
 
     def own(self, column: str) -> list[str]:
         """Names of its own columns that could be one of the rig's."""
-        return [n for n in self.proposal.candidates.get(column, ()) if n in self.beside.called]
+        return [n for n in self.proposal.candidates.get(column, ()) if n in self.renamed.called]
 
     def readings(self) -> list[np.ndarray]:
         """Its own columns of numbers but for its time, each of shape (n,)."""
         columns, time = self.proposal.recording.columns, self.own("time_s")
-        return [columns[n] for n in self.beside.called if n in columns and n not in time]
+        return [columns[n] for n in self.renamed.called if n in columns and n not in time]
 
     def ends(self) -> tuple[float, float, float]:
         """Where it begins and ends, and its usual step: in its own time, in rows where it has none."""
@@ -106,7 +107,7 @@ class SideBySide:
     def parts(self, one: Proposal) -> list[Proposal]:
         """What each of the trials of a recording seems to hold: several that stand side by side, or one.
 
-        Their columns have the names of the first one; `Proposal.beside` says what the file calls them.
+        Their columns have the names of the first one; `Proposal.renamed` says what the file calls them.
 
         Raises
         ------
@@ -119,8 +120,8 @@ class SideBySide:
         if not found and self.split == COLUMNS:
             message = "expected names that are the same but for a number, each set of them a trial"
             raise InputError(f"{message}; found {listed(one.recording.names)}", column=f"--split {COLUMNS}")
-        others = {n for some in found for n in some.names.values() if n not in some.beside.called}
-        if not found or any(words == n or words.startswith((f"{n}:", f"{n},")) for words in self.chosen for n in others):
+        others = {n for some in found for n in some.names.values() if n not in some.renamed.called}
+        if not found or any(others.intersection(column_named(words, one.recording.names)) for words in self.chosen):
             return [one]
         words = " and ".join(listed([*some.names.values()]) for some in found[:2]) + " ..." * (len(found) > 2)
         why = f"--split {COLUMNS} says so" if self.split == COLUMNS else _why(one, found)
@@ -131,7 +132,7 @@ class SideBySide:
         for key, name in found[0].names.items():
             self.called.setdefault(key, name)
         said = f"{len(found)} trials side by side, {words}: {why}; --split none leaves it whole"
-        parts = [replace(some.proposal, sheet=one.sheet, beside=some.beside) for some in found]
+        parts = [replace(some.proposal, sheet=one.sheet, renamed=some.renamed) for some in found]
         return [replace(parts[0], said=(*one.said, said)), *parts[1:]]
 
     def _sets(self, one: Proposal, place: int) -> list[_Set]:
@@ -143,15 +144,15 @@ class SideBySide:
         first = {**next(iter(by_number.values())), **self.called}
         found = []
         for trial, (number, names) in zip(numbers, by_number.items(), strict=True):
-            beside = Beside(f"trial{trial}", {first[k]: name for k, name in names.items()}, one.recording.names)
-            found.append(_Set(number, names, self._seen(one, beside, shared), beside))
+            renamed = Renamed(f"trial{trial}", {first[k]: name for k, name in names.items()}, one.recording.names)
+            found.append(_Set(number, names, self._seen(one, renamed, shared), renamed))
         may_share = self.split == COLUMNS or _are_named(one, found)
         is_one = any(len(some.proposal.recording) < MIN_ROWS for some in found) or _are_copies(found)
         return [] if is_one or not all(self._is_trial(some, shared, may_share) for some in found) else found
 
-    def _seen(self, one: Proposal, beside: Beside, shared: Sequence[str]) -> Proposal:
+    def _seen(self, one: Proposal, renamed: Renamed, shared: Sequence[str]) -> Proposal:
         """What the columns of a set and those that all share seem to hold, down to the last sample of the set."""
-        whole, names = one.recording, {**beside.called, **{n: n for n in shared}}
+        whole, names = one.recording, {**renamed.called, **{n: n for n in shared}}
         own = replace(
             whole,
             names=tuple(names),
@@ -165,7 +166,7 @@ class SideBySide:
         """Return whether a set is a whole trial: by its own columns, or with those that all sets share."""
         every = frozenset(c for c, names in some.proposal.candidates.items() if names and c != "time_s")
         own = frozenset(c for c in every if some.own(c))
-        if not every and may_share and len(some.readings()) == 1:  # `Trial 1`: the only column beside the time
+        if not every and may_share and len(some.readings()) == 1:  # `Trial 1`: the only column next to the time
             return not self.schema.inputs_required and len(shared) <= 1
         return bool(own) and (may_share or own == every) and is_whole(every, self.schema)
 

@@ -428,7 +428,8 @@ class _Reader(StudyTables):
         seen: dict[Path, list[tuple[str, View, set[str]]]] = {}
         for index, (table, (recordings, view)) in enumerate(zip(tables, views, strict=True)):
             main, (path, own) = next(iter(recordings.items()))
-            once = {s.name for c, s in own.sources.items() if c not in ("time_s", *self.schema.inputs)} if own else set()
+            shared = ("time_s", *self.schema.inputs)  # which trials side by side may have in common
+            once = {s.name for c, s in own.sources.items() if c not in shared} if own is not None else set()
             key = f"trial[{index}].{main if main in table else f'sources.{main}'}"
             for other, earlier, others in seen.get(path.resolve(), []):
                 if view.overlaps(earlier) and (once & others or not (once and others)):

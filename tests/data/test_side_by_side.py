@@ -86,7 +86,8 @@ def test_names_that_are_repeated_below_words_for_a_trial(tmp_path, seed, counts,
 
 @pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize(
-    "form", ["trial{}_{}", "{1}_trial{0}", "{1} (run {0})", "Trial {}: {}", "{1}Trial{0}", "{1}_rep_{0:02}", "TEST {} {}"]
+    "form",
+    ["trial{}_{}", "{1}_trial{0}", "{1} (run {0})", "Trial {}: {}", "{1}Trial{0}", "{1}_rep_{0:02}", "TEST {} {}"],
 )
 def test_numbers_behind_words_for_a_trial_with_one_time(tmp_path, seed, form):
     trials = [swing(10 * seed + k, count) for k, count in enumerate((200, 200, 120))]
@@ -115,7 +116,7 @@ def test_sets_that_end_apart_are_trials(tmp_path, seed, names, has_times):
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_one_column_a_trial_beside_the_time(tmp_path, seed):
+def test_one_column_a_trial_next_to_the_time(tmp_path, seed):
     trials = [swing(10 * seed + k) for k in range(3)]
     content = text([trials[0][0], *(one[1] for one in trials)], "Time [s],Trial 1,Trial 2,Trial 3")
     assert "--column position=Trial 1:UNIT" in refused(tmp_path, content)
@@ -220,7 +221,8 @@ def test_two_trials_must_not_read_one_column(tmp_path):
     made(tmp_path, text([c for one in trials for c in one], "Trial 1,,,Trial 2,,", ",".join([REPEATED] * 2)))
     file = tmp_path / "s/study.toml"
     before, _, after = file.read_text().rpartition("[sources.trial2]")
-    after = after.replace('"Angle [deg]"', '""').replace('"Angle [deg]#2"', '"Angle [deg]"').replace('""', '"Angle [deg]#2"')
+    own, other = '"Angle [deg]#2"', '"Angle [deg]"'
+    after = after.replace(other, "?").replace(own, other).replace("?", own)
     file.write_text(f"{before}[sources.trial2]{after}")
-    with pytest.raises(InputError, match="the same file as trial.0..sources.trial1; expected from and to"):
+    with pytest.raises(InputError, match=r"the same file as trial\[0\]\.sources\.trial1; expected from and to"):
         read_study(tmp_path / "s")

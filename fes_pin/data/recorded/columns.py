@@ -124,9 +124,7 @@ class Columns:
         called = {column: source.name or column for column, source in taken.items()}
         columns = {"time_s": time, **columns}
         whole = replace(recording, called=called, names=tuple(columns), columns=columns, half_digit=half_digit)
-        table = without_empty_end(whole, ("time_s",))
-        left = len(whole) - len(table)
-        return replace(table, said=(*table.said, f"{left} rows of the file below its last sample are left out")) if left else table
+        return without_empty_end(whole, ("time_s",))
 
     def regular(self, table: Table, held: tuple[str, ...]) -> Table:
         """A table without missing samples, at equally spaced times where a rate is stated.

@@ -105,7 +105,7 @@ def moving(table: Table, readings: Sequence[str]) -> list[Table]:
 
 
 def without_empty_end(table: Table, shared: Sequence[str] = ()) -> Table:
-    """A table down to the last row that holds a sample, as where a longer trial stands beside it.
+    """A table down to the last row that holds a sample, as where a longer trial stands next to it; `said` has it.
 
     Parameters
     ----------
@@ -114,4 +114,7 @@ def without_empty_end(table: Table, shared: Sequence[str] = ()) -> Table:
     """
     own = [v for n, v in table.columns.items() if n not in shared]
     last = max((int(np.flatnonzero(~np.isnan(v))[-1]) for v in own if not np.isnan(v).all()), default=len(table) - 1)
-    return table if last + 1 == len(table) else rows_of(table, slice(0, last + 1))
+    if (left := len(table) - last - 1) == 0:
+        return table
+    said = f"{left} rows of the file below its last sample are left out"
+    return replace(rows_of(table, slice(0, last + 1)), said=(*table.said, said))
