@@ -48,7 +48,7 @@ class _Set:
     number
         "" of names without one, next to others with one.
     names
-        The file's names by what is left of them without the number.
+        The file's names by the words without the number.
     proposal
         What they, and the columns that all sets share, seem to hold.
     renamed
@@ -102,7 +102,7 @@ class SideBySide:
     ) -> None:
         self.schema, self.revolute, self.split, self.chosen = schema, revolute, split, chosen
         self.called: dict[str, str] = {}
-        """The names of the first trial of all recordings, by what is left of them without their number."""
+        """The names of the first trial of all recordings, by their words without the number."""
 
     def parts(self, one: Proposal) -> list[Proposal]:
         """What each of the trials of a recording seems to hold: several that stand side by side, or one.
@@ -172,7 +172,7 @@ class SideBySide:
 
 
 def _by_number(names: Sequence[str], place: int) -> tuple[dict[str, dict[str, str]], list[str]]:
-    """By number, and by what is left without it, names of which there are the same of each number; and all others."""
+    """By number, and by the words without it, names of which there are the same of each number; and all others."""
     found: dict[str, dict[str, str]] = defaultdict(dict)
     for name in names:
         number, rest = _apart(name, place)
