@@ -214,8 +214,9 @@ def _are_named(one: Proposal, found: Sequence[_Set]) -> bool:
         return False
     names = one.recording.names
     firsts = [min(map(names.index, some.names.values())) for some in found]
-    above = one.form.lines(one.recording.path)[: one.form.header_row - 1]
-    lines = ([*cells_of(line, one.form), *[""] * len(names)] for line in above)
+    form = replace(one.form, sheet=one.sheet or one.form.sheet)
+    above = form.lines(one.recording.path)[: form.header_row - 1]
+    lines = ([*cells_of(line, form), *[""] * len(names)] for line in above)
     return any(all(set(re.findall(r"[a-z]+", cells[k].lower())) & TRIALS for k in firsts) for cells in lines)
 
 

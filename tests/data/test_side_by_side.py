@@ -1,5 +1,7 @@
 """Trials that stand side by side in the columns of one file: told from instruments that recorded at once."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -33,7 +35,13 @@ def text(columns, *header):
 def wanted(folder, content, *columns, rig="joint", **more):
     files = content if isinstance(content, dict) else {"a.csv": content}
     for name, one in files.items():
-        (folder / name).write_text(one)
+        if isinstance(one, str):
+            (folder / name).write_text(one)
+        else:
+            pytest.importorskip("python_calamine")
+            from test_sheets import xlsx  # noqa: PLC0415 - which needs it
+
+            xlsx(folder / name, one)
     believed = HeldFile.holding("p.urdf", pendulum(0.3, 1.0).encode()) if rig == "joint" else None
     said = dict(words.split("=", 1) for words in columns)
     paths = tuple(folder / name for name in files)
@@ -124,7 +132,7 @@ def test_one_column_a_trial_next_to_the_time(tmp_path, seed):
     check(study, {f"a-{k}": (*one[:2], None) for k, one in enumerate(trials, 1)})
 
 
-@pytest.mark.parametrize("names", ["angle_1,torque_1,angle_2,torque_2", "position1,effort1,position2,effort2"])
+@pytest.mark.parametrize("names", ["angle_1,torque_1,angle_2,torque_2", "position.1,effort.1,position.2,effort.2"])
 def test_two_joints_of_a_robot_are_asked_for_and_may_be_said_to_be_trials(tmp_path, names):
     trials = [swing(1), swing(2)]
     content = text([trials[0][0], *trials[0][1:], *trials[1][1:]], f"time,{names}")
@@ -226,3 +234,28 @@ def test_two_trials_must_not_read_one_column(tmp_path):
     file.write_text(f"{before}[sources.trial2]{after}")
     with pytest.raises(InputError, match=r"the same file as trial\[0\]\.sources\.trial1; expected from and to"):
         read_study(tmp_path / "s")
+
+
+@pytest.mark.parametrize("heads", [True, False])
+def test_sheets_whose_trials_stand_side_by_side(tmp_path, heads):
+    sheets, trials = {}, {}
+    for place, sheet in enumerate(("before", "after")):
+        pair = [swing(10 * place + k, count) for k, count in enumerate((200, 200 if heads else 120))]
+        trials |= {f"a-{sheet}-{k}": one for k, one in enumerate(pair, 1)}
+        columns = [c for one in pair for c in one]
+        rows = [[float(c[row]) if row < len(c) else "" for c in columns] for row in range(200)]
+        above = [["first trial", "", "", "Trial 2"]] if heads else [["subject 7"]]
+        sheets[sheet] = [*above, REPEATED.split(",") * 2, *rows]
+    study, _ = made(tmp_path, {"a.xlsx": sheets})
+    check(study, trials)
+
+
+def test_a_study_by_hand_as_the_format_has_it(tmp_path):
+    page = (Path(__file__).parents[2] / "docs/study_format.md").read_text()
+    block = page[page.index("[sources.trial1]") : page.index("No two of them may read")].partition("```")[0]
+    (tmp_path / "p.urdf").write_text(pendulum(0.3, 1.0))
+    head = '[study]\nname = "a"\nrig = "joint"\n[rig]\nurdf = "p.urdf"\n[start]\ninertia_scale = 1.0\ndamping = 0.01\n'
+    (tmp_path / "study.toml").write_text(head + block)
+    (time, one, _), (_, other, _) = swing(1), swing(2, 120)
+    (tmp_path / "session.csv").write_text(text([time, one, other], "time,angle_1,angle_2"))
+    check(read_study(tmp_path), {"session-1": (time, one, None), "session-2": (time[:120], other, None)})
