@@ -120,11 +120,14 @@ class SideBySide:
         if not found and self.split == COLUMNS:
             message = "expected names that are the same but for a number, each set of them a trial"
             raise InputError(f"{message}; found {listed(one.recording.names)}", column=f"--split {COLUMNS}")
+        chosen = {n for words in self.chosen for n in column_named(words, one.recording.names)}
         others = {n for some in found for n in some.names.values() if n not in some.renamed.called}
-        if not found or any(others.intersection(column_named(words, one.recording.names)) for words in self.chosen):
+        if not found or others & chosen:
             return [one]
         words = " and ".join(listed([*some.names.values()]) for some in found[:2]) + " ..." * (len(found) > 2)
         why = f"--split {COLUMNS} says so" if self.split == COLUMNS else _why(one, found)
+        if not why and chosen & {*found[0].names.values()}:  # which the person knows
+            return [one]
         if not why:
             either = f"{len(found)} trials side by side or {len(found)} instruments at once"
             said = f"{words} may be {either}: --split {COLUMNS} takes them as trials"

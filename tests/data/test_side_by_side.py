@@ -143,8 +143,10 @@ def test_two_joints_of_a_robot_are_asked_for_and_may_be_said_to_be_trials(tmp_pa
     units = [UNITS["time_s"], UNITS["position"].format(one), UNITS["effort"].format(effort)]
     study, _ = made(tmp_path, content, *units, split="columns")
     check(study, {f"a-{k}": one for k, one in enumerate(trials, 1)})
-    (alone,) = made(tmp_path, content, *units, split="none")[0]
-    assert alone.name == "a" and np.array_equal(alone["effort"], trials[0][2])
+    for split in (None, "none"):
+        study, out = made(tmp_path, content, *units, split=split)
+        check(study, {"a": trials[0]})
+        assert not any("side by side" in words for words in out.said)
 
 
 NO_TRIALS = {
