@@ -316,21 +316,20 @@ class NewColumns:
             own = {"time_s": time, **{c: {**s, "name": s["name"].removeprefix(before)} for c, s in its.items()}}
             names = [n.removeprefix(before) for n in self.seen.names if n.startswith(before)]
             form = self._one_form(source)
-            lines += self._renamed(own, form, options) or columns_text(own, names, form, options, where, is_plain)
+            for table, (called, every) in self._side_by_side(source).items():
+                its = {c: {**s, "name": called[s["name"]]} if s.get("name") in called else s for c, s in own.items()}
+                lines += columns_text(its, [*every], form, options, f"sources.{table}")
+            if any(one.files[source].renamed is None for one in self.trials):
+                lines += columns_text(own, names, form, options, where, is_plain)
         return lines
 
-    def _renamed(self, own: Mapping[str, Source], form: TextForm | None, options: Mapping[str, Any]) -> list[str]:
-        """Lines of a table [sources.NAME] for each of the trials that stand side by side in their files."""
-        names: dict[str, dict[str, None]] = {}
-        called: dict[str, Mapping[str, str]] = {}
-        for renamed in (p.renamed for p in self.seen.proposals if p.renamed is not None):
-            names[renamed.name] = names.get(renamed.name, {}) | dict.fromkeys(renamed.names)
-            called[renamed.name] = renamed.called
-        lines = list[str]()
-        for name, its in called.items():
-            columns = {c: {**s, "name": its.get(s["name"], s["name"])} if "name" in s else s for c, s in own.items()}
-            lines += columns_text(columns, [*names[name]], form, options, f"sources.{name}")
-        return lines
+    def _side_by_side(self, source: str) -> dict[str, tuple[Mapping[str, str], dict[str, None]]]:
+        """By the table of each trial that stands next to others the names of its columns, and all of its files."""
+        out: dict[str, tuple[Mapping[str, str], dict[str, None]]] = {}
+        for renamed in (p.renamed for one in self.trials if (p := one.files[source]).renamed is not None):
+            _, every = out.get(renamed.name, ({}, {}))
+            out[renamed.name] = renamed.called, every | dict.fromkeys(renamed.names)
+        return out
 
     def _one_form(self, source: str) -> TextForm | None:
         forms = {p.form: p for p in (one.files[source] for one in self.trials)}

@@ -91,10 +91,10 @@ class _Making:
         self.own = of_files(wanted.files, "--set", wanted.settings)
         chosen = tuple(wanted.columns.values())
         found = [proposals_of(p, self.schema, wanted.revolute, wanted.form, chosen) for p in wanted.files]
-        split = "none" if wanted.sources else wanted.split
-        apart = SideBySide(self.schema, wanted.revolute, split, chosen)
-        each = [part for some in found for one in some for part in apart.parts(one)]
-        self.trials = grouped_files(each, self.schema, wanted.sources)
+        each = [one for some in found for one in some]
+        apart = SideBySide(self.schema, wanted.revolute, wanted.split, chosen)
+        grouped = grouped_files(each, self.schema, wanted.sources)
+        self.trials = [trial for files in grouped for trial in apart.trials(files)]
         self.columns = NewColumns(wanted, self.trials, self.missing)
 
     def made(self, guess: Guess) -> NewStudy | None:
@@ -147,8 +147,7 @@ class _Making:
 
     def _trial_keys(self, one: FilesOfTrial, files: Mapping[str, str], kind: str) -> dict[str, Any]:
         """Its files, its kind where that is not open, and its labels."""
-        renamed = one.proposal.renamed
-        sources = {renamed.name: files[""]} if renamed is not None else files
+        sources = {p.renamed.name if p.renamed else source: files[source] for source, p in one.files.items()}
         whole: dict[str, Any] = {"sources": sources} if "" not in sources else {"file": files[""]}
         known = {"sheet": one.proposal.sheet} if one.proposal.sheet else {}
         known |= {} if self._is_open(one.proposal, kind) else {"kind": kind}

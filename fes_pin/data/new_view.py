@@ -70,13 +70,11 @@ def grouped_files(proposals: Sequence[Proposal], schema: RigSchema, stated: Mapp
         A pattern of no file, a file of no pattern, trials that do not have a file of each source.
     """
     proposals = [_with_time(one) for one in proposals]
-    if any(one.renamed is not None for one in proposals):
-        return [FilesOfTrial({"": one}, one) for one in proposals]
     by_path = {one.recording.path: one for one in proposals}
     groups = _stated(tuple(by_path), stated) if stated else _by_name(proposals, schema)
     if not groups:
         return [FilesOfTrial({"": one}, one) for one in proposals]
-    return [_joined({source: by_path[path] for source, path in files.items()}, schema) for files in groups]
+    return [joined({source: by_path[path] for source, path in files.items()}, schema) for files in groups]
 
 
 def _with_time(proposal: Proposal) -> Proposal:
@@ -146,7 +144,14 @@ def is_whole(found: frozenset[str], schema: RigSchema) -> bool:
     return is_moved and any(needed <= found for needed in kinds)
 
 
-def _joined(files: Mapping[str, Proposal], schema: RigSchema) -> FilesOfTrial:
+def joined(files: Mapping[str, Proposal], schema: RigSchema) -> FilesOfTrial:
+    """Several files as those of one trial, by their sources.
+
+    Raises
+    ------
+    InputError
+        Their sheets differ.
+    """
     columns: dict[str, np.ndarray] = {}
     units: dict[str, str] = {}
     candidates: dict[str, tuple[str, ...]] = dict.fromkeys(schema.columns, ())

@@ -17,8 +17,8 @@ import numpy as np
 
 from fes_pin.data.errors import InputError, listed
 from fes_pin.data.new_columns import column_named
-from fes_pin.data.new_recording import Renamed, Proposal, as_seen
-from fes_pin.data.new_view import is_whole
+from fes_pin.data.new_recording import Proposal, Renamed, as_seen
+from fes_pin.data.new_view import APART, FilesOfTrial, is_whole, joined
 from fes_pin.data.recorded.form import cells_of
 from fes_pin.data.recorded.parts import without_empty_end
 from fes_pin.data.recorded.regular import LONGEST_GAP
@@ -48,34 +48,31 @@ class _Set:
     number
         "" of names without one, next to others with one.
     names
-        The file's names by the words without the number.
-    proposal
+        The files' names by the words without the number.
+    first
+        Names that those of the first trial have, which all are called by.
+    trial
         What they, and the columns that all sets share, seem to hold.
-    renamed
-        How the study calls them.
     """
 
     number: str
     names: Mapping[str, str]
-    proposal: Proposal
-    renamed: Renamed
-
-    def own(self, column: str) -> list[str]:
-        """Names of its own columns that could be one of the rig's."""
-        return [n for n in self.proposal.candidates.get(column, ()) if n in self.renamed.called]
+    first: frozenset[str]
+    trial: FilesOfTrial
 
     def readings(self) -> list[np.ndarray]:
-        """Its own columns of numbers but for its time, each of shape (n,)."""
-        columns, time = self.proposal.recording.columns, self.own("time_s")
-        return [columns[n] for n in self.renamed.called if n in columns and n not in time]
+        """Its own columns of numbers but for its times, each of shape (n,)."""
+        return [
+            v for one in self.trial.files.values() for n, v in _own(one).items() if n not in one.candidates["time_s"]
+        ]
 
     def ends(self) -> tuple[float, float, float]:
         """Where it begins and ends, and its usual step: in its own time, in rows where it has none."""
-        recording, time = self.proposal.recording, self.own("time_s")
-        if len(time) != 1:
-            return 0.0, float(len(recording)), 1.0
-        values = recording.columns[time[0]]
-        return float(values[0]), float(values[-1]), float(np.median(np.abs(np.diff(values))))
+        one = next(iter(self.trial.files.values()))
+        times = [values for name, values in _own(one).items() if name in one.candidates["time_s"]]
+        if len(times) != 1:
+            return 0.0, float(len(one.recording)), 1.0
+        return float(times[0][0]), float(times[0][-1]), float(np.median(np.abs(np.diff(times[0]))))
 
     def is_called_trial(self) -> bool:
         """Return whether a word for a trial stands before the number in each name."""
@@ -104,10 +101,10 @@ class SideBySide:
         self.called: dict[str, str] = {}
         """The names of the first trial of all recordings, by their words without the number."""
 
-    def parts(self, one: Proposal) -> list[Proposal]:
-        """What each of the trials of a recording seems to hold: several that stand side by side, or one.
+    def trials(self, one: FilesOfTrial) -> list[FilesOfTrial]:
+        """The trials of a recording: several that stand side by side, or the recording itself.
 
-        Their columns have the names of the first one; `Proposal.renamed` says what the file calls them.
+        Their columns have the names of the first one; `Proposal.renamed` says what each file calls them.
 
         Raises
         ------
@@ -116,45 +113,56 @@ class SideBySide:
         """
         if self.split not in (None, COLUMNS):
             return [one]
+        every = one.proposal.recording.names
         found = next((sets for place in PLACES if (sets := self._sets(one, place))), [])
         if not found and self.split == COLUMNS:
             message = "expected names that are the same but for a number, each set of them a trial"
-            raise InputError(f"{message}; found {listed(one.recording.names)}", column=f"--split {COLUMNS}")
-        chosen = {n for words in self.chosen for n in column_named(words, one.recording.names)}
-        others = {n for some in found for n in some.names.values() if n not in some.renamed.called}
-        if not found or others & chosen:
+            raise InputError(f"{message}; found {listed(every)}", column=f"--split {COLUMNS}")
+        chosen = {n for words in self.chosen for n in column_named(words, every)}
+        others = {n for some in found for n in some.names.values()} - set(self.called.values())
+        if not found or chosen & others.difference(found[0].first):
             return [one]
         words = " and ".join(listed([*some.names.values()]) for some in found[:2]) + " ..." * (len(found) > 2)
         why = f"--split {COLUMNS} says so" if self.split == COLUMNS else _why(one, found)
-        if not why and chosen & {*found[0].names.values()}:  # which the person knows
+        if not why and chosen & found[0].first:  # which the person knows
             return [one]
         if not why:
             either = f"{len(found)} trials side by side or {len(found)} instruments at once"
-            said = f"{words} may be {either}: --split {COLUMNS} takes them as trials"
-            return [replace(one, said=(*one.said, said))]
+            return [_saying(one, f"{words} may be {either}: --split {COLUMNS} takes them as trials")]
         for key, name in found[0].names.items():
             self.called.setdefault(key, name)
         said = f"{len(found)} trials side by side, {words}: {why}; --split none leaves it whole"
-        parts = [replace(some.proposal, sheet=one.sheet, renamed=some.renamed) for some in found]
-        return [replace(parts[0], said=(*one.said, said)), *parts[1:]]
+        return [_saying(found[0].trial, said), *(some.trial for some in found[1:])]
 
-    def _sets(self, one: Proposal, place: int) -> list[_Set]:
+    def _sets(self, one: FilesOfTrial, place: int) -> list[_Set]:
         """Sets of columns that are the same but for the number at a place, each a whole trial; none of others."""
-        by_number, shared = _by_number(one.recording.names, place)
+        by_number, shared = _by_number(one.proposal.recording.names, place)
         if len(by_number) < 2:
             return []
         numbers = [*by_number] if all(by_number) else [str(k) for k in range(1, len(by_number) + 1)]
         first = {**next(iter(by_number.values())), **self.called}
         found = []
         for trial, (number, names) in zip(numbers, by_number.items(), strict=True):
-            renamed = Renamed(f"trial{trial}", {first[k]: name for k, name in names.items()}, one.recording.names)
-            found.append(_Set(number, names, self._seen(one, renamed, shared), renamed))
+            called = {first[k]: name for k, name in names.items()}
+            found.append(_Set(number, names, frozenset(called), self._seen(one, f"trial{trial}", called, shared)))
         may_share = self.split == COLUMNS or _are_named(one, found)
-        is_one = any(len(some.proposal.recording) < MIN_ROWS for some in found) or _are_copies(found)
+        is_one = any(len(some.trial.proposal.recording) < MIN_ROWS for some in found) or _are_copies(found)
         return [] if is_one or not all(self._is_trial(some, shared, may_share) for some in found) else found
 
-    def _seen(self, one: Proposal, renamed: Renamed, shared: Sequence[str]) -> Proposal:
-        """What the columns of a set and those that all share seem to hold, down to the last sample of the set."""
+    def _seen(self, one: FilesOfTrial, trial: str, called: Mapping[str, str], shared: Sequence[str]) -> FilesOfTrial:
+        """What the columns of a set and those that all share seem to hold, by the names of the first set."""
+        files = {}
+        for source, proposal in one.files.items():
+            before, table = (f"{source}{APART}", f"{source}_{trial}") if source else ("", trial)
+            its = {
+                n.removeprefix(before): name.removeprefix(before) for n, name in called.items() if n.startswith(before)
+            }
+            also = [n.removeprefix(before) for n in shared if n.startswith(before)]
+            files[source] = self._of_file(proposal, Renamed(table, its, proposal.recording.names), also)
+        return FilesOfTrial(files, files[""]) if "" in files else joined(files, self.schema)
+
+    def _of_file(self, one: Proposal, renamed: Renamed, shared: Sequence[str]) -> Proposal:
+        """What some columns of a file seem to hold, down to the last sample of those that are not shared."""
         whole, names = one.recording, {**renamed.called, **{n: n for n in shared}}
         own = replace(
             whole,
@@ -163,15 +171,29 @@ class SideBySide:
             half_digit_of=lambda n: whole.half_digit_of(names.get(n, n)),
         )
         units = {n: one.units[its] for n, its in names.items() if its in one.units}
-        return as_seen(without_empty_end(own, shared), one.form, units, self.schema, self.revolute, one.rate_hz)
+        seen = as_seen(without_empty_end(own, shared), one.form, units, self.schema, self.revolute, one.rate_hz)
+        return replace(seen, sheet=one.sheet, renamed=renamed)
 
     def _is_trial(self, some: _Set, shared: Sequence[str], may_share: bool) -> bool:
         """Return whether a set is a whole trial: by its own columns, or with those that all sets share."""
-        every = frozenset(c for c, names in some.proposal.candidates.items() if names and c != "time_s")
-        own = frozenset(c for c in every if some.own(c))
-        if not every and may_share and len(some.readings()) == 1:  # `Trial 1`: the only column next to the time
+        held = {c: set(names) for c, names in some.trial.proposal.candidates.items() if names and c != "time_s"}
+        own = [c for c, names in held.items() if names & some.first]
+        if not held and may_share and len(some.readings()) == 1:  # `Trial 1`: the only column next to the time
             return not self.schema.inputs_required and len(shared) <= 1
-        return bool(own) and (may_share or own == every) and is_whole(every, self.schema)
+        return bool(own) and (may_share or len(own) == len(held)) and is_whole(frozenset(held), self.schema)
+
+
+def _own(one: Proposal) -> dict[str, np.ndarray]:
+    """Columns of numbers, each of shape (n,), that a set does not share with others."""
+    called = one.renamed.called if one.renamed is not None else {}
+    return {n: v for n, v in one.recording.columns.items() if n in called}
+
+
+def _saying(one: FilesOfTrial, said: str) -> FilesOfTrial:
+    """Files of a trial with a sentence about them, which the first of them has."""
+    (source, first), *others = one.files.items()
+    first = replace(first, said=(*first.said, said))
+    return FilesOfTrial({source: first, **dict(others)}, one.proposal if source else first)
 
 
 def _by_number(names: Sequence[str], place: int) -> tuple[dict[str, dict[str, str]], list[str]]:
@@ -209,28 +231,29 @@ def _are_copies(found: Sequence[_Set]) -> bool:
     return any(all(map(np.array_equal, one, other)) for one, other in pairs if len(one) == len(other))
 
 
-def _are_named(one: Proposal, found: Sequence[_Set]) -> bool:
+def _are_named(one: FilesOfTrial, found: Sequence[_Set]) -> bool:
     """Return whether a word for a trial stands in the names of all sets, or above the first column of each."""
     if all(some.is_called_trial() for some in found):
         return True
-    if one.form is None or one.form.header_row < 2:
+    proposal = one.proposal
+    if proposal.form is None or proposal.form.header_row < 2:
         return False
-    names = one.recording.names
+    form, names = replace(proposal.form, sheet=proposal.sheet or proposal.form.sheet), proposal.recording.names
     firsts = [min(map(names.index, some.names.values())) for some in found]
-    form = replace(one.form, sheet=one.sheet or one.form.sheet)
-    above = form.lines(one.recording.path)[: form.header_row - 1]
-    lines = ([*cells_of(line, form), *[""] * len(names)] for line in above)
+    lines = ([*cells_of(line, form), *[""] * len(names)] for line in form.lines(one.path)[: form.header_row - 1])
     return any(all(set(re.findall(r"[a-z]+", cells[k].lower())) & TRIALS for k in firsts) for cells in lines)
 
 
-def _why(one: Proposal, found: Sequence[_Set]) -> str:
+def _why(one: FilesOfTrial, found: Sequence[_Set]) -> str:
     """Why sets of columns are trials, and not instruments that recorded at once; "" where nothing says so."""
     if _are_named(one, found):
         return "their names say so"
-    ends = [some.ends() for some in found]
-    gap = LONGEST_GAP * max(step for _, _, step in ends)
-    apart = [
-        (abs(a[0] - b[0]) <= gap < abs(a[1] - b[1])) or max(a[0], b[0]) >= min(a[1], b[1])
-        for a, b in combinations(ends, 2)
-    ]
-    return "they begin at once and end apart" if any(apart) else ""
+    pairs = combinations([some.ends() for some in found], 2)
+    return "" if all(map(_end_at_once, *zip(*pairs, strict=True))) else "they begin at once and end apart"
+
+
+def _end_at_once(one: tuple[float, float, float], other: tuple[float, float, float]) -> bool:
+    """Return whether two recordings with these ends and steps may be of one time."""
+    gap = LONGEST_GAP * max(one[2], other[2])
+    is_later = max(one[0], other[0]) >= min(one[1], other[1])
+    return not is_later and (abs(one[0] - other[0]) > gap or abs(one[1] - other[1]) <= gap)

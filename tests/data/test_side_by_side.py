@@ -39,7 +39,7 @@ def wanted(folder, content, *columns, rig="joint", **more):
             (folder / name).write_text(one)
         else:
             pytest.importorskip("python_calamine")
-            from test_sheets import xlsx  # noqa: PLC0415 - which needs it
+            from test_sheets import xlsx
 
             xlsx(folder / name, one)
     believed = HeldFile.holding("p.urdf", pendulum(0.3, 1.0).encode()) if rig == "joint" else None
@@ -217,6 +217,18 @@ def test_numbers_may_go_on_in_another_file(tmp_path):
     study, out = made(tmp_path, files, *said)
     check(study, dict(zip(("a-1", "a-2", "b-1", "b-2"), trials, strict=True)))
     assert 'trial3 = "b.csv"' in out.contents["study.toml"] or 'trial3 = "trials/b.csv"' in out.contents["study.toml"]
+
+
+def test_a_file_of_one_trial_may_be_among_others(tmp_path):
+    time, *both = swing(1)
+    names = "time,{0}_angle,{0}_torque,{1}_angle,{1}_torque"
+    (_, angle, torque), (_, other, effort) = swing(2), swing(3)
+    files = {
+        "a.csv": text([time, *both, angle, torque], names.format("trial1", "trial2")),
+        "b.csv": text([time, other, effort], "time,trial1_angle,trial1_torque"),
+    }
+    study, _ = made(tmp_path, files, UNITS["time_s"], "position=trial1_angle:deg", "effort=trial1_torque:N m")
+    check(study, {"a-1": (time, *both), "a-2": (time, angle, torque), "b": (time, other, effort)})
 
 
 def test_a_file_that_is_said_to_hold_trials_must(tmp_path):
