@@ -296,14 +296,14 @@ class NewColumns:
 
     def said(self, times: Mapping[str, Source]) -> tuple[str, ...]:
         """What is odd about all files, and how they are taken; a sentence of several files once."""
-        by_sentence: dict[str, list[str]] = {}
+        by_sentence: dict[str, dict[str, None]] = {}
         for source, proposal in (one for trial in self.trials for one in trial.files.items()):
             sentences = [*proposal.said]
             if "rate_hz" in times.get(source, {}) and "time_s" not in self.wanted.columns:
                 sentences.append(f"no column of times: {proposal.rate_hz:g} Hz is what the header says")
             for sentence in sentences:
-                by_sentence.setdefault(sentence, []).append(proposal.recording.path.name)
-        return (*(f"{listed(names)}: {sentence}" for sentence, names in by_sentence.items()), *self.assumed)
+                by_sentence.setdefault(sentence, {})[proposal.recording.path.name] = None
+        return (*(f"{listed([*names])}: {sentence}" for sentence, names in by_sentence.items()), *self.assumed)
 
     def text(self, columns: Mapping[str, Source], times: Mapping[str, Source], looked_hz: float | None) -> list[str]:
         """Lines of [columns], or of a table [sources.NAME] for each source."""

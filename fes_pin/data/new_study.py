@@ -132,7 +132,7 @@ class _Making:
         origins = {place: path for path, place in places.items()}
         if self.wanted.urdf is not None:
             origins[files["urdf"]] = self.wanted.urdf
-        return NewStudy(contents, self._taken(columns, times), origins, tuple(said))
+        return NewStudy(contents, self._taken(columns, times), origins, tuple(dict.fromkeys(said)))
 
     def _also_needed(self, columns: Collection[str]) -> tuple[str, ...]:
         """Constants that a study with these columns needs: ends of recruitment, the cut-off of an EMG."""

@@ -20,8 +20,7 @@ from fes_pin.data.new_columns import column_named
 from fes_pin.data.new_recording import Proposal, Renamed, as_seen
 from fes_pin.data.new_view import APART, FilesOfTrial, is_whole, joined
 from fes_pin.data.recorded.form import cells_of
-from fes_pin.data.recorded.parts import without_empty_end
-from fes_pin.data.recorded.regular import LONGEST_GAP
+from fes_pin.data.recorded.parts import end_at_once, ends_of, without_empty_end
 from fes_pin.data.schema import RigSchema
 from fes_pin.data.table import MIN_ROWS
 from fes_pin.data.units import split_header, stated_unit
@@ -72,7 +71,7 @@ class _Set:
         times = [values for name, values in _own(one).items() if name in one.candidates["time_s"]]
         if len(times) != 1:
             return 0.0, float(len(one.recording)), 1.0
-        return float(times[0][0]), float(times[0][-1]), float(np.median(np.abs(np.diff(times[0]))))
+        return ends_of(times[0])
 
     def is_called_trial(self) -> bool:
         """Return whether a word for a trial stands before the number in each name."""
@@ -171,7 +170,9 @@ class SideBySide:
             half_digit_of=lambda n: whole.half_digit_of(names.get(n, n)),
         )
         units = {n: one.units[its] for n, its in names.items() if its in one.units}
-        seen = as_seen(without_empty_end(own, shared), one.form, units, self.schema, self.revolute, one.rate_hz)
+        seen = as_seen(
+            without_empty_end(own, shared), one.form, units, self.schema, self.revolute, one.rate_hz, one.said
+        )
         return replace(seen, sheet=one.sheet, renamed=renamed)
 
     def _is_trial(self, some: _Set, shared: Sequence[str], may_share: bool) -> bool:
@@ -249,11 +250,4 @@ def _why(one: FilesOfTrial, found: Sequence[_Set]) -> str:
     if _are_named(one, found):
         return "their names say so"
     pairs = combinations([some.ends() for some in found], 2)
-    return "" if all(map(_end_at_once, *zip(*pairs, strict=True))) else "they begin at once and end apart"
-
-
-def _end_at_once(one: tuple[float, float, float], other: tuple[float, float, float]) -> bool:
-    """Return whether two recordings with these ends and steps may be of one time."""
-    gap = LONGEST_GAP * max(one[2], other[2])
-    is_later = max(one[0], other[0]) >= min(one[1], other[1])
-    return not is_later and (abs(one[0] - other[0]) > gap or abs(one[1] - other[1]) <= gap)
+    return "" if all(map(end_at_once, *zip(*pairs, strict=True))) else "they begin at once and end apart"

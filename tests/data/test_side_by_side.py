@@ -273,3 +273,64 @@ def test_a_study_by_hand_as_the_format_has_it(tmp_path):
     (time, one, _), (_, other, _) = swing(1), swing(2, 120)
     (tmp_path / "session.csv").write_text(text([time, one, other], "time,angle_1,angle_2"))
     check(read_study(tmp_path), {"session-1": (time, one, None), "session-2": (time[:120], other, None)})
+
+
+def sheets_of_quantities(trials, names=("Angle", "Torque"), head="Trial {}"):
+    """Sheets of a quantity each: the times of the longest trial, then a column a trial."""
+    longest = max((one[0] for one in trials), key=len)
+    heads = ["Time [s]", *(head.format(k) for k in range(1, len(trials) + 1))]
+    sheets = {}
+    for place, name in enumerate(names, 1):
+        columns = [longest, *(one[place] for one in trials)]
+        rows = [[float(c[row]) if row < len(c) else "" for c in columns] for row in range(len(longest))]
+        sheets[name] = [heads, *rows]
+    return sheets
+
+
+NOTES = {"notes": [["measured by"], ["nobody"]]}
+SUMMARY = {"Peak torque": [["trial", "peak"], *[[float(k), 0.1 * k] for k in range(1, 9)]]}
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("counts", [(200,), (200, 200), (150, 200, 90)])
+@pytest.mark.parametrize("more", [{}, NOTES, {**NOTES, **SUMMARY}], ids=["alone", "notes", "summary"])
+def test_one_quantity_a_sheet(tmp_path, seed, counts, more):
+    trials = [swing(10 * seed + k, count) for k, count in enumerate(counts)]
+    sheets = {**sheets_of_quantities(trials), **more}
+    study, out = made(tmp_path, {"a.xlsx": sheets}, "position=angle.Trial 1:deg", "effort=torque.Trial 1:N m")
+    check(study, {f"a-{k}" if len(trials) > 1 else "a": one for k, one in enumerate(trials, 1)})
+    assert any("Angle, Torque of its sheets hold one quantity each" in words for words in out.said)
+
+
+def test_sheets_may_state_the_unit(tmp_path):
+    trials = [swing(1), swing(2)]
+    sheets = sheets_of_quantities(trials, ("Knee angle (deg)", "Torque (Nm)"), "run {}")
+    study, _ = made(tmp_path, {"a.xlsx": sheets, "b.xlsx": sheets_of_quantities(trials[::-1], [*sheets], "run {}")})
+    check(study, dict(zip(("a-1", "a-2", "b-1", "b-2"), [*trials, *trials[::-1]], strict=True)))
+
+
+@pytest.mark.parametrize("names", [("left", "right"), ("Angle 1", "Angle 2"), ("trial 1", "trial 2")])
+def test_sheets_of_the_same_quantity_stay_trials(tmp_path, names):
+    trials = [swing(1), swing(2)]
+    rows = {n: [["Time [s]", "Angle [deg]"], *zip(*one[:2], strict=True)] for n, one in zip(names, trials, strict=True)}
+    study, _ = made(tmp_path, {"a.xlsx": rows})
+    check(study, {f"a-{n}": (*one[:2], None) for n, one in zip(names, trials, strict=True)})
+
+
+@pytest.mark.parametrize("order", [("Angle", "Torque"), ("Torque", "Angle")])
+def test_quantities_of_other_times_are_no_trial(tmp_path, order):
+    both = {"Angle": swing(1)[:2], "Torque": swing(2, 90)[::2]}
+    sheets = {n: [["Time [s]", "value"], *zip(*both[n], strict=True)] for n in order}
+    study, out = made(tmp_path, {"a.xlsx": sheets}, "position=value:deg")
+    check(study, {"a-Angle": (*both["Angle"], None)})
+    assert any("Angle of its 2 sheets is a trial, not Torque" in words for words in out.said)
+
+
+def test_several_files_a_trial_whose_trials_stand_side_by_side(tmp_path):
+    trials = [swing(1), swing(2)]
+    files = {
+        f"s1_{name}.csv": text([trials[0][0], *(one[k] for one in trials)], "Time [s],Trial 1,Trial 2")
+        for k, name in ((1, "angle"), (2, "torque"))
+    }
+    study, _ = made(tmp_path, files, "position=angle.Trial 1:deg", "effort=torque.Trial 1:N m")
+    check(study, {"s1_angle-1": trials[0], "s1_angle-2": trials[1]})
