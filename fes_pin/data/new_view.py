@@ -76,7 +76,7 @@ def grouped_files(proposals: Sequence[Proposal], schema: RigSchema, stated: Mapp
     groups = _stated(tuple(by_path), stated) if stated else _by_name(proposals, schema)
     if not groups:
         return [FilesOfTrial({"": one}, one) for one in proposals]
-    return [joined({source: by_path[path] for source, path in files.items()}, schema) for files in groups]
+    return [files_of_trial({source: by_path[path] for source, path in files.items()}, schema) for files in groups]
 
 
 def _of_sheets(proposals: Sequence[Proposal], schema: RigSchema, stated: Mapping[str, str]) -> list[FilesOfTrial]:
@@ -86,7 +86,7 @@ def _of_sheets(proposals: Sequence[Proposal], schema: RigSchema, stated: Mapping
         found[one.recording.path, one.sheet][one.source] = one
     if stated:
         raise InputError("expected none of a workbook that holds one quantity a sheet", column="--source")
-    return [FilesOfTrial(f, f[""]) if "" in f else joined(f, schema) for f in found.values()]
+    return [FilesOfTrial(f, f[""]) if "" in f else files_of_trial(f, schema) for f in found.values()]
 
 
 def _with_time(proposal: Proposal) -> Proposal:
@@ -150,7 +150,7 @@ def is_whole(found: frozenset[str], schema: RigSchema) -> bool:
     return is_moved and any(needed <= found for needed in kinds)
 
 
-def joined(files: Mapping[str, Proposal], schema: RigSchema) -> FilesOfTrial:
+def files_of_trial(files: Mapping[str, Proposal], schema: RigSchema) -> FilesOfTrial:
     """Several files as those of one trial, by their sources.
 
     Raises

@@ -18,7 +18,7 @@ import numpy as np
 from fes_pin.data.errors import InputError, listed
 from fes_pin.data.new_columns import column_named
 from fes_pin.data.new_recording import Proposal, Renamed, as_seen
-from fes_pin.data.new_view import APART, FilesOfTrial, is_whole, joined
+from fes_pin.data.new_view import APART, FilesOfTrial, files_of_trial, is_whole
 from fes_pin.data.recorded.form import cells_of
 from fes_pin.data.recorded.parts import end_at_once, ends_of, without_empty_end
 from fes_pin.data.schema import RigSchema
@@ -158,7 +158,7 @@ class SideBySide:
             }
             also = [n.removeprefix(before) for n in shared if n.startswith(before)]
             files[source] = self._of_file(proposal, Renamed(table, its, proposal.recording.names), also)
-        return FilesOfTrial(files, files[""]) if "" in files else joined(files, self.schema)
+        return FilesOfTrial(files, files[""]) if "" in files else files_of_trial(files, self.schema)
 
     def _of_file(self, one: Proposal, renamed: Renamed, shared: Sequence[str]) -> Proposal:
         """What some columns of a file seem to hold, down to the last sample of those that are not shared."""

@@ -266,7 +266,7 @@ def test_sheets_whose_trials_stand_side_by_side(tmp_path, heads):
 
 def test_a_study_by_hand_as_the_format_has_it(tmp_path):
     page = (Path(__file__).parents[2] / "docs/study_format.md").read_text()
-    block = page[page.index("[sources.trial1]") : page.index("No two of them may read")].partition("```")[0]
+    block = page[page.index("[sources.trial1]") :].partition("```")[0]
     (tmp_path / "p.urdf").write_text(pendulum(0.3, 1.0))
     head = '[study]\nname = "a"\nrig = "joint"\n[rig]\nurdf = "p.urdf"\n[start]\ninertia_scale = 1.0\ndamping = 0.01\n'
     (tmp_path / "study.toml").write_text(head + block)
@@ -300,6 +300,11 @@ def test_one_quantity_a_sheet(tmp_path, seed, counts, more):
     study, out = made(tmp_path, {"a.xlsx": sheets}, "position=angle.Trial 1:deg", "effort=torque.Trial 1:N m")
     check(study, {f"a-{k}" if len(trials) > 1 else "a": one for k, one in enumerate(trials, 1)})
     assert any("Angle, Torque of its sheets hold one quantity each" in words for words in out.said)
+    text = (tmp_path / "s/study.toml").read_text()
+    for wrong, why in (("3", "expected the name of a sheet"), ('"Speed"', "expected one of its sheets, Angle, Torque")):
+        (tmp_path / "s/study.toml").write_text(text.replace('sheet = "Torque"', f"sheet = {wrong}", 1))
+        with pytest.raises(InputError, match=why):
+            read_study(tmp_path / "s")
 
 
 def test_sheets_may_state_the_unit(tmp_path):
@@ -334,3 +339,14 @@ def test_several_files_a_trial_whose_trials_stand_side_by_side(tmp_path):
     }
     study, _ = made(tmp_path, files, "position=angle.Trial 1:deg", "effort=torque.Trial 1:N m")
     check(study, {"s1_angle-1": trials[0], "s1_angle-2": trials[1]})
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("count", [1, 3])
+def test_sheets_whose_columns_say_the_quantity(tmp_path, seed, count):
+    trials = [swing(10 * seed + k) for k in range(count)]
+    sheets = sheets_of_quantities(trials, ("Sheet1", "Sheet2"))
+    for sheet, name in (("Sheet1", "Angle {} [deg]"), ("Sheet2", "Torque {} [Nm]")):
+        sheets[sheet][0] = ["Time [s]", *(name.format(f"trial {k}") for k in range(1, count + 1))]
+    study, _ = made(tmp_path, {"a.xlsx": sheets})
+    check(study, {f"a-{k}" if count > 1 else "a": one for k, one in enumerate(trials, 1)})
