@@ -145,8 +145,10 @@ class SideBySide:
             called = {first[k]: name for k, name in names.items()}
             found.append(_Set(number, names, frozenset(called), self._seen(one, f"trial{trial}", called, shared)))
         may_share = self.split == COLUMNS or _are_named(one, found)
-        is_one = any(len(some.trial.proposal.recording) < MIN_ROWS for some in found) or _are_copies(found)
-        return [] if is_one or not all(self._is_trial(some, shared, may_share) for some in found) else found
+        if any(len(some.trial.proposal.recording) < MIN_ROWS for some in found):
+            return []
+        are_trials = all(self._is_trial(some, shared, may_share) for some in found)
+        return found if are_trials and not _are_copies(found) else []
 
     def _seen(self, one: FilesOfTrial, trial: str, called: Mapping[str, str], shared: Sequence[str]) -> FilesOfTrial:
         """What the columns of a set and those that all share seem to hold, by the names of the first set."""

@@ -350,3 +350,18 @@ def test_sheets_whose_columns_say_the_quantity(tmp_path, seed, count):
         sheets[sheet][0] = ["Time [s]", *(name.format(f"trial {k}") for k in range(1, count + 1))]
     study, _ = made(tmp_path, {"a.xlsx": sheets})
     check(study, {f"a-{k}" if count > 1 else "a": one for k, one in enumerate(trials, 1)})
+
+
+def test_all_trials_may_be_of_one_sheet(tmp_path):
+    trials = {name: swing(seed) for seed, name in enumerate(("one", "two", "three"))}
+    sheets = {n: [["t", "Angle [deg]"], *zip(*one[:2], strict=True)] for n, one in trials.items()}
+    wanted(tmp_path, {"a.xlsx": sheets})
+    (tmp_path / "p.urdf").write_text(pendulum(0.3, 1.0))
+    head = '[study]\nname = "a"\nrig = "joint"\n[rig]\nurdf = "p.urdf"\n[start]\ninertia_scale = 1.0\ndamping = 0.01\n'
+    own = '[columns]\ntime_s = "t"\nposition = { name = "Angle [deg]", unit = "deg" }\n[columns.file]\nsheet = "two"\n'
+    each = '[[trial]]\nfile = "a.xlsx"\n[[trial]]\nfile = "a.xlsx"\nsheet = "three"\n'
+    (tmp_path / "study.toml").write_text(head + own + each)
+    check(read_study(tmp_path), {"a": (*trials["two"][:2], None), "a-three": (*trials["three"][:2], None)})
+    (tmp_path / "study.toml").write_text(head + own + each.replace("three", "two"))
+    with pytest.raises(InputError, match="the same file as"):
+        read_study(tmp_path)
