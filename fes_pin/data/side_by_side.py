@@ -74,10 +74,13 @@ class _Set:
         return ends_of(times[0])
 
     def is_called_trial(self) -> bool:
-        """Return whether a word for a trial stands before the number in each name."""
-        before = rf"([A-Z]+|[A-Z]?[a-z]+)[^A-Za-z0-9]*{self.number}(?!\d)"
-        words = [{w.lower() for w in re.findall(before, name)} for name in self.names.values()]
-        return bool(self.number) and all(some & TRIALS for some in words)
+        """Return whether a word for a trial stands before the number in each name that holds it."""
+        names = [re.sub(r"#\d+$", "", name) for name in self.names.values()]
+        before = rf"([A-Z]+|[A-Z]?[a-z]+)[^A-Za-z0-9]*0*{self.number}(?!\d)"
+        words = [
+            [w.lower() for w in re.findall(before, n)] for n in names if re.search(rf"(?<!\d)0*{self.number}(?!\d)", n)
+        ]
+        return bool(self.number and words) and all(TRIALS.intersection(some) for some in words)
 
 
 class SideBySide:
@@ -202,8 +205,10 @@ def _saying(one: FilesOfTrial, said: str) -> FilesOfTrial:
 def _by_number(names: Sequence[str], place: int) -> tuple[dict[str, dict[str, str]], list[str]]:
     """By number, and by the words without it, names of which there are the same of each number; and all others."""
     found: dict[str, dict[str, str]] = defaultdict(dict)
+    again = {name.rpartition("#")[0] for name in names if re.search(r"#\d+$", name)}
     for name in names:
         number, rest = _apart(name, place)
+        number = number or "1" * (name in again)
         if rest in found[number]:
             return {}, []
         found[number][rest] = name
@@ -217,15 +222,16 @@ def _by_number(names: Sequence[str], place: int) -> tuple[dict[str, dict[str, st
 
 
 def _apart(name: str, place: int) -> tuple[str, str]:
-    """The number at a place in a name, "" of one without, and the words that are left, with the unit."""
+    """The number at a place in a name, "" of one without, and its other words, with the unit."""
+    again = re.match(r"(.+)#(\d+)$", name)
+    base, number = (again[1], again[2]) if again else (name, "")
     if place == AGAIN:
-        again = re.match(r"(.+)#(\d+)$", name)
-        return (again[2], again[1]) if again else ("", name)
-    bare, unit = split_header(name) if stated_unit(name)[0] else (name, "")
+        return number, base
+    bare, unit = split_header(base) if stated_unit(base)[0] else (base, "")
     found = [*re.finditer(r"\d+", bare)][place : place + 1]
     rest = f"{bare[: found[0].start()]} {bare[found[0].end() :]}" if found else bare
     words = re.findall(r"[^\W_]+", rest.lower())
-    return found[0][0] if found and words else "", " ".join([*words, unit])
+    return str(int(found[0][0])) if found and words else number, " ".join([*words, unit.lower()]).strip()
 
 
 def _are_copies(found: Sequence[_Set]) -> bool:

@@ -13,7 +13,7 @@ from fes_pin.data.study import read_study
 from fes_pin.data.templates import pendulum
 from fes_pin.data.wanted import Wanted
 
-SEEDS = range(5)
+SEEDS = range(3)
 UNITS = {"time_s": "time_s=time:s", "position": "position={}:deg", "effort": "effort={}:N m"}
 REPEATED = "Time [s],Angle [deg],Torque [Nm]"
 
@@ -365,3 +365,28 @@ def test_all_trials_may_be_of_one_sheet(tmp_path):
     (tmp_path / "study.toml").write_text(head + own + each.replace("three", "two"))
     with pytest.raises(InputError, match="the same file as"):
         read_study(tmp_path)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("counts", [(200, 200, 200), (200, 90, 140)])
+@pytest.mark.parametrize("form", ["Trial {}: {}", "{1} run {0:02}", "{1} {0}"])
+def test_times_that_are_repeated_next_to_numbers(tmp_path, seed, counts, form):
+    trials = [swing(10 * seed + k, count) for k, count in enumerate(counts)]
+    names = [n for k in (1, 2, 3) for n in ("Time [s]", form.format(k, "Angle"), form.format(k, "Torque"))]
+    content = text([c for one in trials for c in one], ",".join(names))
+    said = [UNITS["position"].format(names[1]), UNITS["effort"].format(names[2])]
+    if form == "{1} {0}" and len({*counts}) == 1:
+        assert "may be 3 trials side by side or 3 instruments" in refused(tmp_path, content)
+        said = [*said, "time_s=Time [s]"]
+    study, _ = made(tmp_path, content, *said, split="columns" if form == "{1} {0}" else None)
+    check(study, {f"a-{k}": one for k, one in enumerate(trials, 1)})
+
+
+@pytest.mark.parametrize("form", ["{}.{}", "{}{}", "{}_{}"])
+@pytest.mark.parametrize("names", [("Time [s]", "Angle [deg]", "Torque [Nm]"), ("time_s", "position", "effort")])
+def test_repeated_names_that_a_program_has_numbered(tmp_path, form, names):
+    trials = [swing(k, count) for k, count in enumerate((200, 120, 160))]
+    every = [n if k == 0 else form.format(n, k + ("." not in form)) for k in range(3) for n in names]
+    said = ["position=position:deg"] if "position" in names else []
+    study, _ = made(tmp_path, text([c for one in trials for c in one], ",".join(every)), *said)
+    check(study, {f"a-{k}": one for k, one in enumerate(trials, 1)})
