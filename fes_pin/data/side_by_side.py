@@ -258,4 +258,4 @@ def _why(one: FilesOfTrial, found: Sequence[_Set]) -> str:
     if _are_named(one, found):
         return "their names say so"
     pairs = combinations([some.ends() for some in found], 2)
-    return "" if all(map(end_at_once, *zip(*pairs, strict=True))) else "they begin at once and end apart"
+    return "" if all(map(end_at_once, *zip(*pairs, strict=True))) else "they do not end at once"

@@ -120,7 +120,7 @@ def test_sets_that_end_apart_are_trials(tmp_path, seed, names, has_times):
     said = [f"time_s={flat[0][0]}:s", UNITS["position"].format(own[0][1]), UNITS["effort"].format(own[0][2])]
     study, out = made(tmp_path, text([c for _, c in flat], ",".join(n for n, _ in flat)), *said)
     check(study, {f"a-{k}": one for k, one in enumerate(trials, 1)})
-    assert any("they begin at once and end apart" in words for words in out.said)
+    assert any("they do not end at once" in words for words in out.said)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -390,3 +390,19 @@ def test_repeated_names_that_a_program_has_numbered(tmp_path, form, names):
     said = ["position=position:deg"] if "position" in names else []
     study, _ = made(tmp_path, text([c for one in trials for c in one], ",".join(every)), *said)
     check(study, {f"a-{k}": one for k, one in enumerate(trials, 1)})
+
+
+@pytest.mark.parametrize("later", [3.0, 60.0])
+def test_a_clock_that_goes_on_parts_trials(tmp_path, later):
+    one, (time, *both) = swing(1), swing(2)
+    content = text([*one, np.round(time + later, 6), *both], "time_1,angle_1,torque_1,time_2,angle_2,torque_2")
+    said = ("time_s=time_1:s", "position=angle_1:deg", "effort=torque_1:N m")
+    study, out = made(tmp_path, content, *said)
+    check(study, {"a-1": one, "a-2": (np.round(time + later, 6), *both)})
+    assert any("they do not end at once" in words for words in out.said)
+
+
+def test_clocks_that_overlap_are_of_instruments(tmp_path):
+    one, (time, *both) = swing(1), swing(2)
+    content = text([*one, np.round(time + 0.3, 6), *both], "time_1,angle_1,torque_1,time_2,angle_2,torque_2")
+    assert "or 2 instruments at once" in refused(tmp_path, content)
