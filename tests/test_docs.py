@@ -180,7 +180,7 @@ def test_the_page_of_own_recordings_has_every_option_of_new_study():
 
 
 def test_the_study_format_shows_toml():
-    first, own, view, walking, conventions = blocks("study_format.md", "toml")
+    first, own, view, side_by_side, walking, conventions = blocks("study_format.md", "toml")
     read = columns_of(tomllib.loads(own)["columns"], known_rigs()["joint"], True, AssertionError)
     assert set(tomllib.loads(own)["columns"]["file"]) == set(FILE_KEYS)
     assert read.sources["position"](np.array([90.0, 0.0])).tolist() == pytest.approx([0.0, np.pi / 2])
@@ -189,6 +189,7 @@ def test_the_study_format_shows_toml():
     assert tomllib.loads(first)["trial"][0]["role"] == "fit"
     shown = {key for table in tomllib.loads(view)["trial"] for key in table}
     assert {"from", "to", "split", "rate", "sources", "offset_s", "derive"} <= shown
+    assert {key for t in tomllib.loads(side_by_side)["trial"] for key in t["sources"]} == {"trial1", "trial2"}
     shown = tomllib.loads(conventions)["conventions"]
     assert shown == {**STANDARD, MOMENTS_ON: "foot"} and checked_conventions(shown, AssertionError) == shown
     assert set(tomllib.loads(walking)["trial"][0]) <= {"coordinates", "ground_reaction", "belt_speed_mps"}

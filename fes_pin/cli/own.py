@@ -88,7 +88,8 @@ def new_study(
         list[str] | None, typer.Option(help="Added to the times of a source, s: force=0.004, or force=fit.")
     ] = None,
     split: Annotated[
-        str | None, typer.Option(help="Several trials a file: restarts, holes, rests, a column that changes; or none.")
+        str | None,
+        typer.Option(help="Several trials a file: restarts, holes, rests, a column that changes, columns; or none."),
     ] = None,
     fill: Annotated[bool, typer.Option("--fill", help="Fill in short gaps of missing samples.")] = False,
     names: Annotated[str | None, typer.Option(help="Of the columns of text files: t,angle,torque.")] = None,

@@ -123,7 +123,7 @@ class NewColumns:
     def _time_of(self, source: str) -> Source | None:
         seen = Seen([one.files[source] for one in self.trials])
         option = self.wanted.columns.get("time_s")
-        if option is not None and (not source or option.startswith("rate=") or _named(option, seen.names)):
+        if option is not None and (not source or option.startswith("rate=") or column_named(option, seen.names)):
             return self.stated("time_s", option, seen)
         rates = {p.rate_hz for p in seen.proposals}
         if not seen.could_be("time_s") and len(rates) == 1 and None not in rates:
@@ -148,7 +148,7 @@ class NewColumns:
     def _values(self, column: str) -> np.ndarray:
         """What the files hold of one of the rig's columns, as they have it; empty where that is not known."""
         said = self.wanted.columns.get(column)
-        names = self._could_be(column) if said is None else _named(said, self.seen.names)
+        names = self._could_be(column) if said is None else column_named(said, self.seen.names)
         return self.seen.values(names[0]) if len(names) == 1 else np.zeros(0)
 
     def channel(self, sources: Collection[str]) -> Channel | None:
@@ -172,7 +172,7 @@ class NewColumns:
     def _could_be(self, column: str) -> tuple[str, ...]:
         """Columns of the files that could be this one, without those that a person named for another."""
         others = [words for other, words in self.wanted.columns.items() if other != column]
-        taken = {name for words in others for name in _named(words, self.seen.names)}
+        taken = {name for words in others for name in column_named(words, self.seen.names)}
         return tuple(n for n in self.seen.could_be(column) if n not in taken)
 
     def _source(self, column: str, is_needed: bool) -> Source | None:
@@ -207,7 +207,7 @@ class NewColumns:
     def _free(self, column: str, seen: Seen) -> dict[str, str]:
         """All columns, in words with their units, but for those that another of the rig's takes; all where none is."""
         others = [c for c in (*self.schema.columns, "time_s") if c != column]
-        said = {n for c in others for n in _named(self.wanted.columns.get(c, ""), seen.names)}
+        said = {n for c in others for n in column_named(self.wanted.columns.get(c, ""), seen.names)}
         alone = {names[0] for c in others if len(names := seen.could_be(c)) == 1}
         every = dict(zip(seen.names, seen.with_units(), strict=True))
         return {name: words for name, words in every.items() if name not in said | alone} or every
@@ -296,14 +296,14 @@ class NewColumns:
 
     def said(self, times: Mapping[str, Source]) -> tuple[str, ...]:
         """What is odd about all files, and how they are taken; a sentence of several files once."""
-        by_sentence: dict[str, list[str]] = {}
+        by_sentence: dict[str, dict[str, None]] = {}
         for source, proposal in (one for trial in self.trials for one in trial.files.items()):
             sentences = [*proposal.said]
             if "rate_hz" in times.get(source, {}) and "time_s" not in self.wanted.columns:
                 sentences.append(f"no column of times: {proposal.rate_hz:g} Hz is what the header says")
             for sentence in sentences:
-                by_sentence.setdefault(sentence, []).append(proposal.recording.path.name)
-        return (*(f"{listed(names)}: {sentence}" for sentence, names in by_sentence.items()), *self.assumed)
+                by_sentence.setdefault(sentence, {})[proposal.recording.path.name] = None
+        return (*(f"{listed([*names])}: {sentence}" for sentence, names in by_sentence.items()), *self.assumed)
 
     def text(self, columns: Mapping[str, Source], times: Mapping[str, Source], looked_hz: float | None) -> list[str]:
         """Lines of [columns], or of a table [sources.NAME] for each source."""
@@ -315,8 +315,21 @@ class NewColumns:
             its = {c: s for c, s in columns.items() if str(s.get("name", "")).startswith(before)}
             own = {"time_s": time, **{c: {**s, "name": s["name"].removeprefix(before)} for c, s in its.items()}}
             names = [n.removeprefix(before) for n in self.seen.names if n.startswith(before)]
-            lines += columns_text(own, names, self._one_form(source), options, where, is_plain)
+            form = self._one_form(source)
+            for table, (called, every) in self._side_by_side(source).items():
+                its = {c: {**s, "name": called[s["name"]]} if s.get("name") in called else s for c, s in own.items()}
+                lines += columns_text(its, [*every], form, options, f"sources.{table}")
+            if any(one.files[source].renamed is None for one in self.trials):
+                lines += columns_text(own, names, form, options, where, is_plain)
         return lines
+
+    def _side_by_side(self, source: str) -> dict[str, tuple[Mapping[str, str], dict[str, None]]]:
+        """By the table of each trial that stands next to others the names of its columns, and all of its files."""
+        out: dict[str, tuple[Mapping[str, str], dict[str, None]]] = {}
+        for renamed in (p.renamed for one in self.trials if (p := one.files[source]).renamed is not None):
+            _, every = out.get(renamed.name, ({}, {}))
+            out[renamed.name] = renamed.called, every | dict.fromkeys(renamed.names)
+        return out
 
     def _one_form(self, source: str) -> TextForm | None:
         forms = {p.form: p for p in (one.files[source] for one in self.trials)}
@@ -329,7 +342,7 @@ class NewColumns:
         return next(iter(forms))
 
 
-def _named(words: str, names: Sequence[str]) -> tuple[str, ...]:
+def column_named(words: str, names: Sequence[str]) -> tuple[str, ...]:
     """The column that an option names, `NAME[:UNIT][,key=number ...]`: at most one."""
     found = [n for n in names if words == n or words.startswith((f"{n}:", f"{n},"))]
     return (max(found, key=len),) if found else ()

@@ -20,6 +20,7 @@ from fes_pin.data.errors import InputError, listed
 from fes_pin.data.recorded.form import TextForm
 from fes_pin.data.recorded.formats import by_length, is_nested, is_text, read_recording
 from fes_pin.data.recorded.header import Header
+from fes_pin.data.recorded.parts import Ends, end_at_once, ends_of
 from fes_pin.data.recorded.sheets import is_spreadsheet, sheets_of
 from fes_pin.data.recorded.sniff import sniffed
 from fes_pin.data.recorded.text import read_text_recording
@@ -35,6 +36,25 @@ WANTED = frozenset(
 OTHERS = frozenset({"acc", "accel", "acceleration", "temp", "temperature", "temperatur", "efficiency", "power"})
 """Words for quantities that no rig reads."""
 _NUMBERED = re.compile(r"([a-z]{3,})\d+$")
+
+
+@dataclass(frozen=True)
+class Renamed:
+    """The columns of a trial among others that stand next to it.
+
+    Parameters
+    ----------
+    name
+        Of the table of sources that says how they are read.
+    called
+        The file's names of them, by those of the first trial.
+    names
+        All columns of the file.
+    """
+
+    name: str
+    called: Mapping[str, str]
+    names: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -57,6 +77,10 @@ class Proposal:
         What is odd about the file and how it is taken, a sentence each.
     sheet
         Of a spreadsheet that has several.
+    source
+        What the sheet is called as a source of a trial, where each sheet holds one quantity of it.
+    renamed
+        Of a trial with others next to it in the columns of one file; None of others.
     """
 
     recording: Table
@@ -66,14 +90,16 @@ class Proposal:
     rate_hz: float | None = None
     said: tuple[str, ...] = ()
     sheet: str = ""
+    source: str = ""
+    renamed: Renamed | None = None
 
 
 def proposals_of(
     path: Path, schema: RigSchema, revolute: bool | None, stated: Mapping[str, Any], chosen: Collection[str] = ()
 ) -> list[Proposal]:
-    """What the recordings in a file seem to hold, as `propose`: one, or the sheets of a spreadsheet that are alike.
+    """What the recordings in a file seem to hold, as `propose`: one, or sheets of a spreadsheet.
 
-    Of sheets with other columns those with most rows are taken.
+    Sheets may hold one quantity each of the same trials, and be alike. Of others those with most rows are taken.
 
     Raises
     ------
@@ -89,9 +115,11 @@ def proposals_of(
     for sheet in sheets:
         with suppress(InputError):  # a title page, a drawing
             one = _of_sheet(propose(path, schema, revolute, {**stated, "sheet": sheet}, chosen), sheet)
-            alike[one.recording.names, one.form].append(one)
+            alike[one.recording.names, one.form, quantities_held(one, words_of(sheet), schema)].append(one)
     if not alike:
         raise InputError(f"expected rows of numbers in one of its sheets, {listed(sheets)}", file=path)
+    if apart := _one_quantity_each([one for some in alike.values() for one in some], schema):
+        return apart
     taken = max(alike.values(), key=lambda some: sum(len(one.recording) for one in some))
     names, form = [one.sheet for one in taken], taken[0].form or TextForm()
     if names[1:] and not form.names and not form.header_row:
@@ -101,6 +129,42 @@ def proposals_of(
     words = f"{path.name}: {listed(names)} of its {len(sheets)} sheets {'are trials' if names[1:] else 'is a trial'}"
     said = words + (f", not {listed(left)}: without numbers, or with other columns" if left else "")
     return [replace(taken[0], said=(*taken[0].said, said)), *taken[1:]]
+
+
+def _one_quantity_each(sheets: Sequence[Proposal], schema: RigSchema) -> list[Proposal]:
+    """Sheets that hold different quantities of what was recorded at once, as sources of a trial; none of others."""
+    longest = max(sheets, key=lambda one: len(one.recording))
+    held = {one.sheet: quantities_held(one, words_of(one.sheet), schema) for one in sheets}
+    found = [one for one in sheets if held[one.sheet] and end_at_once(_ends(one), _ends(longest))]
+    if len(found) < 2 or sum(len(held[one.sheet]) for one in found) > len(
+        {c for one in found for c in held[one.sheet]}
+    ):
+        return []
+    out: dict[str, Proposal] = {}
+    for place, one in enumerate(found, 1):
+        meant = sorted(words_of(one.sheet) & {w for c in held[one.sheet] for w in MEANT.get(c, ())})
+        source = next((word for word in meant if word not in out), f"sheet{place}")
+        form, unit = replace(one.form or TextForm(), sheet=one.sheet), split_header(one.sheet)[1]
+        time = one.candidates["time_s"]
+        units = {n: u or (unit if n not in time else "") for n, u in one.units.items()}
+        out[source] = replace(one, form=form, sheet="", source=source, units=units)
+    left = [one.sheet for one in sheets if one not in found]
+    first, *others = out.values()
+    said = f"{listed([one.sheet for one in found])} of its sheets hold one quantity each of what was recorded at once"
+    return [replace(first, said=(*first.said, said + (f", not {listed(left)}" if left else ""))), *others]
+
+
+def quantities_held(proposal: Proposal, of_name: Collection[str], schema: RigSchema) -> frozenset[str]:
+    """The rig's columns that a file seems to hold, by the names of its columns, else by the words of its own."""
+    found = {n for n, names in proposal.candidates.items() if names and n != "time_s"}
+    return frozenset(found or {n for n in schema.columns if MEANT.get(n, frozenset()) & set(of_name)})
+
+
+def _ends(one: Proposal) -> Ends:
+    """Ends of a recording in its first column of times, in rows where it has none."""
+    times = (one.recording.columns[n] for n in one.candidates["time_s"])
+    known = [time[np.isfinite(time)] for time in times if np.isfinite(time).sum() > 1]
+    return ends_of(known[0] if known else np.arange(float(len(one.recording))))
 
 
 def _of_sheet(one: Proposal, sheet: str) -> Proposal:
@@ -138,7 +202,20 @@ def propose(
         names, said = by_length(path, chosen) if is_nested(path) else (None, ())
         recording, header = read_recording(path, wanted=names), Header(said=said)
         units = {}
-    units = {**recording.units, **units}
+    return as_seen(recording, form, {**recording.units, **units}, schema, revolute, header.rate_hz, header.said)
+
+
+def as_seen(
+    recording: Table,
+    form: TextForm | None,
+    stated: Mapping[str, str],
+    schema: RigSchema,
+    revolute: bool | None,
+    rate_hz: float | None,
+    said: tuple[str, ...] = (),
+) -> Proposal:
+    """What columns of numbers seem to hold for a rig, by their names and the units that are stated apart from these."""
+    units = dict(stated)
     for name in recording.columns:
         units.setdefault(name, split_header(name)[1])
     named = {c: tuple(_candidates(c, recording.columns, units, revolute)) for c in schema.columns}
@@ -153,7 +230,7 @@ def propose(
         taken = {name for found in candidates.values() for name in found}
         candidates |= {c: tuple(n for n in found if n not in taken) for c, found in either.items()}
     candidates = {c: _readings(c, _without_copies(found, recording)) for c, found in candidates.items()}
-    return Proposal(recording, form, _without_doubles(candidates), units, header.rate_hz, header.said)
+    return Proposal(recording, form, _without_doubles(candidates), units, rate_hz, said)
 
 
 def _without_copies(names: Sequence[str], recording: Table) -> tuple[str, ...]:

@@ -18,6 +18,7 @@ from fes_pin.data.new_columns import NewColumns, Source
 from fes_pin.data.new_recording import Proposal, proposals_of
 from fes_pin.data.new_view import FilesOfTrial, WantedView, grouped_files, trial_view
 from fes_pin.data.schema import NumberKey, any_number, one_of, unknown
+from fes_pin.data.side_by_side import COLUMNS, SideBySide
 from fes_pin.data.study_text import HEADER, source_in_words, toml_table
 from fes_pin.data.wanted import Wanted, labels_of, number_set, of_files
 
@@ -91,7 +92,9 @@ class _Making:
         chosen = tuple(wanted.columns.values())
         found = [proposals_of(p, self.schema, wanted.revolute, wanted.form, chosen) for p in wanted.files]
         each = [one for some in found for one in some]
-        self.trials = grouped_files(each, self.schema, wanted.sources)
+        apart = SideBySide(self.schema, wanted.revolute, wanted.split, chosen)
+        grouped = grouped_files(each, self.schema, wanted.sources)
+        self.trials = [trial for files in grouped for trial in apart.trials(files)]
         self.columns = NewColumns(wanted, self.trials, self.missing)
 
     def made(self, guess: Guess) -> NewStudy | None:
@@ -129,7 +132,7 @@ class _Making:
         origins = {place: path for path, place in places.items()}
         if self.wanted.urdf is not None:
             origins[files["urdf"]] = self.wanted.urdf
-        return NewStudy(contents, self._taken(columns, times), origins, tuple(said))
+        return NewStudy(contents, self._taken(columns, times), origins, tuple(dict.fromkeys(said)))
 
     def _also_needed(self, columns: Collection[str]) -> tuple[str, ...]:
         """Constants that a study with these columns needs: ends of recruitment, the cut-off of an EMG."""
@@ -144,7 +147,8 @@ class _Making:
 
     def _trial_keys(self, one: FilesOfTrial, files: Mapping[str, str], kind: str) -> dict[str, Any]:
         """Its files, its kind where that is not open, and its labels."""
-        whole = {"sources": files} if one.is_joined else {"file": files[""]}
+        sources = {p.renamed.name if p.renamed else source: files[source] for source, p in one.files.items()}
+        whole: dict[str, Any] = {"sources": sources} if "" not in sources else {"file": files[""]}
         known = {"sheet": one.proposal.sheet} if one.proposal.sheet else {}
         known |= {} if self._is_open(one.proposal, kind) else {"kind": kind}
         return {**whole, **known, **labels_of(self.wanted, *(p.recording.path for p in one.files.values()))}
@@ -158,7 +162,8 @@ class _Making:
         """What a person said of the part of a recording that a trial is."""
         texts = {key: self.own.get((path, key)) or self.wanted.settings.get(key) for key in ("from", "to")}
         ends = {key: number_set(key, text, any_number("s", False)) for key, text in texts.items() if text is not None}
-        split = self.wanted.split if self.wanted.split is not None or not looked_hz else "none"  # rows come with events
+        split = None if self.wanted.split == COLUMNS else self.wanted.split
+        split = "none" if split is None and looked_hz else split  # rows come with events
         rate_hz, derived = self.wanted.resample_hz, self.columns.derived
         return WantedView(ends, split, self.wanted.offsets, rate_hz, derived, is_regular=bool(rate_hz or looked_hz))
 

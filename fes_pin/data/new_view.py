@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from fes_pin.data.errors import InputError
-from fes_pin.data.new_recording import Proposal
+from fes_pin.data.new_recording import Proposal, quantities_held
 from fes_pin.data.numbers import number_in
 from fes_pin.data.recorded.free_part import free_from
 from fes_pin.data.recorded.parts import HOLES, RESTARTS, holes, restarts
@@ -70,11 +70,23 @@ def grouped_files(proposals: Sequence[Proposal], schema: RigSchema, stated: Mapp
         A pattern of no file, a file of no pattern, trials that do not have a file of each source.
     """
     proposals = [_with_time(one) for one in proposals]
+    if any(one.source for one in proposals):
+        return _of_sheets(proposals, schema, stated)
     by_path = {one.recording.path: one for one in proposals}
     groups = _stated(tuple(by_path), stated) if stated else _by_name(proposals, schema)
     if not groups:
         return [FilesOfTrial({"": one}, one) for one in proposals]
-    return [_joined({source: by_path[path] for source, path in files.items()}, schema) for files in groups]
+    return [files_of_trial({source: by_path[path] for source, path in files.items()}, schema) for files in groups]
+
+
+def _of_sheets(proposals: Sequence[Proposal], schema: RigSchema, stated: Mapping[str, str]) -> list[FilesOfTrial]:
+    """Trials of which workbooks hold a quantity a sheet, and those of other files."""
+    found: dict[tuple[Path, str], dict[str, Proposal]] = defaultdict(dict)
+    for one in proposals:
+        found[one.recording.path, one.sheet][one.source] = one
+    if stated:
+        raise InputError("expected none of a workbook that holds one quantity a sheet", column="--source")
+    return [FilesOfTrial(f, f[""]) if "" in f else files_of_trial(f, schema) for f in found.values()]
 
 
 def _with_time(proposal: Proposal) -> Proposal:
@@ -112,8 +124,8 @@ def _by_name(proposals: Sequence[Proposal], schema: RigSchema) -> list[dict[str,
     """Files by trial and source, as their names show; none where each is a trial of its own."""
     paths = [one.recording.path for one in proposals]
     words = [re.findall(r"[a-z]+|\d+|[^a-z\d]+", path.stem.lower()) for path in paths]
-    found = {_quantities(one, some, schema) for one, some in zip(proposals, words, strict=True)}
-    alike = len(found) == 1 or all(_is_whole(one, schema) for one in found)
+    found = {quantities_held(one, some, schema) for one, some in zip(proposals, words, strict=True)}
+    alike = len(found) == 1 or all(is_whole(one, schema) for one in found)
     if alike or len({len(some) for some in words}) > 1:
         return []
     return next((trials for k in range(len(words[0])) if (trials := _apart_in(k, paths, words))), [])
@@ -130,13 +142,7 @@ def _apart_in(place: int, paths: Sequence[Path], words: Sequence[Sequence[str]])
     return [*trials.values()] if is_apart else []
 
 
-def _quantities(proposal: Proposal, of_name: Sequence[str], schema: RigSchema) -> frozenset[str]:
-    """The rig's columns that a file seems to hold, by the names of its columns, else by its own."""
-    found = {n for n, names in proposal.candidates.items() if names and n != "time_s"}
-    return frozenset(found or {n for n in schema.columns if MEANT.get(n, frozenset()) & set(of_name)})
-
-
-def _is_whole(found: frozenset[str], schema: RigSchema) -> bool:
+def is_whole(found: frozenset[str], schema: RigSchema) -> bool:
     """Return whether a file with these columns is a trial by itself."""
     found |= {n for n, source in INTEGRATED.items() if source in found}
     kinds = ({schema.outputs[kind], *schema.motion(kind)[:1]} for kind in schema.outputs)
@@ -144,7 +150,14 @@ def _is_whole(found: frozenset[str], schema: RigSchema) -> bool:
     return is_moved and any(needed <= found for needed in kinds)
 
 
-def _joined(files: Mapping[str, Proposal], schema: RigSchema) -> FilesOfTrial:
+def files_of_trial(files: Mapping[str, Proposal], schema: RigSchema) -> FilesOfTrial:
+    """Several files as those of one trial, by their sources.
+
+    Raises
+    ------
+    InputError
+        Their sheets differ.
+    """
     columns: dict[str, np.ndarray] = {}
     units: dict[str, str] = {}
     candidates: dict[str, tuple[str, ...]] = dict.fromkeys(schema.columns, ())
@@ -223,7 +236,8 @@ def trial_view(
     keys |= {"split": split} if split not in ("", "none") else {}
     said += [f"{name}: {sentence}"] if sentence else []
     if files.is_joined:
-        said.append(f"{' and '.join(one.recording.path.name for one in files.files.values())} are one trial")
+        paths = dict.fromkeys(one.recording.path.name for one in files.files.values())
+        said += [f"{' and '.join(paths)} are one trial"] if len(paths) > 1 else []
         offsets = _offsets(seconds, wanted.offsets)
         keys |= {"offset_s": offsets} if offsets else {}
     recorded = files.proposal.recording.columns.get(position or "")  # none of words, which their reader refuses

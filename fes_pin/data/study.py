@@ -425,14 +425,17 @@ class _Reader(StudyTables):
     def _trial_names(self, tables: Sequence[Mapping[str, Any]], views: Sequence[tuple[Recordings, View]]) -> list[str]:
         """What trials call themselves, else the stems of their files, or their paths where stems are the same."""
         paths: list[PurePosixPath] = []
-        seen: dict[Path, list[tuple[str, View]]] = {}
+        seen: dict[Path, list[tuple[str, View, set[str]]]] = {}
         for index, (table, (recordings, view)) in enumerate(zip(tables, views, strict=True)):
-            main, (path, _) = next(iter(recordings.items()))
+            main, (path, own) = next(iter(recordings.items()))
+            shared = ("time_s", *self.schema.inputs)  # which trials side by side may have in common
+            seen_of = replace(view, sheet=view.sheet or own.form.sheet) if own is not None else view
+            once = {s.name for c, s in own.sources.items() if c not in shared} if own is not None else set()
             key = f"trial[{index}].{main if main in table else f'sources.{main}'}"
-            for other, earlier in seen.get(path.resolve(), []):
-                if view.overlaps(earlier):
+            for other, earlier, others in seen.get(path.resolve(), []):
+                if seen_of.overlaps(earlier) and (once & others or not (once and others)):
                     raise self.error(key, f"the same file as {other}; expected from and to that tell them apart")
-            seen.setdefault(path.resolve(), []).append((key, view))
+            seen.setdefault(path.resolve(), []).append((key, seen_of, once))
             paths.append(PurePosixPath((table[main] if main in table else table["sources"][main]).replace("\\", "/")))
         stems = Counter(path.stem for path in dict.fromkeys(paths))
         names = [path.stem if stems[path.stem] == 1 else str(path.with_suffix("")) for path in paths]

@@ -5,7 +5,7 @@ They say what the rig is and how its recordings are written; an option of new-st
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -201,7 +201,7 @@ def columns_text(
 def _about_files(form: TextForm, options: Mapping[str, Any]) -> dict[str, Any]:
     """What the table `file` says: the options that are set, and what is not as in a plain form."""
     about = {k: v for k, v in options.items() if v is not None}
-    about |= {k: v for k, v in asdict(replace(form, sheet="")).items() if v != getattr(TextForm(), k)}
+    about |= {k: v for k, v in asdict(form).items() if v != getattr(TextForm(), k)}
     if form.first_row != form.header_row + 1:
         about["first_row"] = form.first_row
     if form.header_row == AFTER_COMMENTS:

@@ -148,7 +148,7 @@ def _as_recorded(path: Path, own: Columns | None, schema: RigSchema, kind: str, 
     """The rig's columns of one file, sample by sample; of several sources none has them all."""
     if own is None:
         return read_csv_or_hint(path)
-    own = replace(own, form=replace(own.form, sheet=view.sheet))
+    own = replace(own, form=replace(own.form, sheet=view.sheet or own.form.sheet))
     return own.taken(path, schema, kind, inputs_only or bool(view.derive) or view.is_joined, view.also)
 
 

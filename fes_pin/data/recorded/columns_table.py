@@ -127,6 +127,12 @@ def _true_or_false(value: Any, error: ValueFault) -> bool:
     return value
 
 
+def _sheet(value: Any, error: ValueFault) -> str:
+    if not isinstance(value, str):
+        raise error("expected the name of a sheet of a spreadsheet")
+    return value
+
+
 def _line(value: Any, error: ValueFault, least: int, hint: str = "") -> int:
     if isinstance(value, bool) or not isinstance(value, int) or value < least:
         raise error(f"expected the number of a line, from 1{hint}")
@@ -145,6 +151,7 @@ FILE_KEYS: Mapping[str, Callable[[Any, ValueFault], Any]] = {
     **{"delimiter": _word(DELIMITERS), "decimal": _word(DECIMALS)},
     **{"header_row": _header_row, "first_row": partial(_line, least=1)},
     **{"comment": _comment, "encoding": _word(ENCODINGS), "names": _file_names, "transposed": _true_or_false},
+    **{"sheet": _sheet},
     **{"resample_hz": positive("Hz").check, "missing": _word((INTERPOLATE,)), "rows": _word((EVENTS,))},
 }
 """Keys of `[columns.file]`, and what checks the value of each."""

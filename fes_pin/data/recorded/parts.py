@@ -102,3 +102,38 @@ def moving(table: Table, readings: Sequence[str]) -> list[Table]:
     stops = [one.start for one in resting if one.start > 0] + [len(table)]
     slices = [slice(a, b) for a, b in zip(begins, stops, strict=False) if b - a >= MIN_ROWS]
     return [rows_of(table, one) for one in slices]
+
+
+def without_empty_end(table: Table, shared: Sequence[str] = ()) -> Table:
+    """A table down to the last row that holds a sample, as where a longer trial stands next to it; `said` has it.
+
+    Parameters
+    ----------
+    shared
+        Columns that others have as well: they may go on.
+    """
+    own = [v for n, v in table.columns.items() if n not in shared]
+    last = max((int(np.flatnonzero(~np.isnan(v))[-1]) for v in own if not np.isnan(v).all()), default=len(table) - 1)
+    if (left := len(table) - last - 1) == 0:
+        return table
+    said = f"{left} rows of the file below its last sample are left out"
+    return replace(rows_of(table, slice(0, last + 1)), said=(*table.said, said))
+
+
+Ends = tuple[float, float, float]
+"""Where a recording begins and ends, and its usual step."""
+
+
+def ends_of(time: np.ndarray) -> Ends:
+    """Ends of a recording with these times, shape (n,), in their unit."""
+    return float(time[0]), float(time[-1]), float(np.median(np.abs(np.diff(time))))
+
+
+def end_at_once(one: Ends, other: Ends) -> bool:
+    """Return whether two recordings may be of one time: they overlap, and do not begin at once and end apart.
+
+    What is recorded at once by one logger ends at once, within `LONGEST_GAP` steps.
+    """
+    gap = LONGEST_GAP * max(one[2], other[2])
+    is_later = max(one[0], other[0]) >= min(one[1], other[1])
+    return not is_later and (abs(one[0] - other[0]) > gap or abs(one[1] - other[1]) <= gap)

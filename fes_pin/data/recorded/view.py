@@ -238,5 +238,6 @@ def joined(tables: Mapping[str, Table], offsets: Mapping[str, float | str], held
     rows = np.flatnonzero((leading.time >= begin) & (leading.time <= end))
     if len(rows) < MIN_ROWS:
         raise leading.error(f"the sources {', '.join(tables)} have no {MIN_ROWS} samples in common", "time_s")
-    whole = replace(leading, columns=columns, names=tuple(columns), said=tuple(said), called=called)
+    once = tuple(dict.fromkeys(said))  # what is the same of two sheets of one file
+    whole = replace(leading, columns=columns, names=tuple(columns), said=once, called=called)
     return rows_of(whole, slice(int(rows[0]), int(rows[-1]) + 1))
