@@ -11,6 +11,7 @@ from fes_pin.data.errors import listed
 from fes_pin.data.recorded.events import sampled_events
 from fes_pin.data.recorded.form import TextForm
 from fes_pin.data.recorded.formats import read_recording
+from fes_pin.data.recorded.parts import without_empty_end
 from fes_pin.data.recorded.regular import check_steps, filled, resampled
 from fes_pin.data.recorded.wraps import table_without_wraps
 from fes_pin.data.schema import RigSchema
@@ -122,7 +123,8 @@ class Columns:
         columns |= {n: recording.columns[n] for n in also if n in recording.columns and n not in columns}
         called = {column: source.name or column for column, source in taken.items()}
         columns = {"time_s": time, **columns}
-        return replace(recording, called=called, names=tuple(columns), columns=columns, half_digit=half_digit)
+        whole = replace(recording, called=called, names=tuple(columns), columns=columns, half_digit=half_digit)
+        return without_empty_end(whole, ("time_s",))
 
     def regular(self, table: Table, held: tuple[str, ...]) -> Table:
         """A table without missing samples, at equally spaced times where a rate is stated.

@@ -102,3 +102,19 @@ def moving(table: Table, readings: Sequence[str]) -> list[Table]:
     stops = [one.start for one in resting if one.start > 0] + [len(table)]
     slices = [slice(a, b) for a, b in zip(begins, stops, strict=False) if b - a >= MIN_ROWS]
     return [rows_of(table, one) for one in slices]
+
+
+def without_empty_end(table: Table, shared: Sequence[str] = ()) -> Table:
+    """A table down to the last row that holds a sample, as where a longer trial stands next to it; `said` has it.
+
+    Parameters
+    ----------
+    shared
+        Columns that others have as well: they may go on.
+    """
+    own = [v for n, v in table.columns.items() if n not in shared]
+    last = max((int(np.flatnonzero(~np.isnan(v))[-1]) for v in own if not np.isnan(v).all()), default=len(table) - 1)
+    if (left := len(table) - last - 1) == 0:
+        return table
+    said = f"{left} rows of the file below its last sample are left out"
+    return replace(rows_of(table, slice(0, last + 1)), said=(*table.said, said))
