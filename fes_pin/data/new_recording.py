@@ -192,9 +192,19 @@ def _candidates(
     if column in names and may_be(column, column, units.get(column, ""), revolute):
         yield column  # a name that is the rig's own needs no words
         return
+    names = [n for n in names if n not in _of_quaternions(names)]
     words = {n: words_of(split_header(n)[0]) for n in names if may_be(column, n, units.get(n, ""), revolute)}
     found = [n for n, some in words.items() if without_unit(column) == "_".join(some) or _means(some, column)]
     yield from found or [n for n, some in words.items() if _means(_without_numbers(some), column)]
+
+
+def _of_quaternions(names: Collection[str]) -> set[str]:
+    """Columns x, y, z and w of one name, `imu.x` or `qx`: parts of a quaternion, which are no angles."""
+    parts: dict[str, dict[str, str]] = defaultdict(dict)
+    for name in names:
+        if name[:-1] and name[-1].lower() in "xyzw":
+            parts[name[:-1]][name[-1].lower()] = name
+    return {name for four in parts.values() if len(four) == len("xyzw") for name in four.values()}
 
 
 def _without_numbers(words: frozenset[str]) -> frozenset[str]:
