@@ -95,8 +95,8 @@ class NewColumns:
     ----------
     assumed
         What no file and nobody says, and is taken so: sentences, in order.
-    instead
-        What may be said in the place of a column that is asked for, by its name.
+    instead, last
+        What may be said in the place of a column that is asked for, and the only column that was left for one, by name.
     """
 
     def __init__(self, wanted: Wanted, trials: Sequence[FilesOfTrial], missing: dict[str, str]) -> None:
@@ -104,6 +104,7 @@ class NewColumns:
         self.seen = Seen([one.proposal for one in trials])
         self.assumed: dict[str, None] = {}
         self.instead: dict[str, str] = {}
+        self.last: dict[str, str] = {}
         check_known(wanted.columns, self.schema.columns, fault_at("--column"))
         self.derived = {n: rate for n, rate in INTEGRATED.items() if self._is_integrated(n, rate)}
 
@@ -210,6 +211,7 @@ class NewColumns:
         named = [n for n in levers if MEANT.get(column, frozenset()) & words_of(split_header(n)[0])]
         last = next(iter(free)) if not candidates and len(free) == 1 and not named else ""
         if last and not seen.unit_of(last) and seen.values(last).size:
+            self.last[column] = last
             return self._with_unit(column, last, seen, nothing)
         if levers:
             own, those = own_unit(column, self.wanted.revolute), listed(named or levers, " or ")
@@ -228,7 +230,7 @@ class NewColumns:
         """All columns, in words with their units, but for those that another of the rig's takes."""
         others = [c for c in (*self.schema.columns, "time_s") if c != column]
         said = {n for c in others for n in _named(self.wanted.columns.get(c, ""), seen.names)}
-        alone = {names[0] for c in others if len(names := seen.could_be(c)) == 1}
+        alone = {names[0] for c in others if len(names := seen.could_be(c)) == 1} | {*self.last.values()}
         every = dict(zip(seen.names, seen.with_units(), strict=True))
         return {name: words for name, words in every.items() if name not in said | alone}
 

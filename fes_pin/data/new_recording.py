@@ -135,8 +135,8 @@ def propose(
         units = {name: header.units[k] for k, name in enumerate(recording.names) if k in header.units}
     else:
         form, header = None, Header()
-        names, said = by_length(path, chosen) if is_nested(path) else (None, ())
-        recording, header = read_recording(path, wanted=names), Header(said=said)
+        names, rate_hz, said = by_length(path, chosen) if is_nested(path) else (None, None, ())
+        recording, header = read_recording(path, wanted=names), Header(rate_hz=rate_hz, said=said)
         units = {}
     units = {**recording.units, **units}
     for name in recording.columns:

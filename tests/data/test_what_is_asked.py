@@ -1,5 +1,6 @@
 """What new-study asks for and proposes where files do not say everything: nothing that they cannot be."""
 
+import json
 import re
 
 import numpy as np
@@ -57,6 +58,8 @@ def test_a_column_that_is_taken_is_asked_for_no_other_quantity(tmp_path):
     path = csv(tmp_path / "a.csv", ("a", "b"), drawn(2, 1))
     words = asked(tmp_path, path, rig="muscle", columns={"time_s": "a:s", "force_n": "b:N"})
     assert "pulse_width_us=NAME:UNIT (no column is left; or in its place" in words
+    words = asked(tmp_path, path, rig="muscle", columns={"time_s": "a:s"})
+    assert "force_n=b:UNIT" in words and "pulse_width_us=NAME:UNIT (no column is left" in words
     words = asked(tmp_path, path, rig="joint", columns={"position": "b:rad"})
     assert "time_s=a:UNIT" in words
 
@@ -134,3 +137,34 @@ def test_columns_of_one_sheet_that_end_earlier_are_whole_trials(tmp_path):
     path.write_text("t [s],angle [rad],sync\n" + "\n".join(middle) + "\n")
     with pytest.raises(InputError, match=r"row 22, column .*: expected a time, found nothing"):
         read_study(tmp_path)
+
+
+@pytest.mark.parametrize("suffix", [".mat", ".json"])
+@pytest.mark.parametrize("rate", ["fs", "fsamp", "SampleRate", "sampling_frequency_Hz", "srate"])
+def test_of_lists_of_events_and_one_signal_the_signal_is_taken_at_the_rate_of_the_file(tmp_path, suffix, rate):
+    rng = np.random.default_rng(len(rate))
+    events = [np.sort(rng.integers(0, 900, n)).tolist() for n in (30, 41, 41, 41, 12)]
+    content = {"MUPulses": events, rate: 2048.0, "gain": 3.0, "ref_signal": rng.normal(size=900).tolist()}
+    path = nested(tmp_path / f"a{suffix}", content)
+    words = asked(tmp_path, path, rig="joint")
+    assert "position=ref_signal:UNIT" in words and "time_s" not in words
+    text = made(tmp_path, path, columns={"position": "ref_signal:deg"}).contents["study.toml"]
+    assert "time_s = { rate_hz = 2048.0 }" in str(text)
+
+
+@pytest.mark.parametrize("names", [("freq", "frequency"), ("fs", "frame_rate"), ("f_stim", "cutoff_hz")])
+def test_other_rates_of_a_nested_file_are_none_of_samples(tmp_path, names):
+    content = {names[0]: 50.0, names[1]: 20.0, "angle": list(np.linspace(0.0, 1.0, 50))}
+    words = asked(tmp_path, nested(tmp_path / "a.json", content), columns={"position": "angle:rad"})
+    assert "--column time_s=" in words
+
+
+def nested(path, content):
+    if path.suffix == ".json":
+        path.write_text(json.dumps(content))
+        return path
+    pytest.importorskip("pymatreader")
+    cells = np.empty(len(content.get("MUPulses", [])), dtype=object)
+    cells[:] = [np.array(one, dtype=float) for one in content.get("MUPulses", [])]
+    pytest.importorskip("scipy.io").savemat(path, {**content, "MUPulses": cells})
+    return path
