@@ -18,6 +18,7 @@ from fes_pin.models.conventions import answered_angle
 from fes_pin.models.effects.coulomb_friction import STATED
 from fes_pin.models.goals import check_no_goal
 from fes_pin.models.model import Model
+from fes_pin.models.rigs.ankle import Ankle
 from fes_pin.models.rigs.base import RUN_OUT
 from fes_pin.models.rigs.joint import Joint
 
@@ -36,6 +37,8 @@ LONGEST_M = 10.0
 """Largest position and pendulum length in m in a laboratory; values in millimetres are larger."""
 SWING = 2.0 * math.pi
 """Largest angle in rad between two turning points of a pendulum that is not driven: from upright round to upright."""
+ROUNDED = 0.02
+"""rad by which an angle may lie beyond what it can be: a degree of a goniometer's zero."""
 ASKEW = 0.5
 """Angle in rad from hanging above which dry friction hardly holds a pendulum: half of its weight acts there."""
 STICKS = 2.0
@@ -63,7 +66,7 @@ def odd_numbers(study: Study | ToPredict, model: Model, simulated: Simulation) -
     check_no_goal(study, model.rig)
     odd = [*implausible(study), *_steps(study, model), *_range(study, model)]
     odd += _of_urdf(study, model) if isinstance(study, Study) and isinstance(model.rig, Joint) else []
-    odd += answered_angle(study.trials, model.rig)
+    odd += [*answered_angle(study.trials, model.rig), *_of_ankle(study, model)]
     return [*odd, *_swings(study, model), *_turned(study, model, simulated), *_at_rest(study, model)]
 
 
@@ -157,6 +160,20 @@ def _range(study: Study | ToPredict, model: Model) -> Iterable[str]:
         yield f"position reaches {most:.4g} rad, {most / (2.0 * math.pi):.1f} turns: is it in degrees?"
     if not model.rig.constants["revolute"] and most > LONGEST_M:
         yield f"position reaches {most:.4g} m: is it in mm?"
+
+
+def _of_ankle(study: Study | ToPredict, model: Model) -> Iterable[str]:
+    """Yield a warning for angles that no foot has to its leg: a dynamometer counts from the foot at right angles."""
+    if not isinstance(model.rig, Ankle):
+        return
+    found = {t.name: t["angle_rad"] for t in study.trials if "angle_rad" in t}
+    found |= {t.name: np.array([t.conditions["angle_rad"]]) for t in study.trials if "angle_rad" in t.conditions}
+    odd = {name: q for name, q in found.items() if np.min(q) < -ROUNDED or np.max(q) > math.pi + ROUNDED}
+    if odd:
+        least, most = (math.degrees(f(f(q) for q in odd.values())) for f in (min, max))
+        counts = "an ankle's counts from 0, folded back on the leg, over 90, hanging, to 180 degrees"
+        how = "zero = -90 in [columns], or scale = -1 and zero = 90 of dorsiflexion, reads 0 at right angles as 90"
+        yield f"angle_rad is {least:.3g} to {most:.3g} degrees in {trials_named([*odd])}: {counts}; {how}"
 
 
 def _weight(model: Model) -> float:
