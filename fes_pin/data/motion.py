@@ -45,10 +45,10 @@ ONE_TURN = 2.0 * np.pi * (1.0 + 1e-3)
 """rad; an angle that wraps varies by no more, but for rounding."""
 SPELT = {
     **{"flex": "flexion", "add": "adduction", "rot": "rotation", "ext": "extension", "bend": "bending"},
-    **{"knee_flexion": "knee_angle", "ankle_dorsiflexion": "ankle_angle"},
+    **{"knee_flexion": "knee_angle", "ankle_dorsiflexion": "ankle_angle", "ankle_flexion": "ankle_angle"},
 }
 """Other names of coordinates, as in the knee model of Lenhart et al. (Ann. Biomed. Eng. 43:2675): words, and joints
-with their motion. Words that may mean either sign, as abduction and the flexion of an ankle, are none of them."""
+with their motion. Words that may mean either sign, as abduction, are none of them; that of an ankle a walk shows."""
 BENT_RAD, BACK_RAD = 0.7, -0.26
 """Knees that both pass the first and never the second count flexion positive: none extends 0.7 rad beyond straight."""
 
@@ -141,7 +141,7 @@ def coordinates_of(table: Table, in_degrees: bool | None) -> dict[str, np.ndarra
     """
     columns = in_radians(named_coordinates(table), stated_degrees(table, in_degrees))
     columns, _ = coordinates_unwrapped(columns)
-    return knees_turned(columns, "rl") if knees_bend_positively(columns) else columns
+    return joints_turned(columns, "knee", "rl") if knees_bend_positively(columns) else columns
 
 
 def stated_degrees(table: Table, in_degrees: bool | None) -> bool:
@@ -219,9 +219,9 @@ def knees_bend_positively(columns: Mapping[str, np.ndarray]) -> bool:
     return all(bool(knee.max() > BENT_RAD and knee.min() > BACK_RAD) for knee in knees)
 
 
-def knees_turned(columns: Mapping[str, np.ndarray], sides: Collection[str]) -> dict[str, np.ndarray]:
-    """Coordinates with the knees of these sides, `r` and `l`, and their rates counted with the other sign."""
-    turned = {f"{kind}_knee_angle_{side}" for kind in ("q", "qd", "qdd") for side in sides}
+def joints_turned(columns: Mapping[str, np.ndarray], joint: str, sides: Collection[str]) -> dict[str, np.ndarray]:
+    """Coordinates with a knee or ankle of these sides, `r` and `l`, and its rates counted with the other sign."""
+    turned = {f"{kind}_{joint}_angle_{side}" for kind in ("q", "qd", "qdd") for side in sides}
     return {name: -values if name in turned else values for name, values in columns.items()}
 
 

@@ -211,14 +211,16 @@ def reordered(folder: Path) -> None:
         put(folder / file, {time: values, **dict(reversed(rest))})
 
 
-def _knee(sides: str) -> Callable[[Path], None]:
-    return scaled("coords.csv", lambda n: n in [f"q_knee_angle_{s}" for s in sides], -1.0)
+def _joint(joint: str, sides: str) -> Callable[[Path], None]:
+    return scaled("coords.csv", lambda n: n in [f"q_{joint}_angle_{s}" for s in sides], -1.0)
 
 
 WRONG: Mapping[str, tuple[Callable[[Path], None], str]] = {
-    "right knee": (_knee("r"), "the right knee counts flexion positive"),
-    "left knee": (_knee("l"), "the left knee counts flexion positive"),
-    "both knees": (_knee("rl"), "both knees count flexion positive"),
+    "right knee": (_joint("knee", "r"), "the right knee counts flexion positive"),
+    "left knee": (_joint("knee", "l"), "the left knee counts flexion positive"),
+    "both knees": (_joint("knee", "rl"), "both knees count flexion positive"),
+    "left ankle": (_joint("ankle", "l"), "the left ankle counts dorsiflexion negative"),
+    "both ankles": (_joint("ankle", "rl"), "both ankles count dorsiflexion negative"),
     "exchanged feet": (exchanged, "the feet are exchanged"),
     "numbered plates": (numbered, "plate 1 is the left foot's, plate 2 is the right foot's"),
     "three plates": (walkway, "plate 3 is "),

@@ -119,7 +119,7 @@ def test_other_names_of_coordinates_are_taken_and_said(folder, case):
     assert all(f"{other}_r as {name}_r" in said for name, other in OTHER_NAMES[case].items() if "pelvis" not in name)
 
 
-@pytest.mark.parametrize("other", ["ankle_flexion_r", "ankle_moment_r", "ankle_angle_x_r"])
+@pytest.mark.parametrize("other", ["ankle_plantarflexion_r", "ankle_moment_r", "ankle_angle_x_r"])
 def test_names_that_may_mean_another_sign_or_thing_are_no_coordinates(folder, other):
     text = (folder / "coords.mot").read_text()
     (folder / "coords.mot").write_text(text.replace("\tankle_angle_r", f"\t{other}"))

@@ -17,7 +17,8 @@ from fes_pin.data.wanted import Wanted
 from fes_pin.walk.recording import recordings_of
 
 pytestmark = pytest.mark.shared
-WRONG = ("right knee", "left knee", "both knees", "exchanged feet", "numbered plates", "three plates", "action",
+WRONG = ("right knee", "left knee", "both knees", "left ankle", "both ankles", "exchanged feet",
+         "numbered plates", "three plates", "action",
          "shear sign", "lateral sign", "moments in N mm", "moments about a corner", "moment sign", "forces in kN",
          "degrees under no", "rad under yes", "wraps", "pressure in mm", "translations in mm",
          "inclined axes")  # fmt: skip
