@@ -34,7 +34,10 @@ WANTED = frozenset(
 """Words for what a controller wants, which is no reading."""
 OTHERS = frozenset({"acc", "accel", "acceleration", "temp", "temperature", "temperatur", "efficiency", "power"})
 """Words for quantities that no rig reads."""
+RATES = {"dot": "velocity", "ddot": "acceleration"}
+"""What the end of a name makes of an angle or a position: `theta_dot`, `thetaDot`, `alpha_ddot`."""
 _NUMBERED = re.compile(r"([a-z]{3,})\d+$")
+_ENDING = re.compile(r"(.*?)(?:(d?dot)\d*)?$")
 
 
 @dataclass(frozen=True)
@@ -153,6 +156,7 @@ def propose(
         taken = {name for found in candidates.values() for name in found}
         candidates |= {c: tuple(n for n in found if n not in taken) for c, found in either.items()}
     candidates = {c: _readings(c, _without_copies(found, recording)) for c, found in candidates.items()}
+    candidates |= {"time_s": _rising(candidates.get("time_s", ()), recording)}
     return Proposal(recording, form, _without_doubles(candidates), units, header.rate_hz, header.said)
 
 
@@ -164,6 +168,13 @@ def _without_copies(names: Sequence[str], recording: Table) -> tuple[str, ...]:
         if name not in read or not any(np.array_equal(read[name], other, equal_nan=True) for other in others):
             kept.append(name)
     return tuple(kept)
+
+
+def _rising(names: tuple[str, ...], recording: Table) -> tuple[str, ...]:
+    """Columns of times without those that hardly ever rise, as dates of too few digits do, where others rise."""
+    read = recording.columns
+    rise = tuple(n for n in names if n not in read or np.median(np.diff(read[n][np.isfinite(read[n])])) > 0.0)
+    return rise or names
 
 
 def _readings(column: str, names: tuple[str, ...]) -> tuple[str, ...]:
@@ -193,9 +204,20 @@ def _candidates(
         yield column  # a name that is the rig's own needs no words
         return
     names = [n for n in names if n not in _of_quaternions(names)]
-    words = {n: words_of(split_header(n)[0]) for n in names if may_be(column, n, units.get(n, ""), revolute)}
+    words = {n: _said(n) for n in names if may_be(column, n, units.get(n, ""), revolute)}
     found = [n for n, some in words.items() if without_unit(column) == "_".join(some) or _means(some, column)]
     yield from found or [n for n, some in words.items() if _means(_without_numbers(some), column)]
+
+
+def _said(name: str) -> frozenset[str]:
+    """Words of a name; of `theta_dot` that of a rate, instead of the angle's."""
+    words = words_of(split_header(name)[0])
+    apart = frozenset(part for word in words for part in _ENDING.match(word).groups() if part)  # type: ignore[union-attr]
+    rates = {RATES[word] for word in apart & RATES.keys()}
+    moves = {word for word in apart if _without_numbers(frozenset({word})) & MEANT["position"]}
+    rest = apart - moves - RATES.keys()
+    is_rate = rates and (moves or (rest and not rest & frozenset().union(*MEANT.values())))
+    return rest | rates if is_rate else words
 
 
 def _of_quaternions(names: Collection[str]) -> set[str]:

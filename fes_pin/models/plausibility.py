@@ -66,8 +66,10 @@ def odd_numbers(study: Study | ToPredict, model: Model, simulated: Simulation) -
     check_no_goal(study, model.rig)
     odd = [*implausible(study), *_steps(study, model), *_range(study, model)]
     odd += _of_urdf(study, model) if isinstance(study, Study) and isinstance(model.rig, Joint) else []
-    odd += [*answered_angle(study.trials, model.rig), *_of_ankle(study, model)]
-    return [*odd, *_swings(study, model), *_turned(study, model, simulated), *_at_rest(study, model)]
+    turned = [*_turned(study, model, simulated)]
+    odd += answered_angle(study.trials, model.rig)
+    odd += [] if any(words.startswith("angle_rad") for words in turned) else _of_ankle(study, model)
+    return [*odd, *_swings(study, model), *turned, *_at_rest(study, model)]
 
 
 def warn_of_odd_numbers(model: Model, trials: Sequence[Trial], simulated: Simulation) -> None:
@@ -195,7 +197,8 @@ def _swings(study: Study | ToPredict, model: Model) -> Iterable[str]:
     if off := {n: rest for n, rest in rests.items() if math.cos(rest - hangs) < math.cos(ASKEW)}:
         said = f"position comes to rest at {_ends(off)} rad, and by the URDF it hangs at {hangs + 0.0:.4g}, in"
         zero = f"zero in [columns], {math.degrees(np.mean([*off.values()]) - hangs):.3g} of degrees"
-        yield f"{said} {trials_named([*off])}: is its zero elsewhere ({zero}), or its sign another?"
+        asks = f"is its zero elsewhere ({zero}), its sign another, or does a torque hold it?"
+        yield f"{said} {trials_named([*off])}: {asks}"
         return
     length = c["inertia"] * 9.81 / _weight(model)
     if length > LONGEST_M:
