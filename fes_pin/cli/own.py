@@ -262,8 +262,8 @@ def _ask(question: str) -> str:
 
 
 def _tried(made: NewStudy, wanted: Wanted, catalogue: Catalogue) -> tuple[Study, list[str] | None]:
-    """The study as it will be read, and what is odd about it, before anything of it is written where it belongs; None
-    of a walk, which takes inverse dynamics to judge.
+    """The study as it will be read, and what is odd about it, before anything of it is written where it belongs; of a
+    walk, which takes inverse dynamics to judge, what was assumed on reading, or None.
 
     Raises
     ------
@@ -276,7 +276,9 @@ def _tried(made: NewStudy, wanted: Wanted, catalogue: Catalogue) -> tuple[Study,
     text = str(made.contents["study.toml"])
     try:
         study = study_of_text(text, wanted.folder, made.origins, catalogue.schemas())
-        return study, None if study.schema.owner is None else odd_numbers(study)[1]
+        if study.schema.owner is None:
+            return study, list(dict.fromkeys(words for trial in study.trials for words in trial.remarks)) or None
+        return study, odd_numbers(study)[1]
     except InputError as error:
         if error.file != wanted.folder / "study.toml":
             raise

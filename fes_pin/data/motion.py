@@ -43,6 +43,12 @@ APART_M = 0.02
 """Least sideways distance of two plates' centres of pressure that identifies the right foot's."""
 ONE_TURN = 2.0 * np.pi * (1.0 + 1e-3)
 """rad; an angle that wraps varies by no more, but for rounding."""
+SPELT = {
+    **{"flex": "flexion", "add": "adduction", "rot": "rotation", "ext": "extension", "bend": "bending"},
+    **{"knee_flexion": "knee_angle", "ankle_dorsiflexion": "ankle_angle", "ankle_flexion": "ankle_angle"},
+}
+"""Other names of coordinates, as in the knee model of Lenhart et al. (Ann. Biomed. Eng. 43:2675): words, and joints
+with their motion. Words that may mean either sign, as abduction, are none of them; that of an ankle a walk shows."""
 BENT_RAD, BACK_RAD = 0.7, -0.26
 """Knees that both pass the first and never the second count flexion positive: none extends 0.7 rad beyond straight."""
 
@@ -135,7 +141,7 @@ def coordinates_of(table: Table, in_degrees: bool | None) -> dict[str, np.ndarra
     """
     columns = in_radians(named_coordinates(table), stated_degrees(table, in_degrees))
     columns, _ = coordinates_unwrapped(columns)
-    return knees_turned(columns, "rl") if knees_bend_positively(columns) else columns
+    return joints_turned(columns, "knee", "rl") if knees_bend_positively(columns) else columns
 
 
 def stated_degrees(table: Table, in_degrees: bool | None) -> bool:
@@ -155,6 +161,7 @@ def named_coordinates(table: Table) -> dict[str, np.ndarray]:
     """
     storage = is_storage(table.path)
     names = {(_coordinate(name) if storage else name): name for name in table.names[1:]}
+    names = {respelt(name, names): of for name, of in names.items()}
     known = [f"q_{name}" for name in (*REQUIRED, *OPTIONAL)]
     for name in known[: len(REQUIRED)]:
         if name not in names:
@@ -163,6 +170,25 @@ def named_coordinates(table: Table) -> dict[str, np.ndarray]:
         if name.startswith("q_") and name not in known and is_like(name, known, cutoff=0.92):
             raise table.error(unknown(name, known), original)
     return {name: table.columns[of] for name, of in names.items() if name.startswith(("q_", "qd_", "qdd_"))}
+
+
+def respelt(name: str, names: Collection[str]) -> str:
+    """A column `q_<coordinate>`, or of its rates, by the name that is used here; as it is where names hold that."""
+    kind, apart, rest = name.partition("_")
+    words = "_".join(SPELT.get(word, word) for word in rest.split("_"))
+    for other, usual in SPELT.items():
+        words = words.replace(f"{other}_", f"{usual}_") if words.startswith(f"{other}_") else words
+    usual = f"{kind}{apart}{words}"
+    is_known = kind in ("q", "qd", "qdd") and words in (*REQUIRED, *OPTIONAL)
+    return usual if is_known and usual not in names else name
+
+
+def renamed_coordinates(table: Table) -> tuple[str, ...]:
+    """What is said of coordinates whose names in the file are other ones than are used here; () of none."""
+    names = [_coordinate(name) if is_storage(table.path) else name for name in table.names[1:]]
+    pairs = [(name, usual) for name in names if (usual := respelt(name, names)) != name and name.startswith("q_")]
+    words = [f"{name.removeprefix('q_')} as {usual.removeprefix('q_')}" for name, usual in pairs]
+    return (f"{', '.join(words)}: coordinates are taken by these names",) if words else ()
 
 
 def is_angle(name: str) -> bool:
@@ -193,9 +219,9 @@ def knees_bend_positively(columns: Mapping[str, np.ndarray]) -> bool:
     return all(bool(knee.max() > BENT_RAD and knee.min() > BACK_RAD) for knee in knees)
 
 
-def knees_turned(columns: Mapping[str, np.ndarray], sides: Collection[str]) -> dict[str, np.ndarray]:
-    """Coordinates with the knees of these sides, `r` and `l`, and their rates counted with the other sign."""
-    turned = {f"{kind}_knee_angle_{side}" for kind in ("q", "qd", "qdd") for side in sides}
+def joints_turned(columns: Mapping[str, np.ndarray], joint: str, sides: Collection[str]) -> dict[str, np.ndarray]:
+    """Coordinates with a knee or ankle of these sides, `r` and `l`, and its rates counted with the other sign."""
+    turned = {f"{kind}_{joint}_angle_{side}" for kind in ("q", "qd", "qdd") for side in sides}
     return {name: -values if name in turned else values for name, values in columns.items()}
 
 
@@ -296,8 +322,10 @@ def _right_plate(table: Table, plates: Mapping[str, Mapping[str, np.ndarray]]) -
 
 def _missing(table: Table, name: str, names: tuple[str, ...]) -> InputError:
     known = {*REQUIRED, *OPTIONAL, *(f"q_{each}" for each in (*REQUIRED, *OPTIONAL)), *GROUND_REACTION}
-    like = next((each for each in names if each not in known and is_like(each, [name], cutoff=0.85)), None)
-    return table.error("missing" + (f"; found {like[:40]}, which is another name or unit" if like else ""), name)
+    joint, side = name.removeprefix("q_").partition("_")[0], name[-2:]
+    near = [each for each in names if each not in known and is_like(each, [name], cutoff=0.85)]
+    near += [n for n in names if n not in known and joint in n.split("_") and n.endswith(side)]
+    return table.error("missing" + (f"; found {near[0][:40]}, which is another name or unit" if near else ""), name)
 
 
 def on_common_time(

@@ -3,12 +3,15 @@
 from pathlib import Path
 
 from fes_pin.data.errors import InputError, fault_at
-from fes_pin.data.motion import named_coordinates, plates_in, read_motion, stated_degrees
+from fes_pin.data.motion import MARKERS, STORAGE, named_coordinates, plates_in, read_motion, stated_degrees
 from fes_pin.data.new_study import NewStudy, placed
 from fes_pin.data.schema import BODY, check_known
 from fes_pin.data.study_text import HEADER, toml_table
 from fes_pin.data.walk_conventions import WORDS, checked_conventions
 from fes_pin.data.wanted import Wanted, labels_of, number_set
+
+WALKS = "a walk is .mot, .sto or CSV as the study format has it: OpenSim makes joint coordinates of markers"
+"""What is said of files that hold no walk."""
 
 
 def new_body_study(wanted: Wanted) -> NewStudy:
@@ -50,7 +53,12 @@ def new_body_study(wanted: Wanted) -> NewStudy:
 
 def _is_ground_reaction(path: Path) -> bool:
     """True for a ground reaction, False for joint coordinates."""
-    table, in_degrees = read_motion(path)
+    try:
+        table, in_degrees = read_motion(path)
+    except InputError as error:
+        if path.suffix.lower() in (*STORAGE, *MARKERS):
+            raise
+        raise InputError(f"{error.message}; {WALKS}", file=path, row=error.row, column=error.column) from None
     try:
         plates_in(table)
     except InputError:

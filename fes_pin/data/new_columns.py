@@ -18,12 +18,23 @@ from fes_pin.data.recorded.events import EVENTS, looking_period
 from fes_pin.data.recorded.form import TextForm
 from fes_pin.data.recorded.text import after_comments
 from fes_pin.data.recorded.view import INTEGRATED
-from fes_pin.data.schema import IMPOSED, check_known
+from fes_pin.data.schema import IMPOSED, MEANT, check_known
 from fes_pin.data.stimulus import varying
 from fes_pin.data.study_text import columns_text, form_in_words, source_from_option
-from fes_pin.data.units import factor_of, known_unit, own_unit, quantities_of, stated_unit, turns_a_second
+from fes_pin.data.units import (
+    factor_of,
+    known_unit,
+    own_unit,
+    quantities_of,
+    split_header,
+    stated_unit,
+    turns_a_second,
+    words_of,
+)
 from fes_pin.data.wanted import Wanted
 
+LEVERS = {"force": "torque", "torque": "force"}
+"""What a lever makes of a quantity."""
 Source = Mapping[str, Any]
 """What `[columns]` says of a column: its name in the files, unit, scale ..., or the rate of times."""
 
@@ -56,7 +67,7 @@ class Seen:
     def with_units(self) -> list[str]:
         """All columns, each with the unit that the files state in brackets behind it."""
         units = {name: self.unit_of(name) for name in self.names}
-        return [f"{name} ({unit})" if unit and unit not in name else name for name, unit in units.items()]
+        return [f"{name} ({unit})" if unit and not split_header(name)[1] else name for name, unit in units.items()]
 
     def values(self, name: str) -> np.ndarray:
         """The numbers of a column in all files, shape (n,); empty where it holds none."""
@@ -84,12 +95,16 @@ class NewColumns:
     ----------
     assumed
         What no file and nobody says, and is taken so: sentences, in order.
+    instead, last
+        What may be said in the place of a column that is asked for, and the only column that was left for one, by name.
     """
 
     def __init__(self, wanted: Wanted, trials: Sequence[FilesOfTrial], missing: dict[str, str]) -> None:
         self.wanted, self.schema, self.trials, self.missing = wanted, wanted.schema, trials, missing
         self.seen = Seen([one.proposal for one in trials])
         self.assumed: dict[str, None] = {}
+        self.instead: dict[str, str] = {}
+        self.last: dict[str, str] = {}
         check_known(wanted.columns, self.schema.columns, fault_at("--column"))
         self.derived = {n: rate for n, rate in INTEGRATED.items() if self._is_integrated(n, rate)}
 
@@ -110,7 +125,10 @@ class NewColumns:
         needed = [self.derived.get(c, c) for c in motion]
         inputs = self._inputs(order)
         if not inputs and schema.inputs_required and kinds != {IMPOSED}:
-            needed.append(schema.stimuli(order[0])[0])
+            first, *others = dict.fromkeys(c for k in order for c in schema.stimuli(k))
+            passive = f"; or --set kind={IMPOSED} where nothing is stimulated" if IMPOSED in schema.outputs else ""
+            self.instead[first] = f"; or in its place {listed(others, ' or ')}{passive}" if others else passive
+            needed.append(first)
         read = {c for k in order for c in schema.columns_of(k)}
         others = [c for c in (*schema.optional, *schema.imposed) if c in read]
         sources = {c: self._source(c, c in needed) for c in dict.fromkeys([*needed, *inputs, *others])}
@@ -185,18 +203,22 @@ class NewColumns:
 
     def _proposed(self, column: str, candidates: Sequence[str], seen: Seen, is_needed: bool) -> Source | None:
         """The only column that could be it, in the unit that it seems to be in; else it is asked for."""
-        nothing = "" if is_needed else f"; or nothing: --column {column}="
+        nothing = self.instead.get(column, "") if is_needed else f"; or nothing: --column {column}="
         if len(candidates) == 1:
             return self._with_unit(column, candidates[0], seen, nothing)
         free = self._free(column, seen)
-        last = next(iter(free)) if not candidates and len(free) == 1 else ""
+        levers = [] if candidates else self._by_lever(column, seen)
+        named = [n for n in levers if MEANT.get(column, frozenset()) & words_of(split_header(n)[0])]
+        last = next(iter(free)) if not candidates and len(free) == 1 and not named else ""
         if last and not seen.unit_of(last) and seen.values(last).size:
+            self.last[column] = last
             return self._with_unit(column, last, seen, nothing)
-        if not candidates and (levers := self._by_lever(column, seen)):
-            own = own_unit(column, self.wanted.revolute)
-            self._ask(column, f"NAME,scale=NUMBER ({listed(levers, ' or ')}; {own} for each unit of it{nothing})")
+        if levers:
+            own, those = own_unit(column, self.wanted.revolute), listed(named or levers, " or ")
+            self._ask(column, f"NAME,scale=NUMBER ({those}; {own} for each unit of it{nothing})")
             return None
-        could = listed(candidates, " or ") if candidates else f"one of {listed(list(free.values()))}"
+        left = f"one of {listed(list(free.values()))}" if free else "no column is left"
+        could = listed(candidates, " or ") if candidates else left
         if column == "time_s":
             could += "; or rate=HZ of a file without times"
         if not candidates and (rate := INTEGRATED.get(column)) in self.schema.columns:
@@ -205,18 +227,17 @@ class NewColumns:
         return None
 
     def _free(self, column: str, seen: Seen) -> dict[str, str]:
-        """All columns, in words with their units, but for those that another of the rig's takes; all where none is."""
+        """All columns, in words with their units, but for those that another of the rig's takes."""
         others = [c for c in (*self.schema.columns, "time_s") if c != column]
         said = {n for c in others for n in column_named(self.wanted.columns.get(c, ""), seen.names)}
-        alone = {names[0] for c in others if len(names := seen.could_be(c)) == 1}
+        alone = {names[0] for c in others if len(names := seen.could_be(c)) == 1} | {*self.last.values()}
         every = dict(zip(seen.names, seen.with_units(), strict=True))
-        return {name: words for name, words in every.items() if name not in said | alone} or every
+        return {name: words for name, words in every.items() if name not in said | alone}
 
     def _by_lever(self, column: str, seen: Seen) -> list[str]:
-        """Columns of torques for a force, which is one over its lever."""
-        if quantities_of(column, self.wanted.revolute) != ("force",):
-            return []
-        return [n for n in seen.names if stated_unit(n, seen.unit_of(n))[0] == "torque"]
+        """Columns of torques for a force, which is one over its lever, and of forces for a torque."""
+        other = LEVERS.get("".join(quantities_of(column, self.wanted.revolute)))
+        return [n for n in seen.names if other and stated_unit(n, seen.unit_of(n))[0] == other]
 
     def _with_unit(self, column: str, name: str, seen: Seen, nothing: str) -> Source | None:
         unit = stated_unit(name, seen.unit_of(name))[1] or seen.unit_of(name)

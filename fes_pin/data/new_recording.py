@@ -35,7 +35,10 @@ WANTED = frozenset(
 """Words for what a controller wants, which is no reading."""
 OTHERS = frozenset({"acc", "accel", "acceleration", "temp", "temperature", "temperatur", "efficiency", "power"})
 """Words for quantities that no rig reads."""
+RATES = {"dot": "velocity", "ddot": "acceleration"}
+"""What the end of a name makes of an angle or a position: `theta_dot`, `thetaDot`, `alpha_ddot`."""
 _NUMBERED = re.compile(r"([a-z]{3,})\d+$")
+_ENDING = re.compile(r"(.*?)(?:(d?dot)\d*)?$")
 
 
 @dataclass(frozen=True)
@@ -199,8 +202,8 @@ def propose(
         units = {name: header.units[k] for k, name in enumerate(recording.names) if k in header.units}
     else:
         form, header = None, Header()
-        names, said = by_length(path, chosen) if is_nested(path) else (None, ())
-        recording, header = read_recording(path, wanted=names), Header(said=said)
+        names, rate_hz, said = by_length(path, chosen) if is_nested(path) else (None, None, ())
+        recording, header = read_recording(path, wanted=names), Header(rate_hz=rate_hz, said=said)
         units = {}
     return as_seen(recording, form, {**recording.units, **units}, schema, revolute, header.rate_hz, header.said)
 
@@ -230,6 +233,7 @@ def as_seen(
         taken = {name for found in candidates.values() for name in found}
         candidates |= {c: tuple(n for n in found if n not in taken) for c, found in either.items()}
     candidates = {c: _readings(c, _without_copies(found, recording)) for c, found in candidates.items()}
+    candidates |= {"time_s": _rising(candidates.get("time_s", ()), recording)}
     return Proposal(recording, form, _without_doubles(candidates), units, rate_hz, said)
 
 
@@ -241,6 +245,13 @@ def _without_copies(names: Sequence[str], recording: Table) -> tuple[str, ...]:
         if name not in read or not any(np.array_equal(read[name], other, equal_nan=True) for other in others):
             kept.append(name)
     return tuple(kept)
+
+
+def _rising(names: tuple[str, ...], recording: Table) -> tuple[str, ...]:
+    """Columns of times without those that hardly ever rise, as dates of too few digits do, where others rise."""
+    read = recording.columns
+    rise = tuple(n for n in names if n not in read or np.median(np.diff(read[n][np.isfinite(read[n])])) > 0.0)
+    return rise or names
 
 
 def _readings(column: str, names: tuple[str, ...]) -> tuple[str, ...]:
@@ -269,9 +280,30 @@ def _candidates(
     if column in names and may_be(column, column, units.get(column, ""), revolute):
         yield column  # a name that is the rig's own needs no words
         return
-    words = {n: words_of(split_header(n)[0]) for n in names if may_be(column, n, units.get(n, ""), revolute)}
+    names = [n for n in names if n not in _of_quaternions(names)]
+    words = {n: _said(n) for n in names if may_be(column, n, units.get(n, ""), revolute)}
     found = [n for n, some in words.items() if without_unit(column) == "_".join(some) or _means(some, column)]
     yield from found or [n for n, some in words.items() if _means(_without_numbers(some), column)]
+
+
+def _said(name: str) -> frozenset[str]:
+    """Words of a name; of `theta_dot` that of a rate, instead of the angle's."""
+    words = words_of(split_header(name)[0])
+    apart = frozenset(part for word in words for part in _ENDING.match(word).groups() if part)  # type: ignore[union-attr]
+    rates = {RATES[word] for word in apart & RATES.keys()}
+    moves = {word for word in apart if _without_numbers(frozenset({word})) & MEANT["position"]}
+    rest = apart - moves - RATES.keys()
+    is_rate = rates and (moves or (rest and not rest & frozenset().union(*MEANT.values())))
+    return rest | rates if is_rate else words
+
+
+def _of_quaternions(names: Collection[str]) -> set[str]:
+    """Columns x, y, z and w of one name, `imu.x` or `qx`: parts of a quaternion, which are no angles."""
+    parts: dict[str, dict[str, str]] = defaultdict(dict)
+    for name in names:
+        if name[:-1] and name[-1].lower() in "xyzw":
+            parts[name[:-1]][name[-1].lower()] = name
+    return {name for four in parts.values() if len(four) == len("xyzw") for name in four.values()}
 
 
 def _without_numbers(words: frozenset[str]) -> frozenset[str]:

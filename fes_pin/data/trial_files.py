@@ -23,6 +23,7 @@ from fes_pin.data.motion import (
     on_common_time,
     plates_in,
     read_motion,
+    renamed_coordinates,
     stated_degrees,
 )
 from fes_pin.data.numbers import instance
@@ -235,7 +236,7 @@ def read_body_trial(
         message = f"expected at least {MIN_ROWS} samples in the time of {coordinates.name}, found {len(time)}"
         raise pushes.error(message, pushes.names[0], 0)
     as_read = AsRead(sha256, b"", recordings=recordings, stated=frozenset(conventions or ()))
-    labels["remarks"] = (*labels.get("remarks", ()), *moves.said, *pushes.said, *said)
+    labels["remarks"] = (*labels.get("remarks", ()), *moves.said, *renamed_coordinates(moves), *pushes.said, *said)
     return _made(columns, time, as_read, name=name, kind="motion", conditions=conditions, **labels)
 
 

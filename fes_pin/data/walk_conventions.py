@@ -16,12 +16,22 @@ import numpy as np
 from fes_pin.data.errors import KeyFault
 from fes_pin.data.schema import check_known, one_of
 from fes_pin.data.walk_forces import FORCES, MOMENTS, MOMENTS_ON, ON, moments, sign_and_unit_of_forces, signs_of_shears
-from fes_pin.data.walk_motion import KNEES, LENGTHS, signs_of_knees, unit_of_pressure, units_of_motion
+from fes_pin.data.walk_level import AXES, axes_of
+from fes_pin.data.walk_motion import (
+    ANKLES,
+    KNEES,
+    LENGTHS,
+    signs_of_ankles,
+    signs_of_knees,
+    unit_of_pressure,
+    units_of_motion,
+)
 from fes_pin.data.walk_plates import PLATES, whose_plates
 from fes_pin.data.walk_recorded import SIDES, Arrays, RecordedWalk
 
 WORDS: Mapping[str, Sequence[str]] = {
     **{f"knee_flexion_{side}": tuple(KNEES) for side in SIDES.values()},
+    **{f"dorsiflexion_{side}": tuple(ANKLES) for side in SIDES.values()},
     "angle_unit": ("rad", "deg"),
     "translation_unit": tuple(LENGTHS),
     "pressure_unit": tuple(LENGTHS),
@@ -29,6 +39,7 @@ WORDS: Mapping[str, Sequence[str]] = {
     "moment_unit": tuple(MOMENTS),
     **{f"{what}_on": tuple(ON) for what in ("fx", "fy", "fz", "moments")},
     "moments_about": ("pressure", "origin"),
+    "axes": AXES,
 }
 """Keys of `[conventions]` and what each may be; the first is how the study format has it."""
 STANDARD = {key: words[0] for key, words in WORDS.items() if key != MOMENTS_ON} | {PLATES[0]: ["r"], PLATES[1]: ["l"]}
@@ -82,7 +93,7 @@ def conventional(
     Returns
     -------
     coordinates
-        rad and m, knees with flexion negative, angles without jumps.
+        rad and m, knees with flexion negative, ankles with dorsiflexion positive, angles without jumps.
     reaction
         `r_` and `l_` `Fx` ... `Tz`: N, m, N m about the centre of pressure, on the foot.
     said
@@ -100,6 +111,8 @@ def conventional(
         unit_of_pressure(walk)
         whose_plates(walk)
         signs_of_knees(walk)
+        signs_of_ankles(walk)
         signs_of_shears(walk)
         moments(walk)
+        axes_of(walk, mass_kg)
     return walk.moves, {f"{s}_{kind}": v for s in SIDES for kind, v in walk.plates[s].items()}, tuple(walk.said)

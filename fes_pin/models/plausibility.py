@@ -18,6 +18,7 @@ from fes_pin.models.conventions import answered_angle
 from fes_pin.models.effects.coulomb_friction import STATED
 from fes_pin.models.goals import check_no_goal
 from fes_pin.models.model import Model
+from fes_pin.models.rigs.ankle import Ankle
 from fes_pin.models.rigs.base import RUN_OUT
 from fes_pin.models.rigs.joint import Joint
 
@@ -36,6 +37,8 @@ LONGEST_M = 10.0
 """Largest position and pendulum length in m in a laboratory; values in millimetres are larger."""
 SWING = 2.0 * math.pi
 """Largest angle in rad between two turning points of a pendulum that is not driven: from upright round to upright."""
+ROUNDED = 0.02
+"""rad by which an angle may lie beyond what it can be: a degree of a goniometer's zero."""
 ASKEW = 0.5
 """Angle in rad from hanging above which dry friction hardly holds a pendulum: half of its weight acts there."""
 STICKS = 2.0
@@ -63,8 +66,10 @@ def odd_numbers(study: Study | ToPredict, model: Model, simulated: Simulation) -
     check_no_goal(study, model.rig)
     odd = [*implausible(study), *_steps(study, model), *_range(study, model)]
     odd += _of_urdf(study, model) if isinstance(study, Study) and isinstance(model.rig, Joint) else []
+    turned = [*_turned(study, model, simulated)]
     odd += answered_angle(study.trials, model.rig)
-    return [*odd, *_swings(study, model), *_turned(study, model, simulated), *_at_rest(study, model)]
+    odd += [] if any(words.startswith("angle_rad") for words in turned) else _of_ankle(study, model)
+    return [*odd, *_swings(study, model), *turned, *_at_rest(study, model)]
 
 
 def warn_of_odd_numbers(model: Model, trials: Sequence[Trial], simulated: Simulation) -> None:
@@ -159,6 +164,20 @@ def _range(study: Study | ToPredict, model: Model) -> Iterable[str]:
         yield f"position reaches {most:.4g} m: is it in mm?"
 
 
+def _of_ankle(study: Study | ToPredict, model: Model) -> Iterable[str]:
+    """Yield a warning for angles that no foot has to its leg: a dynamometer counts from the foot at right angles."""
+    if not isinstance(model.rig, Ankle):
+        return
+    found = {t.name: t["angle_rad"] for t in study.trials if "angle_rad" in t}
+    found |= {t.name: np.array([t.conditions["angle_rad"]]) for t in study.trials if "angle_rad" in t.conditions}
+    odd = {name: q for name, q in found.items() if np.min(q) < -ROUNDED or np.max(q) > math.pi + ROUNDED}
+    if odd:
+        least, most = (math.degrees(f(f(q) for q in odd.values())) for f in (min, max))
+        counts = "an ankle's counts from 0, folded back on the leg, over 90, hanging, to 180 degrees"
+        how = "zero = -90 in [columns], or scale = -1 and zero = 90 of dorsiflexion, reads 0 at right angles as 90"
+        yield f"angle_rad is {least:.3g} to {most:.3g} degrees in {trials_named([*odd])}: {counts}; {how}"
+
+
 def _weight(model: Model) -> float:
     """Greatest moment of the weight of what a joint carries, N m; 0 of a balanced wheel."""
     return math.hypot(model.rig.constants.get("gravity_cos", 0.0), model.rig.constants.get("gravity_sin", 0.0))
@@ -178,7 +197,8 @@ def _swings(study: Study | ToPredict, model: Model) -> Iterable[str]:
     if off := {n: rest for n, rest in rests.items() if math.cos(rest - hangs) < math.cos(ASKEW)}:
         said = f"position comes to rest at {_ends(off)} rad, and by the URDF it hangs at {hangs + 0.0:.4g}, in"
         zero = f"zero in [columns], {math.degrees(np.mean([*off.values()]) - hangs):.3g} of degrees"
-        yield f"{said} {trials_named([*off])}: is its zero elsewhere ({zero}), or its sign another?"
+        asks = f"is its zero elsewhere ({zero}), its sign another, or does a torque hold it?"
+        yield f"{said} {trials_named([*off])}: {asks}"
         return
     length = c["inertia"] * 9.81 / _weight(model)
     if length > LONGEST_M:

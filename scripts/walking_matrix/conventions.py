@@ -127,13 +127,13 @@ def about_origin(folder: Path) -> None:
     put(folder / "grf.csv", columns)
 
 
-def turned(angle: float, wraps: bool = False) -> Callable[[Path], None]:
-    """Return what turns the laboratory about the vertical by an angle, rad."""
+def turned(angle: float, wraps: bool = False, axis: np.ndarray = Y) -> Callable[[Path], None]:
+    """Return what turns the laboratory by an angle, rad, about the vertical or another axis."""
 
     def spoil(folder: Path) -> None:
         moves, pushes = read(folder / "coords.csv"), read(folder / "grf.csv")
         tilt, lean, rotation = (moves[f"q_pelvis_{n}"] for n in ("tilt", "list", "rotation"))
-        about = turn(Y, np.array([angle]))[0]
+        about = turn(axis, np.array([angle]))[0]
         pelvis = about @ turn(Z, tilt) @ turn(X, lean) @ turn(Y, rotation)
         _put_pelvis(moves, pelvis, wraps)
         place = np.stack([moves[f"q_pelvis_t{c}"] for c in "xyz"], 1) @ about.T
@@ -211,14 +211,16 @@ def reordered(folder: Path) -> None:
         put(folder / file, {time: values, **dict(reversed(rest))})
 
 
-def _knee(sides: str) -> Callable[[Path], None]:
-    return scaled("coords.csv", lambda n: n in [f"q_knee_angle_{s}" for s in sides], -1.0)
+def _joint(joint: str, sides: str) -> Callable[[Path], None]:
+    return scaled("coords.csv", lambda n: n in [f"q_{joint}_angle_{s}" for s in sides], -1.0)
 
 
 WRONG: Mapping[str, tuple[Callable[[Path], None], str]] = {
-    "right knee": (_knee("r"), "the right knee counts flexion positive"),
-    "left knee": (_knee("l"), "the left knee counts flexion positive"),
-    "both knees": (_knee("rl"), "both knees count flexion positive"),
+    "right knee": (_joint("knee", "r"), "the right knee counts flexion positive"),
+    "left knee": (_joint("knee", "l"), "the left knee counts flexion positive"),
+    "both knees": (_joint("knee", "rl"), "both knees count flexion positive"),
+    "left ankle": (_joint("ankle", "l"), "the left ankle counts dorsiflexion negative"),
+    "both ankles": (_joint("ankle", "rl"), "both ankles count dorsiflexion negative"),
     "exchanged feet": (exchanged, "the feet are exchanged"),
     "numbered plates": (numbered, "plate 1 is the left foot's, plate 2 is the right foot's"),
     "three plates": (walkway, "plate 3 is "),
@@ -235,6 +237,7 @@ WRONG: Mapping[str, tuple[Callable[[Path], None], str]] = {
     "pressure in mm": (scaled("grf.csv", lambda n: "cop" in n, 1000.0), "centres of pressure are taken as mm"),
     "translations in mm": (scaled("coords.csv", lambda n: n in ("q_pelvis_tx", "q_pelvis_ty", "q_pelvis_tz"), 1000.0),
                            "translations of the pelvis are taken as mm"),
+    "inclined axes": (turned(np.radians(-15.0), axis=Z), "the axes are taken as inclined by 1"),
 }  # fmt: skip
 """What is done to a study on purpose, and what a remark must then say."""
 TWICE = ("shear sign", "moments about a corner")

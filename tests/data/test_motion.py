@@ -99,6 +99,48 @@ def test_paths_of_a_states_file(folder):
     )
 
 
+OTHER_NAMES = {
+    "lenhart": {"hip_flexion": "hip_flex", "hip_adduction": "hip_add", "hip_rotation": "hip_rot", "knee_angle": "knee_flex"},
+    "flexion": {"knee_angle": "knee_flexion", "ankle_angle": "ankle_dorsiflexion", "pelvis_rotation": "pelvis_rot"},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", OTHER_NAMES)
+def test_other_names_of_coordinates_are_taken_and_said(folder, case):
+    text = (folder / "coords.mot").read_text()
+    usual = read_study(folder).trials[0]
+    for name, other in OTHER_NAMES[case].items():
+        text = text.replace(f"\t{name}", f"\t{other}")
+    (folder / "coords.mot").write_text(text)
+    found = read_study(folder).trials[0]
+    for name in REQUIRED:
+        np.testing.assert_array_equal(found[f"q_{name}"], usual[f"q_{name}"])
+    (said,) = set(found.remarks) - set(usual.remarks)
+    assert all(f"{other}_r as {name}_r" in said for name, other in OTHER_NAMES[case].items() if "pelvis" not in name)
+
+
+@pytest.mark.parametrize("other", ["ankle_plantarflexion_r", "ankle_moment_r", "ankle_angle_x_r"])
+def test_names_that_may_mean_another_sign_or_thing_are_no_coordinates(folder, other):
+    text = (folder / "coords.mot").read_text()
+    (folder / "coords.mot").write_text(text.replace("\tankle_angle_r", f"\t{other}"))
+    with pytest.raises(InputError, match=f"missing; found {other}, which is another name or unit"):
+        read_study(folder)
+
+
+def test_a_coordinate_by_its_own_name_leaves_a_column_of_another_one_alone(folder):
+    text = (folder / "coords.mot").read_text()
+    usual = read_study(folder).trials[0]
+    (folder / "coords.mot").write_text(text.replace("\thip_flexion_r", "\tknee_flex_r\thip_flexion_r"))
+    lines = (folder / "coords.mot").read_text().splitlines()
+    place = lines[6].split("\t").index("knee_flex_r")
+    rows = [row.split("\t") for row in lines[7:] if row]
+    lines[7:] = ["\t".join([*row[:place], "5.5", *row[place:]]) for row in rows]
+    (folder / "coords.mot").write_text("\n".join([*lines, ""]))
+    found = read_study(folder).trials[0]
+    np.testing.assert_array_equal(found["q_knee_angle_r"], usual["q_knee_angle_r"])
+    assert found.remarks == usual.remarks
+
+
 BAD = {  # file, old, new, blamed, row, key, words
     "no_endheader": ("coords.mot", "endheader", "end", "coords.mot", 15, None, "endheader"),
     "no_unit": ("coords.mot", "inDegrees=yes", "inRadians=no", "coords.mot", 1, None, "inDegrees=yes"),

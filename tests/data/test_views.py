@@ -204,6 +204,25 @@ def test_sources_without_a_time_in_common(tmp_path):
     assert "is also in pos" in refused(tmp_path, both, files)
 
 
+@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("case", ["moves again", "steps", "pushed twice"])
+def test_what_moves_again_from_rest_or_swings_further_is_not_free(case, seed):
+    """A joint that somebody wears rests where it ended, and moves by itself; a hand may push it twice."""
+    random = np.random.default_rng(seed)
+    time = np.arange(0.0, 24.0, DT)
+    size, rate = random.uniform(0.2, 1.5) * random.choice([-1.0, 1.0]), random.uniform(3.0, 6.0)
+    swing = lambda since: np.where(since > 0.0, np.exp(-1.2 * since) * np.sin(rate * since), 0.0)  # noqa: E731
+    if case == "moves again":
+        shape = swing(time - 2.0) + 0.4 * swing(time - 12.0)
+    elif case == "steps":
+        walks = (time > 2.0) & (time < 20.0)
+        shape = walks * np.sin(rate * (time - 2.0)) * (1.0 + 0.15 * random.standard_normal(9)[(time // 3).astype(int)])
+    else:
+        shape = swing(time - 2.0) + random.uniform(0.3, 0.6) * swing(time - 2.0 - 4.0 * np.pi / rate)
+    position = size * shape + 5e-4 * abs(size) * random.standard_normal(len(time)) + 0.3
+    assert free_from(time, position) is None
+
+
 def test_a_position_is_the_integral_of_a_speed(tmp_path):
     time = np.arange(0.0, 4.0, DT)
     files = {"a.csv": {"time_s": time, "velocity": np.cos(3.0 * time)}}

@@ -90,6 +90,19 @@ def test_a_muscle_pulls_whichever_way_the_dynamometer_counts(tmp_path):
     assert told == [s < 0.0 for s in signs]
 
 
+@pytest.mark.parametrize("seed", range(2))
+def test_an_angle_that_counts_from_the_foot_at_right_angles_is_said(tmp_path, seed):
+    """So dynamometers count: plantar flexion or dorsiflexion from 0; the model's muscle would push below 0."""
+    usual = made(tmp_path, seed=seed)
+    for turned in (lambda q: q - 0.5 * np.pi, lambda q: 0.5 * np.pi - q, lambda q: q + 0.5 * np.pi):
+        trials = tuple(t.with_columns(angle_rad=turned(t["angle_rad"])) for t in usual.trials)
+        (said,) = [
+            w for w in check_study(replace(usual, trials=trials), nominal_model(usual)) if "an ankle's counts" in w
+        ]
+        assert "zero = -90" in said and "\n" not in said
+    assert not [w for w in check_study(usual, nominal_model(usual)) if "an ankle's counts" in w]
+
+
 @pytest.mark.parametrize("cause", ["force_velocity", "passive_relaxation"])
 def test_a_hidden_cause_is_named_and_predicted(tmp_path, cause):
     """Through files: study, diagnosis, model, and a trial from its inputs alone."""

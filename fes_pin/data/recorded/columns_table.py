@@ -151,6 +151,7 @@ FILE_KEYS: Mapping[str, Callable[[Any, ValueFault], Any]] = {
     **{"delimiter": _word(DELIMITERS), "decimal": _word(DECIMALS)},
     **{"header_row": _header_row, "first_row": partial(_line, least=1)},
     **{"comment": _comment, "encoding": _word(ENCODINGS), "names": _file_names, "transposed": _true_or_false},
+    "labelled": _true_or_false,
     **{"sheet": _sheet},
     **{"resample_hz": positive("Hz").check, "missing": _word((INTERPOLATE,)), "rows": _word((EVENTS,))},
 }

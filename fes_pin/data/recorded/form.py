@@ -5,6 +5,7 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
+from fes_pin.data.recorded.labelled import without_names
 from fes_pin.data.recorded.sheets import lines_in
 
 DELIMITERS = (";", "\t", ",", " ")
@@ -42,6 +43,8 @@ class TextForm:
         Of the columns, instead of those in the header; () for those.
     transposed
         Whether each line holds one quantity: its name, unless `names` or the header have the names, then its samples.
+    labelled
+        Whether numbers stand behind their names, as `angle: 1.36`, in each line.
     comment
         What a line begins with that is passed over; "" for nothing.
     encoding
@@ -61,18 +64,20 @@ class TextForm:
     encoding: str = "utf-8"
     names: tuple[str, ...] = ()
     transposed: bool = False
+    labelled: bool = False
     sheet: str = ""
     strict: bool = False
 
     def lines(self, path: Path) -> list[str]:
-        """Lines of a file, or of a sheet of a spreadsheet.
+        """Lines of a file, or of a sheet of a spreadsheet, without names before their numbers.
 
         Raises
         ------
         InputError
             As `lines_in`.
         """
-        return lines_in(path, self.encoding, self.delimiter, self.sheet)
+        found = lines_in(path, self.encoding, self.delimiter, self.sheet)
+        return without_names(found) if self.labelled else found
 
     def in_words(self) -> str:
         """What sets this form apart from that of the study format; "" if nothing does."""
@@ -83,7 +88,9 @@ class TextForm:
             said.append("decimal commas")
         if self.transposed:
             said.append("one quantity in each line")
-        if self.header_row == 0:
+        if self.labelled:
+            said.append("names before the numbers of each line")
+        elif self.header_row == 0:
             said.append("no header")
         elif self.header_row > 1:
             said.append(f"a header in row {self.header_row}")

@@ -10,8 +10,8 @@
 | `.mot`, `.sto`, `.trc`, `.json` | none | |
 """
 
+import re
 import warnings
-from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -137,28 +137,30 @@ def matlab_vectors(path: Path) -> dict[str, np.ndarray]:
     InputError
         Not a MATLAB file, hardly more than objects of a class, or pymatreader is not installed.
     """
+    return _found_in(path)[0]
+
+
+def _found_in(path: Path) -> tuple[dict[str, np.ndarray], float | None]:
+    """Every vector of numbers in a file that nests them, by dotted names, and the sample rate that it states, Hz.
+
+    Of JSON a list of records has a vector of each key, and a null among numbers is a missing sample.
+    """
+    content, is_odd = _NESTED[path.suffix.lower()](path)
+    found = dict(_vectors(content))
+    if is_odd and len(found) < 2:  # no time with a quantity
+        words = "expected arrays of numbers; objects of a class, as timeseries and table, are not read"
+        raise InputError(f"{words}: save their times and data as arrays", file=path)
+    rates = {float(value) for name, value in _scalars(content) if SAMPLED.match(name.rpartition(".")[2]) and value > 0}
+    return found, rates.pop() if len(rates) == 1 else None
+
+
+def _matlab(path: Path) -> tuple[Any, bool]:
+    """What a MATLAB file holds, and whether it holds objects of a class as well."""
     reader = _library("pymatreader", "matlab", path)
     with _reading(path, "a MATLAB file"), warnings.catch_warnings(record=True) as objects:
         warnings.simplefilter("always")
         content = {key: one for key, one in reader.read_mat(str(path)).items() if not str(key).startswith("#")}
-    found = dict(_vectors(content))
-    if objects and len(found) < 2:  # no time with a quantity
-        words = "expected arrays of numbers; objects of a class, as timeseries and table, are not read"
-        raise InputError(f"{words}: save their times and data as arrays", file=path)
-    return found
-
-
-def json_vectors(path: Path) -> dict[str, np.ndarray]:
-    """Every vector of numbers in a JSON file, by dotted names; a list of records has a vector of each key.
-
-    A null among numbers is a missing sample.
-
-    Raises
-    ------
-    InputError
-        Not a JSON file.
-    """
-    return dict(_vectors(_of_records(read_json(path))))
+    return content, bool(objects)
 
 
 def _of_records(content: Any) -> Any:
@@ -174,8 +176,13 @@ def _of_records(content: Any) -> Any:
     return [_of_records(one) for one in content]
 
 
-_NESTED = {".mat": matlab_vectors, ".json": json_vectors}
-"""Vectors of files that nest them, by suffix."""
+_NESTED: Mapping[str, Callable[[Path], tuple[Any, bool]]] = {
+    ".mat": _matlab,
+    ".json": lambda path: (_of_records(read_json(path)), False),
+}
+"""What files hold that nest vectors, by suffix."""
+SAMPLED = re.compile(r"(?i)(fs|fsamp|sfreq|srate|frame_?rate|samp[a-z]*_?(rate|freq[a-z]*)|f_?sampl[a-z]*)(_?hz)?$")
+"""Names of a number that is the rate of the samples."""
 
 
 def is_nested(path: Path) -> bool:
@@ -184,40 +191,71 @@ def is_nested(path: Path) -> bool:
 
 
 def _nested(path: Path, wanted: Sequence[str] | None) -> Table:
-    columns = _NESTED[path.suffix.lower()](path)
+    columns, _ = _found_in(path)
     if wanted is None and columns:  # scalars and tables of other lengths are no columns of the recording
-        count = Counter(len(v) for v in columns.values()).most_common(1)[0][0]
+        count = _usual_length(columns)
         columns = {n: v for n, v in columns.items() if len(v) == count}
     return _made(path, columns, wanted)
 
 
-def by_length(path: Path, chosen: Collection[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Names of vectors of one length in a file that nests them, and a sentence about others that go together.
+def by_length(path: Path, chosen: Collection[str]) -> tuple[tuple[str, ...], float | None, tuple[str, ...]]:
+    """Names of vectors of one length in a file that nests them, their rate, and a sentence about others.
 
     Parameters
     ----------
     chosen
         What a person says of columns: a vector's name begins it, and decides the length; else the most have it.
 
+    Returns
+    -------
+    names : tuple of str
+    rate_hz : float or None
+        Of the samples, where the file states it: `fs`, `SampleRate`.
+    said : tuple of str
+        Of other vectors that go together.
+
     Raises
     ------
     InputError
-        As `matlab_vectors` and `json_vectors`.
+        As `matlab_vectors`; not a JSON file.
     """
-    columns = _NESTED[path.suffix.lower()](path)
-    groups: dict[int, list[str]] = {}
-    for name, values in columns.items():
-        groups.setdefault(len(values), []).append(name)
+    columns, rate_hz = _found_in(path)
+    groups = _by_length(columns)
     asked = [n for n in columns if any(words == n or words.startswith((f"{n}:", f"{n},")) for words in chosen)]
-    count = len(columns[asked[0]]) if asked else max(groups, key=lambda n: len(groups[n]), default=0)
+    count = len(columns[asked[0]]) if asked else _usual_length(columns)
     others = {n: names for n, names in groups.items() if n != count and len(names) > 1}
     if not others:
-        return tuple(groups.get(count, ())), ()
+        return tuple(groups.get(count, ())), rate_hz, ()
     parts = "; ".join(f"{n} samples: {_few(names)}" for n, names in list(others.items())[:MOST_LISTED])
     more = f" ... and {len(others) - MOST_LISTED} lengths more" if len(others) > MOST_LISTED else ""
     first = next(iter(others.values()))[0]
     how = f"--column COLUMN={first} takes those of its length"
-    return tuple(groups[count]), (f"vectors of {count} samples are taken; there are also {parts}{more}; {how}",)
+    return (
+        tuple(groups[count]),
+        rate_hz,
+        (f"vectors of {count} samples are taken; there are also {parts}{more}; {how}",),
+    )
+
+
+def _by_length(columns: Mapping[str, np.ndarray]) -> dict[int, list[str]]:
+    groups: dict[int, list[str]] = {}
+    for name, values in columns.items():
+        groups.setdefault(len(values), []).append(name)
+    return groups
+
+
+def _usual_length(columns: Mapping[str, np.ndarray]) -> int:
+    """The length that most vectors have; where none has another's, the longest.
+
+    Members of one list that differ in length, as the times of events by unit, are no columns of a recording.
+    """
+    lists: dict[str, set[int]] = {}
+    for name, values in columns.items():
+        if name.rpartition(".")[2].isdigit():
+            lists.setdefault(name.rpartition(".")[0], set()).add(len(values))
+    alike = {n: v for n, v in columns.items() if len(lists.get(n.rpartition(".")[0], ())) < 2} or columns
+    groups = _by_length(alike)
+    return max(groups, key=lambda n: (len(groups[n]), n if len(groups[n]) == 1 else 0), default=0)
 
 
 def _few(names: Sequence[str]) -> str:
@@ -248,6 +286,16 @@ def _vectors(content: Any, name: str = "") -> Iterator[tuple[str, np.ndarray]]:
     table = values if values.shape[0] >= values.shape[1] else values.T
     for place, column in enumerate(table.T, 1):
         yield f"{name}.{place}", column.astype(float)
+
+
+def _scalars(content: Any, name: str = "") -> Iterator[tuple[str, float]]:
+    """Single numbers in nested structures, by dotted names."""
+    if isinstance(content, Mapping):
+        for key, value in content.items():
+            if not str(key).startswith("__"):
+                yield from _scalars(value, f"{name}.{key}" if name else str(key))
+    elif isinstance(content, int | float | np.number) and not isinstance(content, bool):
+        yield name, float(content)
 
 
 def _c3d(path: Path, wanted: Sequence[str] | None) -> Table:

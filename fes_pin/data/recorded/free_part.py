@@ -12,6 +12,8 @@ from fes_pin.data.recorded.parts import REST_S, STILL
 
 SETTLED = 0.05
 """Share of the largest deviation within which the end counts as the place of rest that the record began at."""
+PUSHES = 3
+"""Deviations of half the largest one and more by which a hand brings it there; who walks or works makes more."""
 LARGER = 0.99
 """Share of the largest deviation from which a sample counts as being at it."""
 
@@ -38,4 +40,28 @@ def free_from(time: np.ndarray, position: np.ndarray) -> float | None:
     away = np.abs(position - np.mean(first))
     is_far = away[int(np.argmax(away)) :] >= LARGER * away.max()
     begin = int(np.argmax(away)) + int(np.argmin(is_far)) - 1  # the end of a plateau: a hand may hold it there
-    return float(time[begin]) if count < begin < len(time) - count else None
+    if not count < begin < len(time) - count:
+        return None
+    is_push = len(_peaks(away[: begin + 1], 0.5 * away.max())) <= PUSHES
+    away = position - np.mean(first)
+    return float(time[begin]) if is_push and _falls(away[begin:], reach, count) else None
+
+
+def _peaks(side: np.ndarray, least: float) -> np.ndarray:
+    """The largest deviation of each stretch, shape (m,), in which deviations to one side, (n,), are above the least."""
+    edges = np.flatnonzero(np.diff(np.r_[False, side > least, False].astype(int)))
+    return np.array([side[a:b].max() for a, b in zip(edges[::2], edges[1::2], strict=True)])
+
+
+def _falls(away: np.ndarray, reach: float, count: int) -> bool:
+    """Whether deviations from the place of rest, (n,), are those of a motion whose energy falls, to the end.
+
+    On each side none is larger than an earlier one, and none follows where it has come to rest, for so many samples.
+    """
+    least = SETTLED * reach
+    for peaks in (_peaks(away, least), _peaks(-away, least)):
+        if np.any(peaks[1:] > np.minimum.accumulate(peaks)[:-1] + least):
+            return False
+    windows = np.lib.stride_tricks.sliding_window_view(away, count)
+    rests = (np.ptp(windows, axis=1) < STILL * reach) & (np.abs(windows).max(axis=1) < least)
+    return not rests.any() or bool(np.abs(away[int(np.argmax(rests)) :]).max() < 2.0 * least)

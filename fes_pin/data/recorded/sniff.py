@@ -11,12 +11,13 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from fes_pin.data.errors import InputError
+from fes_pin.data.errors import InputError, listed
 from fes_pin.data.files import as_path, read_bytes
 from fes_pin.data.recorded.clock import clock_seconds
 from fes_pin.data.recorded.form import COMMENTS, DECIMALS, DELIMITERS, MISSING, TextForm, cells_of
 from fes_pin.data.recorded.formats import check_suffix, is_text
 from fes_pin.data.recorded.header import NUMBER, Header, cells_in, header_of, is_keyed, ways
+from fes_pin.data.recorded.labelled import names_before_numbers
 from fes_pin.data.recorded.sheets import is_spreadsheet
 from fes_pin.data.recorded.text import read_text_recording
 from fes_pin.data.table import MIN_ROWS, Table
@@ -45,20 +46,25 @@ def sniffed(path: Path, stated: Mapping[str, Any] = MappingProxyType({})) -> tup
         Not a text file, or no rows of numbers in it.
     """
     lines, rows, form = _likeliest(path, str(stated.get("sheet", "")))
+    called = Header(names=form.names, said=_labels_in_words(form.names)) if form.labelled else None
     found = max(_first_of(lines, rows, form), int(stated.get("header_row", 0)))
     first = int(stated.get("first_row", found + 1)) - 1
     above = lines[:first]
-    turned = None if "transposed" in stated else _transposed(above, rows, form)
+    turned = None if "transposed" in stated or called else _transposed(above, rows, form)
     below = [place for place, _ in reversed(rows) if place >= first] or [rows[-1][0]]
     columns = len(rows[0][1])
     numbers = [(cells_of(lines[place], form) + [""] * columns)[:columns] for place in below[:2]]
-    header = turned or (Header() if stated.get("transposed") else header_of(above, form, numbers))
-    if not turned:
+    header = called or turned or (Header() if stated.get("transposed") else header_of(above, form, numbers))
+    if not (turned or called):
         header = replace(header, said=(*header.said, *_odd_of_table(header, above, form, (len(rows), columns))))
     if {"names", "header_row", "transposed"} & set(stated):
         header = Header(int(stated.get("header_row", header.row)), rate_hz=header.rate_hz)
     form = replace(form, header_row=header.row, names=header.names, transposed=turned is not None, first_row=first + 1)
     return replace(form, **stated), header
+
+
+def _labels_in_words(names: Sequence[str]) -> tuple[str, ...]:
+    return (f"its lines have names before their numbers: {listed([n for n in names if n])}",)
 
 
 def _odd_of_table(header: Header, above: Sequence[str], form: TextForm, shape: tuple[int, int]) -> list[str]:
@@ -78,8 +84,10 @@ def _likeliest(path: Path, sheet: str) -> tuple[list[str], Rows, TextForm]:
     if is_spreadsheet(path):
         forms = [TextForm(sheet=sheet)]
     else:
-        encoding = _encoding(path)
-        forms = [TextForm(delimiter, decimal, encoding=encoding) for delimiter in DELIMITERS for decimal in DECIMALS]
+        plain = TextForm(encoding=_encoding(path))
+        if called := names_before_numbers(plain.lines(path)[:LOOKED_AT]):
+            plain = replace(plain, labelled=True, names=called)
+        forms = [replace(plain, delimiter=sign, decimal=point) for sign in DELIMITERS for point in DECIMALS]
     every = forms[0].lines(path)
     lines = _without_footer(_first_block(every[:LOOKED_AT]))
     rows, form = max(((_rows(lines, form), form) for form in forms), key=lambda pair: _likely(*pair))
