@@ -30,5 +30,6 @@ def test_the_nearest_set_has_no_cause_that_the_others_replace(seed, tmp_path):
 def test_no_zero_by_trial_is_named_in_a_model_that_is_none(tmp_path):
     """A joint that dry friction stops in other places: the zeros of an effort differed, and E was 25 %."""
     found = fp.diagnose(study_of(929200, tmp_path))
-    assert {found.causes[0].name, *found.causes[0].equivalents} >= {"base_tilt", "sensor_offset"}
-    assert [c.name for c in found.causes[1:]] == ["coulomb_friction"] and found.extended_error[1] < 0.1
+    friction, other = sorted(found.causes, key=lambda c: c.name != "coulomb_friction")  # each gains about as much
+    assert friction.name == "coulomb_friction" and found.extended_error[1] < 0.1
+    assert {other.name, *other.equivalents} >= {"base_tilt", "sensor_offset"}
