@@ -125,14 +125,18 @@ class NewColumns:
         needed = [self.derived.get(c, c) for c in motion]
         inputs = self._inputs(order)
         if not inputs and schema.inputs_required and kinds != {IMPOSED}:
-            first, *others = dict.fromkeys(c for k in order for c in schema.stimuli(k))
-            passive = f"; or --set kind={IMPOSED} where nothing is stimulated" if IMPOSED in schema.outputs else ""
-            self.instead[first] = f"; or in its place {listed(others, ' or ')}{passive}" if others else passive
-            needed.append(first)
+            needed.append(self._asked_stimulus(order))
         read = {c for k in order for c in schema.columns_of(k)}
         others = [c for c in (*schema.optional, *schema.imposed) if c in read]
         sources = {c: self._source(c, c in needed) for c in dict.fromkeys([*needed, *inputs, *others])}
         return {column: source for column, source in sources.items() if source is not None}
+
+    def _asked_stimulus(self, kinds: Sequence[str]) -> str:
+        """The first stimulus, which is asked for; what may stand in its place is said."""
+        first, *others = dict.fromkeys(c for k in kinds for c in self.schema.stimuli(k))
+        passive = f"; or --set kind={IMPOSED} where nothing is stimulated" if IMPOSED in self.schema.outputs else ""
+        self.instead[first] = f"; or in its place {listed(others, ' or ')}{passive}" if others else passive
+        return first
 
     def times(self) -> dict[str, Source]:
         """For each source of the trials what its table says of `time_s`, with the file's own name of the column."""
@@ -217,14 +221,18 @@ class NewColumns:
             own, those = own_unit(column, self.wanted.revolute), listed(named or levers, " or ")
             self._ask(column, f"NAME,scale=NUMBER ({those}; {own} for each unit of it{nothing})")
             return None
+        self._ask(column, f"NAME:UNIT ({self._could(column, candidates, free)}{nothing})")
+        return None
+
+    def _could(self, column: str, candidates: Sequence[str], free: Mapping[str, str]) -> str:
+        """What could be a column, in words: candidates, else what no other column takes, or another way to have it."""
         left = f"one of {listed(list(free.values()))}" if free else "no column is left"
         could = listed(candidates, " or ") if candidates else left
         if column == "time_s":
             could += "; or rate=HZ of a file without times"
         if not candidates and (rate := INTEGRATED.get(column)) in self.schema.columns:
             could += f"; without one --column {rate}=NAME:UNIT is integrated"
-        self._ask(column, f"NAME:UNIT ({could}{nothing})")
-        return None
+        return could
 
     def _free(self, column: str, seen: Seen) -> dict[str, str]:
         """All columns, in words with their units, but for those that another of the rig's takes."""

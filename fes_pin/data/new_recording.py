@@ -123,7 +123,11 @@ def proposals_of(
         raise InputError(f"expected rows of numbers in one of its sheets, {listed(sheets)}", file=path)
     if apart := _one_quantity_each([one for some in alike.values() for one in some], schema):
         return apart
-    taken = max(alike.values(), key=lambda some: sum(len(one.recording) for one in some))
+    return _alike_sheets(path, max(alike.values(), key=lambda some: sum(len(one.recording) for one in some)), sheets)
+
+
+def _alike_sheets(path: Path, taken: Sequence[Proposal], sheets: Sequence[str]) -> list[Proposal]:
+    """Sheets of a spreadsheet that hold the same columns, as trials; which are taken and which are left is said."""
     names, form = [one.sheet for one in taken], taken[0].form or TextForm()
     if names[1:] and not form.names and not form.header_row:
         message = f"{listed(names)} hold columns without names: expected --sheet NAME, or --names where they are alike"
@@ -139,22 +143,26 @@ def _one_quantity_each(sheets: Sequence[Proposal], schema: RigSchema) -> list[Pr
     longest = max(sheets, key=lambda one: len(one.recording))
     held = {one.sheet: quantities_held(one, words_of(one.sheet), schema) for one in sheets}
     found = [one for one in sheets if held[one.sheet] and end_at_once(_ends(one), _ends(longest))]
-    if len(found) < 2 or sum(len(held[one.sheet]) for one in found) > len(
-        {c for one in found for c in held[one.sheet]}
-    ):
+    each = [held[one.sheet] for one in found]
+    if len(found) < 2 or sum(map(len, each)) > len(frozenset().union(*each)):
         return []
     out: dict[str, Proposal] = {}
     for place, one in enumerate(found, 1):
         meant = sorted(words_of(one.sheet) & {w for c in held[one.sheet] for w in MEANT.get(c, ())})
         source = next((word for word in meant if word not in out), f"sheet{place}")
-        form, unit = replace(one.form or TextForm(), sheet=one.sheet), split_header(one.sheet)[1]
-        time = one.candidates["time_s"]
-        units = {n: u or (unit if n not in time else "") for n, u in one.units.items()}
-        out[source] = replace(one, form=form, sheet="", source=source, units=units)
+        out[source] = _as_source(one, source)
     left = [one.sheet for one in sheets if one not in found]
     first, *others = out.values()
     said = f"{listed([one.sheet for one in found])} of its sheets hold one quantity each of what was recorded at once"
     return [replace(first, said=(*first.said, said + (f", not {listed(left)}" if left else ""))), *others]
+
+
+def _as_source(one: Proposal, source: str) -> Proposal:
+    """A sheet as a source of a trial; a unit in the name of the sheet is that of its columns but for the time."""
+    form, unit = replace(one.form or TextForm(), sheet=one.sheet), split_header(one.sheet)[1]
+    time = one.candidates["time_s"]
+    units = {n: u or (unit if n not in time else "") for n, u in one.units.items()}
+    return replace(one, form=form, sheet="", source=source, units=units)
 
 
 def quantities_held(proposal: Proposal, of_name: Collection[str], schema: RigSchema) -> frozenset[str]:
@@ -289,7 +297,7 @@ def _candidates(
 def _said(name: str) -> frozenset[str]:
     """Words of a name; of `theta_dot` that of a rate, instead of the angle's."""
     words = words_of(split_header(name)[0])
-    apart = frozenset(part for word in words for part in _ENDING.match(word).groups() if part)  # type: ignore[union-attr]
+    apart = frozenset(part for word in words if (found := _ENDING.match(word)) for part in found.groups() if part)
     rates = {RATES[word] for word in apart & RATES.keys()}
     moves = {word for word in apart if _without_numbers(frozenset({word})) & MEANT["position"]}
     rest = apart - moves - RATES.keys()

@@ -124,10 +124,14 @@ class SideBySide:
         others = {n for some in found for n in some.names.values()} - set(self.called.values())
         if not found or chosen & others.difference(found[0].first):
             return [one]
-        words = " and ".join(listed([*some.names.values()]) for some in found[:2]) + " ..." * (len(found) > 2)
         why = f"--split {COLUMNS} says so" if self.split == COLUMNS else _why(one, found)
         if not why and chosen & found[0].first:  # which the person knows
             return [one]
+        return self._as_trials(one, found, why)
+
+    def _as_trials(self, one: FilesOfTrial, found: Sequence[_Set], why: str) -> list[FilesOfTrial]:
+        """Sets of columns as trials, and why they are; the recording with a question where nothing says so."""
+        words = " and ".join(listed([*some.names.values()]) for some in found[:2]) + " ..." * (len(found) > 2)
         if not why:
             either = f"{len(found)} trials side by side or {len(found)} instruments at once"
             return [_saying(one, f"{words} may be {either}: --split {COLUMNS} takes them as trials")]

@@ -424,18 +424,10 @@ class _Reader(StudyTables):
 
     def _trial_names(self, tables: Sequence[Mapping[str, Any]], views: Sequence[tuple[Recordings, View]]) -> list[str]:
         """What trials call themselves, else the stems of their files, or their paths where stems are the same."""
+        self._check_apart(tables, views)
         paths: list[PurePosixPath] = []
-        seen: dict[Path, list[tuple[str, View, set[str]]]] = {}
-        for index, (table, (recordings, view)) in enumerate(zip(tables, views, strict=True)):
-            main, (path, own) = next(iter(recordings.items()))
-            shared = ("time_s", *self.schema.inputs)  # which trials side by side may have in common
-            seen_of = replace(view, sheet=view.sheet or own.form.sheet) if own is not None else view
-            once = {s.name for c, s in own.sources.items() if c not in shared} if own is not None else set()
-            key = f"trial[{index}].{main if main in table else f'sources.{main}'}"
-            for other, earlier, others in seen.get(path.resolve(), []):
-                if seen_of.overlaps(earlier) and (once & others or not (once and others)):
-                    raise self.error(key, f"the same file as {other}; expected from and to that tell them apart")
-            seen.setdefault(path.resolve(), []).append((key, seen_of, once))
+        for table, (recordings, _) in zip(tables, views, strict=True):
+            main = next(iter(recordings))
             paths.append(PurePosixPath((table[main] if main in table else table["sources"][main]).replace("\\", "/")))
         stems = Counter(path.stem for path in dict.fromkeys(paths))
         names = [path.stem if stems[path.stem] == 1 else str(path.with_suffix("")) for path in paths]
@@ -443,6 +435,22 @@ class _Reader(StudyTables):
         count = Counter(names)
         twice = [f"{n}-{names[:k].count(n) + 1}" if count[n] > 1 else n for k, n in enumerate(names)]
         return [table.get("name", name) for table, name in zip(tables, twice, strict=True)]
+
+    def _check_apart(self, tables: Sequence[Mapping[str, Any]], views: Sequence[tuple[Recordings, View]]) -> None:
+        """Raise an error where two trials are the same rows of the same readings; inputs may be those of both."""
+        shared = ("time_s", *self.schema.inputs)
+        seen: dict[Path, list[tuple[str, View, set[str]]]] = {}
+        for index, (table, (recordings, whole)) in enumerate(zip(tables, views, strict=True)):
+            main, (path, own) = next(iter(recordings.items()))
+            once, view = set[str](), whole
+            if own is not None:
+                view = replace(whole, sheet=whole.sheet or own.form.sheet)
+                once = {s.name for c, s in own.sources.items() if c not in shared}
+            key = f"trial[{index}].{main if main in table else f'sources.{main}'}"
+            for other, earlier, others in seen.get(path.resolve(), []):
+                if view.overlaps(earlier) and (once & others or not (once and others)):
+                    raise self.error(key, f"the same file as {other}; expected from and to that tell them apart")
+            seen.setdefault(path.resolve(), []).append((key, view, once))
 
     def _trials(self, where: str, table: Mapping[str, Any], seen: tuple[Recordings, View], name: str) -> list[Trial]:
         """The trials of one `[[trial]]`: one, or the parts that its view is split into."""

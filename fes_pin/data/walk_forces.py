@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from fes_pin.data.legs import origin_of
-from fes_pin.data.walk_recorded import FEWEST, LOADED_N, SIDES, STANDS, RecordedWalk, vectors_of
+from fes_pin.data.walk_recorded import FEWEST, GRAVITY, LOADED_N, SIDES, STANDS, RecordedWalk, vectors_of
 
 ON = {"foot": 1.0, "ground": -1.0}
 """What a force or moment may act on, and the factor that makes it the one on the foot."""
@@ -134,7 +134,7 @@ def _moved_to_pressure(walk: RecordedWalk, side: str, stated: bool) -> None:
 def _is_person(weight_n: float, mass_kg: float | None) -> bool:
     """Whether a mean vertical force may be that of the body."""
     least, most = PERSON_KG if mass_kg is None else (share * mass_kg for share in CARRIED)
-    return least < weight_n / 9.81 < most
+    return least < weight_n / GRAVITY < most
 
 
 def _correlation(one: np.ndarray, other: np.ndarray) -> float:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from fes_pin.data.legs import origin_of, pelvis_of
-from fes_pin.data.walk_recorded import LOADED_N, RecordedWalk, vectors_of
+from fes_pin.data.walk_recorded import GRAVITY, LOADED_N, RecordedWalk, vectors_of
 
 AXES = ("level", "inclined")
 """What the laboratory's axes may be; the first is the study format's."""
@@ -24,7 +24,6 @@ CARRIED = 0.9
 """Share of the time that somebody stands on the plates; who steps next to them has forces that nobody measured."""
 WEIGHS = (0.85, 1.15)
 """Mean force over the weight of a known mass: a stated mass may be wrong by as much, and not what pushes or holds."""
-GRAVITY = 9.81
 
 
 def axes_of(walk: RecordedWalk, mass_kg: float | None) -> None:

@@ -15,6 +15,8 @@ ENOUGH_S, FEWEST = 0.3, 10
 """s and samples; of less nothing is tested (a single support lasts 0.4 s)."""
 STANDS = 0.2
 """Share of its largest vertical force above which a foot counts as standing: its centre of pressure is exact there."""
+GRAVITY = 9.81
+"""Standard gravity as the paper rounds it, m/s2 (eq. 7)."""
 LOADED_N = 20.0
 """A foot stands where its vertical force is above this: the usual threshold on instrumented treadmills."""
 SWINGS = 0.2

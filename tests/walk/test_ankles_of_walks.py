@@ -1,4 +1,4 @@
-"""An ankle that counts the other way is told by its foot, which turns while it lies flat; of less nothing is said."""
+"""The sign of an ankle follows from its foot, which would turn with the other sign while it lies flat."""
 
 import numpy as np
 import pytest

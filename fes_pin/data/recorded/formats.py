@@ -274,6 +274,11 @@ def _vectors(content: Any, name: str = "") -> Iterator[tuple[str, np.ndarray]]:
         for place, value in enumerate(content, 1):
             yield from _vectors(value, f"{name}.{place}")
         return
+    yield from _of_array(content, name)
+
+
+def _of_array(content: Any, name: str) -> Iterator[tuple[str, np.ndarray]]:
+    """A vector of numbers, or the columns of a matrix, by name; none of what is too short or no array of numbers."""
     try:
         values = np.asarray(content)
     except ValueError:

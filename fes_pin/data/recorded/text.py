@@ -205,15 +205,20 @@ def _body(lines: list[str], form: TextForm) -> tuple[list[str], np.ndarray]:
     while found and not found[-1][1].strip():
         found.pop()
     if not form.strict:
-        found = [(row, line) for row, line in found if line.strip()]
-        if between := set(lines_between([line for _, line in found], lines[: form.first_row - 1], form)):
-            found = [(row, line) for row, line in found if line not in between]
+        found = _without_lines_between(found, lines[: form.first_row - 1], form)
     if form.comment:
         found = [(row, line) for row, line in found if not line.lstrip().startswith(form.comment)]
     if not form.strict and found and begins_with_sample(found[0][1], form):
         while not begins_with_sample(found[-1][1], form):  # a summary, `End of data`
             found.pop()
     return [line for _, line in found], np.array([row for row, _ in found], dtype=int)
+
+
+def _without_lines_between(found: list[tuple[int, str]], above: list[str], form: TextForm) -> list[tuple[int, str]]:
+    """Numbered lines without blank ones, and without those between the rows that are no row."""
+    found = [(row, line) for row, line in found if line.strip()]
+    between = set(lines_between([line for _, line in found], above, form))
+    return [(row, line) for row, line in found if line not in between] if between else found
 
 
 def _fast(body: list[str], form: TextForm, places: list[int], count: int) -> np.ndarray | None:
