@@ -126,7 +126,7 @@ def signs_of_ankles(walk: RecordedWalk) -> None:
     """Dorsiflexion positive: with the other sign a foot that lies flat would turn, as the shank turns over it."""
     stated = {s: ANKLES.get(walk.stated.get(f"dorsiflexion_{side}", "")) for s, side in SIDES.items()}
     odds = {s: _flatter(walk, s) if walk.long and sign is None else 0.0 for s, sign in stated.items()}
-    is_both = sum(odds.values()) > 2.0 * np.log(FLATTER)
+    is_both = min(odds.values()) > 0.0 and sum(odds.values()) > 2.0 * np.log(FLATTER)
     told = [s for s in SIDES if odds[s] > np.log(FLATTER) or (is_both and stated[s] is None)]
     walk.moves = joints_turned(walk.moves, "ankle", [*told, *(s for s in SIDES if stated[s] == -1.0)])
     if told:
@@ -140,7 +140,8 @@ def _flatter(walk: RecordedWalk, side: str) -> float:
     if not on.any():
         return 0.0
     both = (walk.moves, joints_turned(walk.moves, "ankle", side))
-    spins = [np.abs(leg_of(moves, walk.time, side).spin[on][:, 2]) for moves in both]
+    across = pelvis_of(walk.moves)[on][:, :, 2]  # whichever way the body walks
+    spins = [np.abs(np.sum(leg_of(moves, walk.time, side).spin[on] * across, axis=1)) for moves in both]
     now, then = (float(np.quantile(spin, FLAT)) + RESTS for spin in spins)
     return float(np.log(now / then))
 

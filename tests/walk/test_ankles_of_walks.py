@@ -69,3 +69,15 @@ def test_the_flexion_of_an_ankle_is_taken_by_the_sign_that_the_walk_shows(made):
     found = fp.read_study(made).trials[0]
     assert BOTH in found.remarks and any("ankle_flex_r as ankle_angle_r" in words for words in found.remarks)
     np.testing.assert_allclose(found["q_ankle_angle_l"], usual["q_ankle_angle_l"], atol=1e-9)
+
+
+@pytest.mark.parametrize("made", [0, 1, 9], indirect=True)
+@pytest.mark.parametrize("degrees", [90.0, -40.0, 200.0])
+def test_which_way_the_body_walks_does_not_matter(made, degrees):
+    from walking_matrix.conventions import turned
+
+    turned(np.radians(degrees))(made)
+    assert fp.read_study(made).trials[0].remarks == ()
+    change(made, "ankle", "l")
+    said = "the left ankle counts dorsiflexion negative: taken with the other sign"
+    assert fp.read_study(made).trials[0].remarks == (said,)
