@@ -94,7 +94,7 @@ class InverseDynamics(Estimator):
         return None if state.names == first.names else state
 
 
-class ValuesByEffort(RigVerdict):
+class ValuesByEffort(VerdictByEffort):
     """The verdict on a set with the values of inverse dynamics, of all trials or of those that are not held out."""
 
     def __init__(self, search: LikelihoodSearch, test: Sequence[Trial]) -> None:
@@ -112,12 +112,38 @@ class ValuesByEffort(RigVerdict):
         known = by_effort.values_in(fitted, [t.name for t in fitted.trials])
         return at_values(fitted, known)
 
+    def in_place_of(self, found: Found) -> Found:
+        """Return a set, its nominal model and those without each cause at the values of inverse dynamics."""
+        without = {n: self.at_efforts(f) for n, f in found.without.items()}
+        return replace(found, best=self.at_efforts(found.best), nominal=self.at_efforts(found.nominal), without=without)
+
     def with_intervals(self, fitted: LikelihoodFit) -> LikelihoodFit:
         """See `RigVerdict.with_intervals`; as wide as those of inverse dynamics at least."""
         by_effort, honest = self.models.by_effort, super().with_intervals(fitted)
         if by_effort is None or not by_effort.knows(fitted.names):
             return honest
         return as_wide_as(honest, by_effort.final(by_effort.models.fitted_set(fitted.names)))
+
+
+class ValuesOfInverseDynamics(InverseDynamics):
+    """The same with its own values: where few samples enter a likelihood, as between coarse counts, efforts know more.
+
+    It answers only where it predicts better in each currency.
+    """
+
+    prefers_smaller = False
+
+    def state(self, first: RigState) -> RigState | None:
+        """Return the state of its set at its own values; None where the first state has the same set."""
+        search, by_effort = first.search, first.search.models.by_effort
+        if by_effort is None or search.was_stopped or (names := by_effort.names) == tuple(sorted(first.names)):
+            return None
+        if names not in search.models.fits or not search.models.is_possible(search.models.fits[names]):
+            return None
+        assert isinstance(first.verdict, RigVerdict)
+        verdict = ValuesByEffort(search, first.verdict.test)
+        found = verdict.in_place_of(search.result(names))
+        return State(verdict, found, verdict.weigh(found), {}, frozenset(names), replaced=first)
 
 
 def never_worse(state: RigState) -> tuple[RigState, list[str]]:
@@ -134,8 +160,7 @@ def never_worse(state: RigState) -> tuple[RigState, list[str]]:
         return state, []
     assert isinstance(first, RigVerdict)
     verdict = ValuesByEffort(state.search, first.test)
-    without = {n: verdict.at_efforts(f) for n, f in found.without.items()}
-    again = replace(found, best=verdict.at_efforts(best), nominal=verdict.at_efforts(found.nominal), without=without)
+    again = verdict.in_place_of(found)
     then = by_effort.error_percent(again.best.model)
     if then >= now:
         return state, []

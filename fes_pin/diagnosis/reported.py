@@ -8,7 +8,7 @@ import numpy as np
 
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.by_effort import InverseDynamics, named_by_one, never_worse
+from fes_pin.diagnosis.by_effort import InverseDynamics, ValuesOfInverseDynamics, named_by_one, never_worse
 from fes_pin.diagnosis.decide.chosen_again import share_of
 from fes_pin.diagnosis.decide.rivals import estimates, experiment, not_identifiable, ranking, seen_sizes
 from fes_pin.diagnosis.errors_ahead import AheadErrors, free_errors, noise_that_is_small
@@ -47,7 +47,7 @@ def diagnosis_of(
 ) -> Diagnosis:
     """Return the diagnosis of a rig from a search by the likelihood that has run."""
     first, white = RigVerdict(search, trials[1]).of(found), WhiteProcessNoise()
-    estimators = (InverseDynamics(), white, LeastSquares())
+    estimators = (InverseDynamics(), ValuesOfInverseDynamics(), white, LeastSquares())
     chosen: RigState = choose(first, estimators, search.models.seed)
     state, said = never_worse(chosen)
     verdict, found = state.verdict, state.found
