@@ -128,15 +128,15 @@ class ValuesByEffort(VerdictByEffort):
 class ValuesOfInverseDynamics(InverseDynamics):
     """The same with its own values: where few samples enter a likelihood, as between coarse counts, efforts know more.
 
-    It answers only where it predicts better in each currency.
+    It adds causes to those of the likelihood and replaces none, where it predicts better in each currency.
     """
 
     prefers_smaller = False
 
     def state(self, first: RigState) -> RigState | None:
-        """Return the state of its set at its own values; None where the first state has the same set."""
+        """Return the state of its set at its own values; None where the set does not hold all causes of the first."""
         search, by_effort = first.search, first.search.models.by_effort
-        if by_effort is None or search.was_stopped or (names := by_effort.names) == tuple(sorted(first.names)):
+        if by_effort is None or search.was_stopped or not first.names < {*(names := by_effort.names)}:
             return None
         if names not in search.models.fits or not search.models.is_possible(search.models.fits[names]):
             return None
