@@ -106,6 +106,26 @@ def along_motion(models: Mapping[str, Model], trials: Sequence[Trial], band: Ban
     return out
 
 
+def effort_percent(model: Model, trials: Sequence[Trial], band: Band) -> float | None:
+    """Return E of the low-passed effort that a model needs for the motion of trials, percent of its mean square.
+
+    Rows in which the joint rests do not count: friction may have any size below its limit there. None where a cause of
+    the model is not in that effort, or where the joint only rests.
+    """
+    rig = model.rig
+    assert isinstance(rig, Joint)
+    if left_out(model, trials):
+        return None
+    fast = Rows([Record.of(t) for t in trials], band, Links.of_rig(rig)).sizes.fast
+    squares = power = 0.0
+    for trial, predicted in zip(trials, _efforts(model, trials, band), strict=True):
+        moves = ~Motion(Record.of(trial), band).resting(fast)
+        measured = _measured(trial, band)[moves]
+        squares += float(np.sum((measured - predicted[moves]) ** 2))
+        power += float(np.sum(measured**2))
+    return 100.0 * squares / power if power > 0.0 else None
+
+
 def left_out(model: Model, trials: Sequence[Trial]) -> list[str]:
     """Return the causes of a model that are not in the efforts along a measured motion."""
     acting = [_acting(model, t) for t in trials if t.kind != IMPOSED]

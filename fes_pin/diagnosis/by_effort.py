@@ -11,6 +11,7 @@ import numpy as np
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.trial import Trial
+from fes_pin.diagnosis.along_motion import effort_percent
 from fes_pin.diagnosis.held_out import Again
 from fes_pin.diagnosis.likelihood_models import Found, LikelihoodModels, LikelihoodSearch
 from fes_pin.diagnosis.verdict import RigState, RigVerdict
@@ -155,14 +156,15 @@ def never_worse(state: RigState) -> tuple[RigState, list[str]]:
     by_effort, best = models.by_effort, state.found.best
     if by_effort is None or not by_effort.knows(best.names):
         return state, []
-    now, believed = by_effort.error_percent(best.model), by_effort.error_percent(models.model)
-    if now <= believed:
+    trials, band = models.trials, by_effort.models.rows.band
+    now, believed = (effort_percent(one, trials, band) for one in (best.model, models.model))
+    if now is None or believed is None or now <= believed:
         return state, []
     assert isinstance(first, RigVerdict)
     verdict = ValuesByEffort(state.search, first.test)
     again = verdict.in_place_of(found)
-    then = by_effort.error_percent(again.best.model)
-    if then >= now:
+    then = effort_percent(again.best.model, trials, band)
+    if then is None or then >= now:
         return state, []
     words = f"the likelihood's values predict the effort with E {percent(now)}, the believed ones {percent(believed)}; "
     words += f"those of least squares of the effort are given: {percent(then)}"

@@ -33,11 +33,6 @@ OTHER_BANDS = (0.7, 1.4)
 NOT_CARRIED = "the inertia moves by more than its interval between 0.7 and 1.4 of the band of the motion"
 """Why no values are given."""
 
-CORNERS = ("coulomb_friction.creep_speed", "coulomb_friction.softness")
-"""Corners of friction of a simulation, which have another meaning in a regression of efforts."""
-STRETCH, WAY = "coulomb_friction.stretch", "coulomb_friction.presliding"
-"""Way over which friction builds up, in a simulation and in a regression of efforts."""
-
 
 class LikelihoodValues(Protocol):
     """A fit of a set of causes by another estimator."""
@@ -94,20 +89,6 @@ class FoundByEffort:
     def errors(self, names: Names) -> Errors:
         """Return cross-validated errors of the low-passed effort of a set, of which it `knows` every cause."""
         return self.verdict.errors_of(self.models.fitted_set(names), self.state.found.best)
-
-    def error_percent(self, model: Model) -> float:
-        """Return E of the low-passed effort by a model of whose causes it `knows` every one, percent.
-
-        Friction that builds up over a way has the stretch of its contact as that way; its corners are those of a start.
-        """
-        names, sets = [e.name for e in model.effects], self.models
-        values = {f"{n}.{k}": v for n in names for k, v in sets.library[n].shapes[0].items()} | sets.values
-        known = model.parameters()
-        values |= {k: v for k, v in known.items() if k not in CORNERS}
-        values |= {WAY: known[STRETCH]} if known.get(STRETCH) else {}
-        left, efforts = sets.problem(names, {}).residuals(values)[0], sets.rows.efforts(values)
-        squares, spread = (sum(float(np.sum(one**2)) for one in many) for many in (left, efforts))
-        return 100.0 * squares / max(spread, 1e-300)
 
     def values_in(self, fitted: LikelihoodValues, names: Collection[str]) -> dict[str, float]:
         """Return the final values of the set of another fit, by trials of some names; those that mean the same in it.

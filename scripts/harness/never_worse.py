@@ -4,7 +4,7 @@ All three predict in one simulator and in one model of the low-passed effort:
 
 - `free`: the motion of a whole trial from its effort, from the position and speed that a cubic reads off its start;
 - `0.3 s`, `1 s`: the motion that far ahead of the readings, whose filter assumes the same noise for every model;
-- `effort`: the low-passed effort of the recorded motion.
+- `effort`: the low-passed effort of the recorded motion: of a model by its own equations, of values by a regression.
 """
 
 from __future__ import annotations
@@ -114,14 +114,6 @@ def _simulated_friction(study: fp.Study, model: fp.Model, values: Mapping[str, f
     return {**own, "softness": values.get("creep_speed", SLOWLY * usual) * stopping / most}
 
 
-def _of_model(model: fp.Model) -> dict[str, float]:
-    """Values of a model as a regression of efforts takes them; its friction changes its sign as that does."""
-    values = model.parameters()
-    way = max(values.pop("coulomb_friction.stretch", 0.0), values.pop("coulomb_friction.presliding", 0.0))
-    values.pop("coulomb_friction.creep_speed", None)
-    return {**values, "coulomb_friction.presliding": way} if "coulomb_friction.torque_nm" in values else values
-
-
 def _likeliest(
     study: fp.Study, shown: Sequence[fp.Trial], model: fp.Model, values: Mapping[str, float]
 ) -> tuple[fp.Model, Mapping[str, float]]:
@@ -147,13 +139,17 @@ def errors_against(study: fp.Study, found: Any, unseen: Sequence[fp.Trial]) -> d
         return {}
     regressed = plain(study)
     models = [model_of(study, found), fp.nominal_model(study), model_of(study, regressed)]
-    own = _of_model(models[0]) if hasattr(found, "model") else values_of(study, found)
+    is_model = hasattr(found, "model")
+    own = models[0].parameters() if is_model else values_of(study, found)
     values = [own, models[1].parameters(), values_of(study, regressed)]
-    models[0], values[0] = _likeliest(study, shown, models[0], own)
+    if not is_model:
+        models[0], values[0] = _likeliest(study, shown, models[0], own)
     out, falls = {}, getattr(found, "extended_error", (0.0,))[0] is None
     for word, trials in (("fitted", shown), ("unseen", list(unseen))):
         each = [_moved(model, trials) for model in models]
-        both = [one | more for one, more in zip(each, _efforts(study, shown, trials, values), strict=True)]
+        efforts = _efforts(study, shown, trials, values)
+        efforts[0] |= _along(study, shown, trials, models[0]) if is_model else {}
+        both = [one | more for one, more in zip(each, efforts, strict=True)]
         names = [n for n in both[0] if all(n in one for one in both) and not (falls and n == "free")]
         out |= {f"{n}, {word}": (both[0][n], both[1][n], both[2][n]) for n in names}
     return out
@@ -225,6 +221,15 @@ def _smooth(trial: fp.Trial, order: int) -> np.ndarray:
 def _percent(squares: float, spread: float) -> float:
     share = 100.0 * squares / spread if spread > 0.0 else math.inf
     return share if math.isfinite(share) else math.inf
+
+
+def _along(study: fp.Study, shown: Sequence[fp.Trial], trials: Sequence[fp.Trial], model: fp.Model) -> dict[str, float]:
+    """Error of the low-passed effort by a model's own equations; none where a cause of it has no part in that."""
+    from fes_pin.diagnosis.along_motion import effort_band, effort_percent  # noqa: PLC0415
+
+    band = effort_band(model.rig, shown)
+    found = effort_percent(model, trials, band) if band is not None else None
+    return {} if found is None else {"effort": found}
 
 
 def _efforts(

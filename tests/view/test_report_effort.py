@@ -12,7 +12,7 @@ from view.reported import ankle_diagnosis, diagnosed, joint_study
 
 import fes_pin as fp
 from fes_pin.data.trial import derived_trial
-from fes_pin.diagnosis.along_motion import AlongMotion, along_motion, effort_band, left_out
+from fes_pin.diagnosis.along_motion import AlongMotion, along_motion, effort_band, effort_percent, left_out
 from fes_pin.effort.motion import Motion, Record
 from fes_pin.models.effects import effect_named
 from fes_pin.models.nominal import nominal_model
@@ -51,6 +51,30 @@ def true_effects():
 def efforts(models, one):
     (found,) = along_motion(models, [one], effort_band(next(iter(models.values())).rig, [one]))
     return found
+
+
+@pytest.mark.parametrize(
+    "form",
+    [
+        {},
+        {"stretch": 0.02},
+        {"creep_speed": 0.15, "stiction": 2.9, "stribeck_speed": 0.08},
+        {"softness": 1.0},
+        {"creep_speed": 0.05},
+    ],
+)
+def test_a_model_needs_the_effort_that_moved_it_whatever_the_form_of_its_friction(tmp_path, recorded, form):
+    """Its own law is evaluated along the motion: a regression's forms of friction are other functions of the speed."""
+    model = arm(tmp_path, coulomb_friction={"torque_nm": 0.1, **form})
+    moved = simulated_trial(model, recorded)
+    band = effort_band(model.rig, [moved])
+    assert effort_percent(model, [moved], band) < 0.02
+    assert effort_percent(arm(tmp_path), [moved], band) > 0.5
+
+
+def test_a_frame_that_swings_is_not_in_the_effort_along_a_motion(tmp_path, recorded):
+    model = arm(tmp_path, frame_vibration={})
+    assert effort_percent(model, [recorded], effort_band(model.rig, [recorded])) is None
 
 
 def test_a_right_model_predicts_the_measured_effort(tmp_path, recorded):
