@@ -1,6 +1,6 @@
 """Trials held out of a diagnosis: evidence for each cause from their likelihood, and gains on their errors."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -97,19 +97,27 @@ def make_folds(
 
 
 def identified_folds(fitted: LikelihoodFit) -> list[list[int]]:
-    """Return the trials of each fold, without which no standard deviation grows by more than 1 / `IDENTIFIABLE_SHARE`.
+    """Return the trials of each fold whose other trials identify the model, and which themselves say something of it.
 
-    A prediction from trials that do not identify the model, as of a joint at rest, says nothing about its causes.
+    Without them no standard deviation grows by more than 1 / `IDENTIFIABLE_SHARE`, and by them alone not every one. A
+    prediction from trials that do not identify the model, as of a joint at rest, says nothing about its causes; nor
+    does a prediction of trials that tell nothing of it, as of a pendulum that is balanced.
     """
     moving = np.array([n not in fitted.at_bound for n in fitted.free])
 
-    def deviations(out: Sequence[int]) -> np.ndarray:
-        parts = [p for k, p in enumerate(fitted.parts) if k not in out]
+    def deviations(some: Collection[int]) -> np.ndarray:
+        parts = [p for k, p in enumerate(fitted.parts) if k in some]
         return np.sqrt(np.diag(covariance_of(normal_equations(parts).hessian, moving)))
 
-    whole = deviations(())
-    known, folds = np.isfinite(whole), folds_of(fitted.trials)
-    return [out for out in folds if np.all(IDENTIFIABLE_SHARE * deviations(out)[known] <= whole[known])]
+    every = {*range(len(fitted.parts))}
+    whole = deviations(every)
+    known = np.isfinite(whole)
+
+    def identifies(some: Collection[int]) -> np.ndarray:
+        return IDENTIFIABLE_SHARE * deviations(some)[known] <= whole[known]
+
+    folds = folds_of(fitted.trials)
+    return [out for out in folds if identifies(every - {*out}).all() and identifies(out).any()]
 
 
 def as_random_as_in_all(fitted: LikelihoodFit, trials: Sequence[Trial]) -> LikelihoodFit:

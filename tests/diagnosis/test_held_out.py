@@ -2,15 +2,19 @@
 
 import copy
 import gc
+from types import SimpleNamespace
 
 import numpy as np
+import pytest
 from diagnosis.hidden import study_of
 from identify.rigs import as_likely
 
 from fes_pin.diagnosis import errors_ahead
 from fes_pin.diagnosis.errors_ahead import free_errors
+from fes_pin.diagnosis.held_out import identified_folds
 from fes_pin.infer.held_out import Errors, held_out_gain
 from fes_pin.infer.levels import RUNAWAY
+from fes_pin.infer.problem import Linearized
 from fes_pin.models.effects import effect_named
 from fes_pin.models.nominal import nominal_model
 from fes_pin.search.fit import fit
@@ -53,3 +57,21 @@ def test_predictions_over_a_horizon_are_kept_as_long_as_their_fit(monkeypatch):
     del fitted
     gc.collect()
     assert set(errors_ahead._PREDICTED) <= kept
+
+
+@pytest.mark.parametrize(
+    ("sizes", "kept"),
+    [
+        ([1.0, 1.0, 1.0], [[0], [1], [2]]),
+        ([1.0, 1.0, 1e-3], [[0], [1]]),  # a trial that tells nothing is no test
+        ([1.0, 1e-3], []),  # without the first nothing is identified, and the second tells nothing
+        ([1.0, (1.0, 1e-3), 1.0], [[0], [1], [2]]),  # one that tells of one parameter is a test
+        ([(1.0, 1e-3), (1e-3, 1.0)], []),  # neither identifies both
+    ],
+)
+def test_folds_predict_trials_that_tell_of_the_model_from_trials_that_identify_it(sizes, kept):
+    rng = np.random.default_rng(len(sizes))
+    parts = [Linearized(rng.standard_normal(80), s * rng.standard_normal((80, 2)), np.zeros((80, 0))) for s in sizes]
+    trials = [SimpleNamespace(kind="motion", conditions={}) for _ in sizes]
+    fitted = SimpleNamespace(parts=parts, free=("a", "b"), at_bound=(), trials=trials)
+    assert sorted(identified_folds(fitted)) == kept
