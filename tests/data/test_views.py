@@ -138,6 +138,13 @@ def test_rests_are_left_out(tmp_path):
     assert rests(time, [np.sin(time)]) == []
 
 
+@pytest.mark.parametrize("times", [[0.0], [0.0, 0.01], [0.0, 0.0, 0.0, 0.0], [2.0, 1.0, 0.5, 0.2]])
+@pytest.mark.parametrize("way", ["rests", "holes", "restarts"])
+def test_too_few_rows_or_times_that_stand_are_one_line_however_they_are_split(tmp_path, times, way):
+    files = {"a.csv": {"time_s": np.array(times), "position": swing(np.arange(len(times)) * DT)}}
+    assert "a.csv" in refused(tmp_path, f'[[trial]]\nfile = "a.csv"\nsplit = "{way}"\n', files)
+
+
 def test_a_column_and_marks_split_a_recording(tmp_path):
     time = np.arange(0.0, 6.0, DT)
     files = {"a.csv": {"time_s": time, "position": swing(time), "trial_no": np.floor(time / 2.0)}}

@@ -63,7 +63,8 @@ def rests(time: np.ndarray, readings: Sequence[np.ndarray]) -> list[slice]:
     """
     from scipy.ndimage import maximum_filter1d, minimum_filter1d  # noqa: PLC0415 - for recordings that are split at rests
 
-    length = max(2, round(REST_S / float(np.median(np.diff(time)))))
+    step = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+    length = max(2, round(REST_S / step)) if step > 0.0 else len(time)
     if length >= len(time):
         return []
     still = np.ones(len(time) - length + 1, dtype=bool)
@@ -96,7 +97,7 @@ def moving(table: Table, readings: Sequence[str]) -> list[Table]:
     """The parts of a table between its rests; a rest between two parts is left out but for its last moment."""
     resting = rests(table.time, [table.columns[n] for n in readings])
     if not resting:
-        return [table]
+        return [table][: len(table) >= MIN_ROWS]
     begins = [0] if resting[0].start > 0 else []
     begins += [one.stop for one in resting]
     stops = [one.start for one in resting if one.start > 0] + [len(table)]
