@@ -208,3 +208,15 @@ def test_a_study_of_another_rig_is_refused(made, monkeypatch, capsys, tmp_path):
     write_study(study_of("muscle", duration_s=4.0), tmp_path / "muscle")
     said = fails(monkeypatch, capsys, "predict", made / "model.toml", tmp_path / "muscle", "--out", "-")
     assert "expected a study of the rig ankle, found muscle" in said
+
+
+@pytest.mark.parametrize("end", ["threshold_us", "saturation_us"])
+@pytest.mark.parametrize("rig", ["ankle", "muscle"])
+def test_a_model_that_lacks_an_end_of_its_recruitment_predicts_no_stimulated_trial(
+    monkeypatch, capsys, tmp_path, rig, end
+):
+    write_study(study_of(rig, duration_s=4.0), tmp_path / "study")
+    lines = model_toml(nominal_model(read_study(tmp_path / "study"))).splitlines()
+    (tmp_path / "model.toml").write_text("\n".join(line for line in lines if not line.startswith(f"{end} =")))
+    said = fails(monkeypatch, capsys, "predict", tmp_path / "model.toml", tmp_path / "study", "--out", "-")
+    assert f"the model states no {end}, which trial " in said

@@ -16,7 +16,7 @@ from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.models.least_squares import least_squares
 from fes_pin.models.maths import cos, exp, ramp, sin, where
-from fes_pin.models.rigs.base import GRAVITY, IMPOSED_STOPPING, Rig, imposed_now
+from fes_pin.models.rigs.base import GRAVITY, IMPOSED_STOPPING, Rig, imposed_now, stated
 from fes_pin.models.rigs.rigid import gravity_coefficients, point_foot
 from fes_pin.models.rigs.stimuli import at_start, recruited_in, recruited_now, rest_muscle, usual_period
 from fes_pin.models.stage import Signals, parameter
@@ -134,7 +134,7 @@ class Ankle(Rig):
         unstated = {"load_kg": 0.0, "torque_sign": 1.0} if trial.kind == IMPOSED else {}
         unstated |= {**at_start(trial), "gravity_cos": a, "gravity_sin": b}
         known = {**unstated, **self.constants, **trial.conditions}
-        return {name: float(known[name]) for name in self.constant_names(trial.kind)}
+        return stated(known, self.constant_names(trial.kind), trial)
 
     def recruited(self, trial: Trial) -> np.ndarray:
         return recruited_in(trial, self.channel, self.constants)

@@ -360,6 +360,19 @@ class Rig(ReadOnly):
         raise NotImplementedError
 
 
+def stated(known: Mapping[str, float], names: Sequence[str], trial: Trial) -> dict[str, float]:
+    """Return values by name, of those that the equations of a trial read.
+
+    Raises
+    ------
+    InputError
+        One is not known, as of a model that was fitted without a stimulus.
+    """
+    if missing := [n for n in names if n not in known]:
+        raise InputError(f"the model states no {' and '.join(missing)}, which trial {trial.name} needs")
+    return {n: float(known[n]) for n in names}
+
+
 def imposed_now(s: Signals) -> tuple[Any, Any, Any]:
     """Position, velocity and acceleration of an imposed motion now, between samples by the latter two."""
     e, bend = s.elapsed, s.u.imposed_acceleration

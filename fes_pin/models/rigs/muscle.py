@@ -14,7 +14,7 @@ from fes_pin.data.stimulus import is_stimulated
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.models.parameters import HELD, parameter
-from fes_pin.models.rigs.base import Rig, imposed_now
+from fes_pin.models.rigs.base import Rig, imposed_now, stated
 from fes_pin.models.rigs.stimuli import at_start, recruited_in, recruited_now, rest_muscle, trains, usual_period
 from fes_pin.models.stage import Signals
 
@@ -99,7 +99,7 @@ class Muscle(Rig):
     def trial_constants(self, trial: Trial) -> dict[str, float]:
         period = pulse_period([trial] if "stim" in trial.columns else [])
         known = {"pulse_period_s": period, "length_m": 0.0, **at_start(trial), **self.constants}
-        return {name: float(known[name]) for name in self.constant_names(trial.kind)}
+        return stated(known, self.constant_names(trial.kind), trial)
 
     def recruited(self, trial: Trial) -> np.ndarray:
         return recruited_in(trial, self.channel, self.trial_constants(trial))
