@@ -34,6 +34,7 @@ from fes_pin.infer.search import SearchResult
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import StateSpaceNoise
 from fes_pin.models.stage import Effect, Stage
+from fes_pin.remainder.unrepeated import voluntary_effort
 from fes_pin.search.library import Library
 from fes_pin.search.likelihood_maxima import look
 from fes_pin.search.starts import STARTED
@@ -166,10 +167,11 @@ def _likeliest(ran: Ran, kinds: Sequence[type[Effect]]) -> type[Effect] | None:
     """Return the kind that lowers the criterion of the best set most, further or in the place of a cause, if any.
 
     Of kinds that are not distinguished, as where the effort itself is read, it is the first on the signal path. A kind
-    is fitted further only if its first fit, at the noise of the base, gains half of what is required.
+    is fitted further only if its first fit, at the noise of the base, gains half of what is required. A subject who
+    does not relax has another effort in each trial: no zero and no scale is told from it.
     """
     search, found, again = ran
-    if search.was_stopped or again is not None:
+    if search.was_stopped or again is not None or voluntary_effort(found.best) is not None:
         return None
     wanted = found.best.criterion - SEPARABLE
     lowest = dict.fromkeys(kinds, wanted)

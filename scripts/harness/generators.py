@@ -22,6 +22,7 @@ GENERATORS = {
     "contrast": ("contrast", "Pairs"),
     "halved": ("contrast", "Halved"),
     "misread": ("misread", "Misread"),
+    "voluntary": ("voluntary", "Voluntary"),
     "large": ("large", "Large"),
     "by-trial": ("by_trial", "ByTrial"),
     "walking": ("walking", "Walks"),

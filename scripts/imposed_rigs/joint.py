@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -27,15 +28,22 @@ CAUSES = (
 DT, SECONDS = 0.002, 5.0
 
 
-def study(causes: tuple[str, ...], size: float, rng: np.random.Generator, folder: Path) -> Study:
+def study(
+    causes: tuple[str, ...],
+    size: float,
+    rng: np.random.Generator,
+    folder: Path,
+    moved: Callable[..., Motion] = drawn,
+    seconds: float = SECONDS,
+) -> Study:
     """A hanging arm, moved by a stand; each cause acts with about `size` of the effort that it takes without.
 
     Its gravity is known, as with any arm that was weighed.
     """
     mass, about, damping = rng.uniform(0.5, 3.0), rng.uniform(0.01, 0.05), rng.uniform(0.05, 0.3)
     inertia, weight = about + mass * 0.04, 9.81 * mass * 0.2
-    time = np.arange(round(SECONDS / DT)) * DT
-    motions = [drawn(rng.uniform(-0.2, 0.2), rng.uniform(0.4, 0.9), 0.2, 1.2, rng) for _ in range(5)]
+    time = np.arange(round(seconds / DT)) * DT
+    motions = [moved(rng.uniform(-0.2, 0.2), rng.uniform(0.4, 0.9), 0.2, 1.2, rng) for _ in range(5)]
     bare = [inertia * m.at(time, 2) + damping * m.at(time, 1) + weight * np.sin(m.at(time)) for m in motions]
     usual = float(np.sqrt(np.mean(np.square(bare))))
     speed = float(np.sqrt(np.mean([np.square(m.at(time, 1)) for m in motions])))
