@@ -117,7 +117,8 @@ class SideBySide:
             return [one]
         every = one.proposal.recording.names
         found = next((sets for place in PLACES if (sets := self._sets(one, place))), [])
-        if not found and self.split == COLUMNS:
+        is_one = one.proposal.form is None and one.proposal.sheet  # of the structures of a file
+        if not found and self.split == COLUMNS and not is_one:
             message = "expected names that are the same but for a number, each set of them a trial"
             raise InputError(f"{message}; found {listed(every)}", column=f"--split {COLUMNS}")
         chosen = {n for words in self.chosen for n in column_named(words, every)}

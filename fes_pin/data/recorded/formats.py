@@ -15,16 +15,18 @@ import warnings
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from fes_pin.data.errors import MOST_LISTED, InputError, optional_library
+from fes_pin.data.errors import MOST_LISTED, InputError, listed, optional_library
 from fes_pin.data.files import as_path, read_bytes, read_json
 from fes_pin.data.markers import TIME, c3d_points, trc_points
 from fes_pin.data.motion import STORAGE, is_rotation, read_motion
 from fes_pin.data.recorded.clock import since_first
+from fes_pin.data.recorded.elements import elements_in
 from fes_pin.data.recorded.form import TextForm
 from fes_pin.data.recorded.text import read_text_recording, without_twins
 from fes_pin.data.table import MIN_ROWS, Table
@@ -78,7 +80,8 @@ def read_recording(path: str | Path, form: TextForm | None = None, wanted: Seque
     if suffix not in _READERS:
         return since_first(read_text_recording(path, form or TextForm(), wanted))
     read_bytes(path)  # their libraries open it themselves
-    recording = _READERS[suffix](path, wanted)
+    sheet = form.sheet if form else ""
+    recording = _nested(path, wanted, sheet) if is_nested(path) else _READERS[suffix](path, wanted)
     sizes = {len(values) for values in recording.columns.values()}
     if len(sizes) > 1:
         lengths = ", ".join(f"{name} {len(values)}" for name, values in recording.columns.items())
@@ -137,21 +140,54 @@ def matlab_vectors(path: Path) -> dict[str, np.ndarray]:
     InputError
         Not a MATLAB file, hardly more than objects of a class, or pymatreader is not installed.
     """
-    return _found_in(path)[0]
+    return _found_in(path).columns
 
 
-def _found_in(path: Path) -> tuple[dict[str, np.ndarray], float | None]:
-    """Every vector of numbers in a file that nests them, by dotted names, and the sample rate that it states, Hz.
+class _Found(NamedTuple):
+    """Vectors by dotted names, the sample rate that is stated in Hz, and sentences about what is no vector."""
+
+    columns: dict[str, np.ndarray]
+    rate_hz: float | None
+    left: tuple[str, ...]
+
+
+def _found_in(path: Path, sheet: str = "") -> _Found:
+    """Every vector of numbers in a file that nests them, or in one of its structures.
 
     Of JSON a list of records has a vector of each key, and a null among numbers is a missing sample.
     """
-    content, is_odd = _NESTED[path.suffix.lower()](path)
+    content, is_odd = _content(path, read_bytes(path))
+    if sheet:
+        parts = dict(elements_in(content))
+        if sheet not in parts:
+            expected = f"expected one of its structures, {listed([*parts])}" if parts else "it has no structures"
+            raise InputError(f"{expected}; found {sheet[:40]!r}", file=path, column="sheet")
+        content = parts[sheet]
     found = dict(_vectors(content))
     if is_odd and len(found) < 2:  # no time with a quantity
         words = "expected arrays of numbers; objects of a class, as timeseries and table, are not read"
         raise InputError(f"{words}: save their times and data as arrays", file=path)
     rates = {float(value) for name, value in _scalars(content) if SAMPLED.match(name.rpartition(".")[2]) and value > 0}
-    return found, rates.pop() if len(rates) == 1 else None
+    return _Found(found, rates.pop() if len(rates) == 1 else None, tuple(_too_deep(content)))
+
+
+@lru_cache(maxsize=2)
+def _content(path: Path, _content: bytes) -> tuple[Any, bool]:
+    """What a file nests; it is read once for all of its trials."""
+    return _NESTED[path.suffix.lower()](path)
+
+
+def elements_of(path: Path) -> tuple[str, ...]:
+    """Names of the structures of a file that nests vectors; none of others. Each is read as a sheet is.
+
+    Raises
+    ------
+    InputError
+        As `matlab_vectors`; not a JSON file.
+    """
+    if not is_nested(path):
+        return ()
+    return tuple(dict.fromkeys(n for n, one in elements_in(_content(path, read_bytes(path))[0]) if any(_vectors(one))))
 
 
 def _matlab(path: Path) -> tuple[Any, bool]:
@@ -190,21 +226,27 @@ def is_nested(path: Path) -> bool:
     return path.suffix.lower() in _NESTED
 
 
-def _nested(path: Path, wanted: Sequence[str] | None) -> Table:
-    columns, _ = _found_in(path)
+def _nested(path: Path, wanted: Sequence[str] | None, sheet: str = "") -> Table:
+    columns, _, left = _found_in(path, sheet)
+    if left and not columns:
+        raise InputError(left[0], file=path)
     if wanted is None and columns:  # scalars and tables of other lengths are no columns of the recording
         count = _usual_length(columns)
         columns = {n: v for n, v in columns.items() if len(v) == count}
-    return _made(path, columns, wanted)
+    return _made(path, columns, wanted, said=left)
 
 
-def by_length(path: Path, chosen: Collection[str]) -> tuple[tuple[str, ...], float | None, tuple[str, ...]]:
+def by_length(
+    path: Path, chosen: Collection[str], sheet: str = ""
+) -> tuple[tuple[str, ...], float | None, tuple[str, ...]]:
     """Names of vectors of one length in a file that nests them, their rate, and a sentence about others.
 
     Parameters
     ----------
     chosen
         What a person says of columns: a vector's name begins it, and decides the length; else the most have it.
+    sheet
+        One of its structures; "" for the whole file.
 
     Returns
     -------
@@ -219,7 +261,7 @@ def by_length(path: Path, chosen: Collection[str]) -> tuple[tuple[str, ...], flo
     InputError
         As `matlab_vectors`; not a JSON file.
     """
-    columns, rate_hz = _found_in(path)
+    columns, rate_hz, _ = _found_in(path, sheet)
     groups = _by_length(columns)
     asked = [n for n in columns if any(words == n or words.startswith((f"{n}:", f"{n},")) for words in chosen)]
     count = len(columns[asked[0]]) if asked else _usual_length(columns)
@@ -283,6 +325,7 @@ def _of_array(content: Any, name: str) -> Iterator[tuple[str, np.ndarray]]:
         values = np.asarray(content)
     except ValueError:
         return
+    values = values.squeeze() if values.ndim > 2 else values
     if values.dtype.kind not in "biuf" or values.size < MIN_ROWS or values.ndim > 2:
         return
     if values.ndim == 1 or 1 in values.shape:
@@ -291,6 +334,17 @@ def _of_array(content: Any, name: str) -> Iterator[tuple[str, np.ndarray]]:
     table = values if values.shape[0] >= values.shape[1] else values.T
     for place, column in enumerate(table.T, 1):
         yield f"{name}.{place}", column.astype(float)
+
+
+def _too_deep(content: Any, name: str = "") -> Iterator[str]:
+    """A sentence about each array of more than two dimensions, none of which says that it is the time."""
+    if isinstance(content, Mapping | list):
+        pairs = content.items() if isinstance(content, Mapping) else enumerate(content, 1)
+        for key, value in pairs:
+            yield from _too_deep(value, f"{name}.{key}" if name else str(key))
+    elif isinstance(content, np.ndarray) and content.dtype.kind in "biuf" and content.squeeze().ndim > 2:
+        shape = " x ".join(map(str, content.shape))
+        yield f"{name} ({shape}) is left out: vectors and matrices are read; save each of its pages as a matrix"
 
 
 def _scalars(content: Any, name: str = "") -> Iterator[tuple[str, float]]:
