@@ -14,7 +14,7 @@ from fes_pin.data.errors import InputError, listed
 from fes_pin.data.new_columns import column_named
 from fes_pin.data.new_recording import Proposal, ends_in, proposals_of, propose, quantities_held
 from fes_pin.data.recorded.formats import elements_of
-from fes_pin.data.recorded.parts import end_at_once
+from fes_pin.data.recorded.parts import Ends, end_at_once
 from fes_pin.data.schema import RigSchema
 from fes_pin.data.side_by_side import COLUMNS, TRIALS
 from fes_pin.data.wanted import Wanted
@@ -33,12 +33,12 @@ def recordings_in(path: Path, schema: RigSchema, wanted: Wanted, chosen: Collect
     """
     revolute, stated = wanted.revolute, wanted.form
     names = () if "sheet" in stated or wanted.split == "none" else elements_of(path)
-    alike: dict[tuple[str, ...], list[Proposal]] = defaultdict(list)
+    alike: dict[tuple[tuple[str, ...], frozenset[str]], list[Proposal]] = defaultdict(list)
     for name in names:
         with suppress(InputError):  # settings, vectors of several lengths
             one = propose(path, schema, revolute, {**stated, "sheet": name}, chosen)
-            if quantities_held(one, (), schema):
-                alike[one.recording.names].append(replace(one, sheet=name))
+            if held := quantities_held(one, (), schema):
+                alike[one.recording.names, held].append(replace(one, sheet=name))
     groups = sorted((some for some in alike.values() if some[1:]), key=lambda some: -sum(map(_length, some)))
     found = next((some for some in groups if _why(some, wanted.split)), [])
     if not found or _is_flat(chosen, found[0]):
@@ -58,6 +58,13 @@ def _are_siblings(name: str, other: str) -> bool:
     return name.rpartition(".")[0] == other.rpartition(".")[0]
 
 
+def _ends(one: Proposal) -> Ends:
+    """Ends of a structure in its times, else by the rate that it states, else in rows."""
+    if one.candidates["time_s"] or one.rate_hz is None:
+        return ends_in(one)
+    return 0.0, len(one.recording) / one.rate_hz, 1.0 / one.rate_hz
+
+
 def _why(some: Sequence[Proposal], split: str | None) -> str:
     """Why structures are trials, and not instruments that recorded at once; "" where nothing says so."""
     if split == COLUMNS:
@@ -65,7 +72,7 @@ def _why(some: Sequence[Proposal], split: str | None) -> str:
     if all(_is_called_trial(one.sheet) for one in some):
         return "their names say so"
     siblings = [(a, b) for a, b in combinations(some, 2) if _are_siblings(a.sheet, b.sheet)]
-    is_apart = any(not end_at_once(ends_in(a), ends_in(b)) for a, b in siblings)
+    is_apart = any(not end_at_once(_ends(a), _ends(b)) for a, b in siblings)
     return "they do not end at once" if is_apart else ""
 
 

@@ -1,10 +1,18 @@
 """Structures of a file that nests vectors, each perhaps a trial: of struct arrays, of cells, of a struct."""
 
-from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections import Counter, defaultdict
+from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
 import numpy as np
+
+from fes_pin.data.errors import listed
+from fes_pin.data.units import words_of
+
+TIMES = frozenset({"t", "time", "times"})
+"""Names of a vector that no unit of its structure is for."""
+FEWEST = 50
+"""Samples that vectors have at least of which some are a sample longer: shorter ones are settings (a round figure)."""
 
 
 def elements_in(content: Any, name: str = "") -> Iterator[tuple[str, dict[str, Any]]]:
@@ -46,3 +54,32 @@ def _is_list_of_parts(value: Any) -> bool:
     if not isinstance(value, list) or not any(isinstance(one, np.ndarray | list | Mapping) for one in value):
         return False
     return not all(isinstance(one, list) for one in value) or len({len(one) for one in value}) > 1
+
+
+def units_in(content: Any, found: Collection[str], name: str = "") -> dict[str, str]:
+    """Units by the names of vectors whose structure states one: `Torque.values` of one with `units`."""
+    units: dict[str, str] = {}
+    for key, value in content.items() if isinstance(content, Mapping) else ():
+        units |= units_in(value, found, _dotted(name, str(key)))
+        if str(key).lower() in ("unit", "units") and isinstance(value, str) and name:
+            its = [n for n in found if n.rpartition(".")[0] == name and not TIMES & words_of(n.rpartition(".")[2])]
+            units |= dict.fromkeys(its, value)
+    return units
+
+
+def of_one_length(found: Mapping[str, np.ndarray]) -> tuple[dict[str, np.ndarray], list[str]]:
+    """Vectors without a last sample that others do not have, as channels that a logger stopped one by one; and why.
+
+    Channels are vectors of one structure, or each alone in its own; others may be trials.
+    """
+    out, said, by_length = dict(found), list[str](), defaultdict[int, list[str]](list)
+    for name, values in found.items():
+        by_length[len(values)].append(name)
+    for count, names in sorted(by_length.items()):
+        every = [*names, *by_length.get(count - 1, ())]
+        apart = len({n.rpartition(".")[0] for n in every})
+        is_pair = len(every) > len(names) and not {count - 2, count + 1} & by_length.keys()
+        if count > FEWEST and is_pair and apart in (1, len(every)) and not any(n[-1].isdigit() for n in every):
+            out |= {n: found[n][:-1] for n in names}
+            said.append(f"{listed(names)} have one sample more than others: their last one is left out")
+    return out, said

@@ -83,7 +83,7 @@ def why_no_names(lines: Sequence[str]) -> str:
     filled = [line for line in lines if line.strip()]
     names = [", ".join(filter(None, p.names)) for line in filled if (p := parts_of(line))]
     is_all = all(map(parts_of, [line for line in filled if re.search(r"\d", line)][-MIN_ROWS:]))
-    if not is_all or len(names) < MIN_ROWS * len({*names}) or names_before_numbers(lines):
+    if not is_all or len(names) < MIN_ROWS * max(len({*names}), 1) or names_before_numbers(lines):
         return ""
     known = listed([*dict.fromkeys(names)])
     return (
