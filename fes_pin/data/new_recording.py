@@ -33,7 +33,9 @@ WANTED = frozenset(
     | {"command", "commanded", "cmd", "reference", "ref"}
 )
 """Words for what a controller wants, which is no reading."""
-OTHERS = frozenset({"acc", "accel", "acceleration", "temp", "temperature", "temperatur", "efficiency", "power"})
+OTHERS = frozenset(
+    {"acc", "accel", "acceleration", "temp", "temperature", "temperatur", "efficiency", "power", "constant"}
+)
 """Words for quantities that no rig reads."""
 RATES = {"dot": "velocity", "ddot": "acceleration"}
 """What the end of a name makes of an angle or a position: `theta_dot`, `thetaDot`, `alpha_ddot`."""
