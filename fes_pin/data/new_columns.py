@@ -346,6 +346,10 @@ class NewColumns:
                 by_sentence.setdefault(sentence, {})[proposal.recording.path.name] = None
         return (*(f"{listed([*names])}: {sentence}" for sentence, names in by_sentence.items()), *self.assumed)
 
+    def odd(self) -> tuple[str, ...]:
+        """As `said`, and what readers left out: of files that do not say everything it may be what is missing."""
+        return (*self.said({}), *dict.fromkeys(words for p in self.seen.proposals for words in p.recording.said))
+
     def text(self, columns: Mapping[str, Source], times: Mapping[str, Source], looked_hz: float | None) -> list[str]:
         """Lines of [columns], or of a table [sources.NAME] for each source."""
         options = {"resample_hz": self.wanted.resample_hz or looked_hz, "rows": EVENTS if looked_hz else None}

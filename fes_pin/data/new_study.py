@@ -169,7 +169,7 @@ class _Making:
         return WantedView(ends, split, self.wanted.offsets, rate_hz, derived, is_regular=bool(rate_hz or looked_hz))
 
     def _incomplete(self) -> InputError:
-        odd = "".join(f"{sentence}; " for sentence in self.columns.said({}))
+        odd = "".join(f"{sentence}; " for sentence in self.columns.odd())
         return InputError(f"{odd}the files do not say everything; please add {', '.join(self.missing.values())}")
 
     def answered(self) -> Wanted:
@@ -182,7 +182,7 @@ class _Making:
         """
         wanted = self.wanted
         if wanted.say is not None:
-            wanted.say("\n".join([*self.columns.said({}), "what the files do not say:", *self.missing.values()]))
+            wanted.say("\n".join([*self.columns.odd(), "what the files do not say:", *self.missing.values()]))
         columns, settings = dict(wanted.columns), dict(wanted.settings)
         for key, what in self.missing.items():
             table, _, name = key.partition(" ")

@@ -142,6 +142,9 @@ def test_arrays_of_more_dimensions_are_said(tmp_path, shape):
     with pytest.raises(InputError) as caught:
         study_of(tmp_path / "t", saved(tmp_path, {"emg": np.ones(shape)}))
     assert words in str(caught.value)
+    with pytest.raises(InputError) as caught:
+        study_of(tmp_path / "v", saved(tmp_path, {"t_s": struct(3, 150)["t_s"], "emg": np.ones(shape)}))
+    assert words in str(caught.value) and "--column position" in str(caught.value)
     flat = {**struct(3, 150), "emg": np.ones((150, 1, 3))}  # a matrix
     study, _ = study_of(tmp_path / "u", saved(tmp_path, flat))
     assert not any("emg" in remark for remark in study.trials[0].remarks)
@@ -188,3 +191,14 @@ def test_a_rate_of_times_is_no_vector_of_the_whole_file(tmp_path):
         tmp_path / "s", saved(tmp_path, {"log": struct_array(structs)}), columns={"time_s": "rate=99.5"}
     )
     assert [round(1.0 / t.dt, 6) for t in study.trials] == [99.5] * 3
+
+
+@pytest.mark.parametrize(
+    "content", [{"": [0.1] * 60, "a": [0.2] * 61}, [[0.1] * 60, {"": [0.3] * 59}], {"t": [[]] * 3}]
+)
+def test_vectors_without_names_are_refused_in_one_line(tmp_path, content):
+    path = tmp_path / "a.json"
+    path.write_text(json.dumps(content))
+    with pytest.raises(InputError) as caught:
+        study_of(tmp_path / "s", path)
+    assert "\n" not in str(caught.value)

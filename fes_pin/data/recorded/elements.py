@@ -79,7 +79,7 @@ def of_one_length(found: Mapping[str, np.ndarray]) -> tuple[dict[str, np.ndarray
         every = [*names, *by_length.get(count - 1, ())]
         apart = len({n.rpartition(".")[0] for n in every})
         is_pair = len(every) > len(names) and not {count - 2, count + 1} & by_length.keys()
-        if count > FEWEST and is_pair and apart in (1, len(every)) and not any(n[-1].isdigit() for n in every):
+        if count > FEWEST and is_pair and apart in (1, len(every)) and not any(n[-1:].isdigit() for n in every):
             out |= {n: found[n][:-1] for n in names}
             said.append(f"{listed(names)} have one sample more than others: their last one is left out")
     return out, said
