@@ -126,7 +126,20 @@ def test_labels_of_something_else_name_no_columns(tmp_path, labels):
     assert "data.2, data.3" in str(caught.value)
 
 
-def test_what_only_looks_like_labchart_stays_as_it_is(tmp_path):
-    content = labchart(drawn(1)) | {"datastart": np.ones((5, 2))}
+@pytest.mark.parametrize(
+    "other",
+    [
+        {"datastart": np.ones((5, 2))},
+        {"datastart": np.zeros((3, 0))},
+        *(
+            {key: np.full((3, 1), value)}
+            for key in ("datastart", "dataend", "unittextmap")
+            for value in (np.nan, np.inf)
+        ),
+        {"dataend": np.full((3, 1), 1e9)},
+        {"titles": 3.0},
+    ],
+)
+def test_what_only_looks_like_labchart_stays_as_it_is(tmp_path, other):
     with pytest.raises(InputError, match="data"):
-        study_of(tmp_path / "s", saved(tmp_path, content))
+        study_of(tmp_path / "s", saved(tmp_path, labchart(drawn(1)) | other))

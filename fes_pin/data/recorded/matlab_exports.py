@@ -58,13 +58,15 @@ def _columns(value: Any, labels: list[str]) -> dict[str, np.ndarray]:
 def _of_labchart(content: Mapping[str, Any]) -> dict[str, Any]:
     """Recordings of LabChart, the blocks between its stops; one alone is the file itself."""
     titles, texts, data = _words(content["titles"]), _words(content.get("unittext")), np.ravel(content["data"])
-    count = len(titles)
-    starts, ends, rates = (np.reshape(content[key], (count, -1)) for key in ("datastart", "dataend", "samplerate"))
-    which = np.reshape(content.get("unittextmap", 0.0 * starts), (count, -1)).astype(int)
+    keys = ("datastart", "dataend", "samplerate", "unittextmap")
+    tables = [np.reshape(content.get(key, np.zeros(np.shape(content[keys[0]]))), (len(titles), -1)) for key in keys]
+    starts, ends, rates, which = np.stack(tables).astype(float)
+    if not np.abs([starts, ends, which]).max() <= data.size:
+        raise ValueError("expected places in the data")
     blocks: dict[str, Any] = {f"recording{block + 1}": {} for block in range(starts.shape[1])}
     for place, title in enumerate(without_twins(titles)):
         for block, found in enumerate(blocks.values()):
-            start, unit = int(starts[place, block]), which[place, block]
+            start, unit = int(starts[place, block]), int(which[place, block])
             if start > 0:  # else the channel was off
                 channel = {
                     "values": data[start - 1 : int(ends[place, block])],
