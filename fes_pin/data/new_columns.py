@@ -16,6 +16,7 @@ from fes_pin.data.new_view import APART, FilesOfTrial
 from fes_pin.data.recorded.columns import INTERPOLATE
 from fes_pin.data.recorded.events import EVENTS, looking_period
 from fes_pin.data.recorded.form import TextForm
+from fes_pin.data.recorded.header import unit_of_step
 from fes_pin.data.recorded.text import after_comments
 from fes_pin.data.recorded.view import INTEGRATED
 from fes_pin.data.schema import IMPOSED, MEANT, check_known
@@ -255,6 +256,7 @@ class NewColumns:
         if is_own or not quantities or quantities == ("pulses",):
             return {"name": name}
         own = own_unit(column, self.wanted.revolute)
+        unit = unit or (self._unit_by_rate(name, seen) if column == "time_s" else "")
         if not unit:
             self._ask(column, f"{name}:UNIT ({seen.range_of(name)}: {own}, or which unit?)")
             return None
@@ -264,6 +266,16 @@ class NewColumns:
             return self._in_turns({"name": name})
         self._ask(column, f"{name},scale=NUMBER ({own} for each {unit}{nothing})")
         return None
+
+    def _unit_by_rate(self, name: str, seen: Seen) -> str:
+        """The unit of times without one whose steps are those of the rates that the files state, which is said."""
+        rated = [(p.recording.columns[name], p.rate_hz or 0.0) for p in seen.proposals if name in p.recording.columns]
+        units = {unit_of_step(float(np.median(np.diff(time))), rate_hz) for time, rate_hz in rated}
+        unit = units.pop() if len(units) == 1 else ""
+        if unit:
+            rates = listed([f"{rate_hz:g}" for rate_hz in dict.fromkeys(rate_hz for _, rate_hz in rated)], " and ")
+            self.assumed[f"{name} is in {unit}: its steps are those of {rates} Hz, which the file states"] = None
+        return unit
 
     def _ask(self, column: str, what: str) -> None:
         self.missing[f"column {column}"] = f"--column {column}={what}"
@@ -333,6 +345,10 @@ class NewColumns:
             for sentence in sentences:
                 by_sentence.setdefault(sentence, {})[proposal.recording.path.name] = None
         return (*(f"{listed([*names])}: {sentence}" for sentence, names in by_sentence.items()), *self.assumed)
+
+    def odd(self) -> tuple[str, ...]:
+        """As `said`, and what readers left out: of files that do not say everything it may be what is missing."""
+        return (*self.said({}), *dict.fromkeys(words for p in self.seen.proposals for words in p.recording.said))
 
     def text(self, columns: Mapping[str, Source], times: Mapping[str, Source], looked_hz: float | None) -> list[str]:
         """Lines of [columns], or of a table [sources.NAME] for each source."""

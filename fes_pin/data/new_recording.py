@@ -33,7 +33,9 @@ WANTED = frozenset(
     | {"command", "commanded", "cmd", "reference", "ref"}
 )
 """Words for what a controller wants, which is no reading."""
-OTHERS = frozenset({"acc", "accel", "acceleration", "temp", "temperature", "temperatur", "efficiency", "power"})
+OTHERS = frozenset(
+    {"acc", "accel", "acceleration", "temp", "temperature", "temperatur", "efficiency", "power", "constant"}
+)
 """Words for quantities that no rig reads."""
 RATES = {"dot": "velocity", "ddot": "acceleration"}
 """What the end of a name makes of an angle or a position: `theta_dot`, `thetaDot`, `alpha_ddot`."""
@@ -133,7 +135,7 @@ def _alike_sheets(path: Path, taken: Sequence[Proposal], sheets: Sequence[str]) 
         message = f"{listed(names)} hold columns without names: expected --sheet NAME, or --names where they are alike"
         raise InputError(message, file=path)
     left = [sheet for sheet in sheets if sheet not in names]
-    words = f"{path.name}: {listed(names)} of its {len(sheets)} sheets {'are trials' if names[1:] else 'is a trial'}"
+    words = f"{listed(names)} of its {len(sheets)} sheets {'are trials' if names[1:] else 'is a trial'}"
     said = words + (f", not {listed(left)}: without numbers, or with other columns" if left else "")
     return [replace(taken[0], said=(*taken[0].said, said)), *taken[1:]]
 
@@ -142,7 +144,7 @@ def _one_quantity_each(sheets: Sequence[Proposal], schema: RigSchema) -> list[Pr
     """Sheets that hold different quantities of what was recorded at once, as sources of a trial; none of others."""
     longest = max(sheets, key=lambda one: len(one.recording))
     held = {one.sheet: quantities_held(one, words_of(one.sheet), schema) for one in sheets}
-    found = [one for one in sheets if held[one.sheet] and end_at_once(_ends(one), _ends(longest))]
+    found = [one for one in sheets if held[one.sheet] and end_at_once(ends_in(one), ends_in(longest))]
     each = [held[one.sheet] for one in found]
     if len(found) < 2 or sum(map(len, each)) > len(frozenset().union(*each)):
         return []
@@ -171,7 +173,7 @@ def quantities_held(proposal: Proposal, of_name: Collection[str], schema: RigSch
     return frozenset(found or {n for n in schema.columns if MEANT.get(n, frozenset()) & set(of_name)})
 
 
-def _ends(one: Proposal) -> Ends:
+def ends_in(one: Proposal) -> Ends:
     """Ends of a recording in its first column of times, in rows where it has none."""
     times = (one.recording.columns[n] for n in one.candidates["time_s"])
     known = [time[np.isfinite(time)] for time in times if np.isfinite(time).sum() > 1]
@@ -180,7 +182,7 @@ def _ends(one: Proposal) -> Ends:
 
 def _of_sheet(one: Proposal, sheet: str) -> Proposal:
     """A proposal of a sheet, which its trial states; its form is that of other sheets too."""
-    return replace(one, form=replace(one.form or TextForm(), sheet=""), sheet=sheet)
+    return replace(one, form=one.form and replace(one.form, sheet=""), sheet=sheet)
 
 
 def propose(
@@ -210,8 +212,10 @@ def propose(
         units = {name: header.units[k] for k, name in enumerate(recording.names) if k in header.units}
     else:
         form, header = None, Header()
-        names, rate_hz, said = by_length(path, chosen) if is_nested(path) else (None, None, ())
-        recording, header = read_recording(path, wanted=names), Header(rate_hz=rate_hz, said=said)
+        sheet = str(stated.get("sheet", ""))
+        names, rate_hz, said = by_length(path, chosen, sheet) if is_nested(path) else (None, None, ())
+        recording = read_recording(path, TextForm(sheet=sheet), names)
+        header = Header(rate_hz=rate_hz, said=said)
         units = {}
     return as_seen(recording, form, {**recording.units, **units}, schema, revolute, header.rate_hz, header.said)
 

@@ -14,8 +14,9 @@ from fes_pin.data.as_read import HeldFile
 from fes_pin.data.channels import EMG, EMG_KEYS
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import inside, read_bytes
+from fes_pin.data.nested_trials import recordings_in
 from fes_pin.data.new_columns import NewColumns, Source
-from fes_pin.data.new_recording import Proposal, proposals_of
+from fes_pin.data.new_recording import Proposal
 from fes_pin.data.new_view import FilesOfTrial, WantedView, grouped_files, trial_view
 from fes_pin.data.schema import NumberKey, any_number, one_of, unknown
 from fes_pin.data.side_by_side import COLUMNS, SideBySide
@@ -90,7 +91,7 @@ class _Making:
         """What nobody has said, as options, and what is asked for it, by `column NAME` or `set KEY`."""
         self.own = of_files(wanted.files, "--set", wanted.settings)
         chosen = tuple(wanted.columns.values())
-        found = [proposals_of(p, self.schema, wanted.revolute, wanted.form, chosen) for p in wanted.files]
+        found = [recordings_in(p, self.schema, wanted, chosen) for p in wanted.files]
         each = [one for some in found for one in some]
         apart = SideBySide(self.schema, wanted.revolute, wanted.split, chosen)
         grouped = grouped_files(each, self.schema, wanted.sources)
@@ -168,7 +169,7 @@ class _Making:
         return WantedView(ends, split, self.wanted.offsets, rate_hz, derived, is_regular=bool(rate_hz or looked_hz))
 
     def _incomplete(self) -> InputError:
-        odd = "".join(f"{sentence}; " for sentence in self.columns.said({}))
+        odd = "".join(f"{sentence}; " for sentence in self.columns.odd())
         return InputError(f"{odd}the files do not say everything; please add {', '.join(self.missing.values())}")
 
     def answered(self) -> Wanted:
@@ -181,7 +182,7 @@ class _Making:
         """
         wanted = self.wanted
         if wanted.say is not None:
-            wanted.say("\n".join([*self.columns.said({}), "what the files do not say:", *self.missing.values()]))
+            wanted.say("\n".join([*self.columns.odd(), "what the files do not say:", *self.missing.values()]))
         columns, settings = dict(wanted.columns), dict(wanted.settings)
         for key, what in self.missing.items():
             table, _, name = key.partition(" ")

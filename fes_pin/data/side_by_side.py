@@ -23,7 +23,7 @@ from fes_pin.data.recorded.form import cells_of
 from fes_pin.data.recorded.parts import end_at_once, ends_of, without_empty_end
 from fes_pin.data.schema import RigSchema
 from fes_pin.data.table import MIN_ROWS
-from fes_pin.data.units import split_header, stated_unit
+from fes_pin.data.units import speed_of_trial, split_header, stated_unit, without_speed
 
 COLUMNS = "columns"
 """What `--split` says of a file whose trials stand side by side."""
@@ -74,7 +74,9 @@ class _Set:
         return ends_of(times[0])
 
     def is_called_trial(self) -> bool:
-        """Return whether a word for a trial stands before the number in each name that holds it."""
+        """Return whether a word for a trial stands before the number in each name that holds it, or it is a speed."""
+        if all(map(speed_of_trial, self.names.values())):
+            return True
         names = [re.sub(r"#\d+$", "", name) for name in self.names.values()]
         before = rf"([A-Z]+|[A-Z]?[a-z]+)[^A-Za-z0-9]*0*{self.number}(?!\d)"
         words = [
@@ -117,7 +119,8 @@ class SideBySide:
             return [one]
         every = one.proposal.recording.names
         found = next((sets for place in PLACES if (sets := self._sets(one, place))), [])
-        if not found and self.split == COLUMNS:
+        is_one = one.proposal.form is None and one.proposal.sheet  # of the structures of a file
+        if not found and self.split == COLUMNS and not is_one:
             message = "expected names that are the same but for a number, each set of them a trial"
             raise InputError(f"{message}; found {listed(every)}", column=f"--split {COLUMNS}")
         chosen = {n for words in self.chosen for n in column_named(words, every)}
@@ -231,6 +234,8 @@ def _apart(name: str, place: int) -> tuple[str, str]:
     base, number = (again[1], again[2]) if again else (name, "")
     if place == AGAIN:
         return number, base
+    if place == 0 and (speed := speed_of_trial(base)):
+        return str(int(speed[1])), without_speed(base, speed).lower()
     bare, unit = split_header(base) if stated_unit(base)[0] else (base, "")
     found = [*re.finditer(r"\d+", bare)][place : place + 1]
     rest = f"{bare[: found[0].start()]} {bare[found[0].end() :]}" if found else bare

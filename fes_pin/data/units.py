@@ -200,6 +200,27 @@ def _ends_a_name(unit: str) -> bool:
     return known is not None and (known[0] in _HELD or len(unit) > 1 or not unit.isalnum())
 
 
+_NUMBER_WITH_UNIT = re.compile(r"(?:^|(?<=[\s(\[_@-]))(\d+)\s?([^\s\d,;()\[\]_]+)(?=$|[\s)\],;_])")
+
+
+def speed_of_trial(name: str) -> re.Match[str] | None:
+    """A whole number with the unit of a speed in a name that says how fast a trial was: `60 deg/s`, `Torque 60 deg/s`.
+
+    Behind a word for a speed, `gyro 1 deg/s`, or a number of one digit without a word for a quantity, it is the unit.
+    """
+    found = _NUMBER_WITH_UNIT.search(name)
+    if found is None or known_unit(found[2], ("angular rate",)) is None:
+        return None
+    words = words_of(without_speed(name, found))
+    meant = {column for column, some in MEANT.items() if some & words}
+    return found if "velocity" not in meant and (meant or not words or "at" in words or len(found[1]) > 1) else None
+
+
+def without_speed(name: str, speed: re.Match[str]) -> str:
+    """A name without the speed of its trial."""
+    return re.sub(r"[(\[]\s*[)\]]", "", f"{name[: speed.start()]}{name[speed.end() :]}").strip(" _,;@-")
+
+
 _BRACKETED = re.compile(r"^(?P<name>.*?)\s*[\[(<{]\s*(?P<unit>[^\])>}]*?)\s*[\])>}]\s*$")
 
 
@@ -212,6 +233,8 @@ def split_header(header: str) -> tuple[str, str]:
         The unit is empty where the header names none that is known.
     """
     text = re.sub(r"#\d+$", "", header.strip().strip("\"'"))  # the second of that name
+    if speed := speed_of_trial(text):
+        return split_header(rest) if (rest := without_speed(text, speed)) else (text, "")
     found = _BRACKETED.match(text)
     if found and found["unit"]:
         return found["name"].strip(), found["unit"]

@@ -31,8 +31,10 @@ ANKLES = {"positive": 1.0, "negative": -1.0}
 FLAT, RESTS = 0.25, 0.05
 """Share of a stance in which its foot lies flat, at least, and what it turns then all the same, rad/s."""
 FLATTER = 1.5
-"""Factor by which flat feet turn faster with one sign of their ankles that shows the other: of each foot 1.6 to 9 in
-walks, also where people limp or walk uphill, and 1 of an ankle that does not move."""
+"""Factor by which flat feet turn faster with one sign of their ankle that shows the other. In made walks, slow to fast,
+a wrong sign gives 1.6 to 9.8, a right one 0.10 to 0.63, also of people who limp. Of feet that point down it is 1.3 to
+5.4 and 0.18 to 0.75, of ankles that hardly move 0.95 to 1.75 and 0.57 to 1.05: some of these stay as they are
+(`scripts/recorded walks --count 60 --seed 71800 --ankles`)."""
 
 
 def units_of_motion(walk: RecordedWalk, in_degrees: bool) -> None:
@@ -125,7 +127,7 @@ def signs_of_knees(walk: RecordedWalk) -> None:
 def signs_of_ankles(walk: RecordedWalk) -> None:
     """Dorsiflexion positive: with the other sign a foot that lies flat would turn, as the shank turns over it."""
     stated = {s: ANKLES.get(walk.stated.get(f"dorsiflexion_{side}", "")) for s, side in SIDES.items()}
-    odds = {s: _flatter(walk, s) if walk.long and sign is None else 0.0 for s, sign in stated.items()}
+    odds = {s: flatter(walk, s) if walk.long and sign is None else 0.0 for s, sign in stated.items()}
     is_both = min(odds.values()) > 0.0 and sum(odds.values()) > 2.0 * np.log(FLATTER)
     told = [s for s in SIDES if odds[s] > np.log(FLATTER) or (is_both and stated[s] is None)]
     walk.moves = joints_turned(walk.moves, "ankle", [*told, *(s for s in SIDES if stated[s] == -1.0)])
@@ -134,7 +136,7 @@ def signs_of_ankles(walk: RecordedWalk) -> None:
         walk.said.append(f"{ankles} dorsiflexion negative: taken with the other sign")
 
 
-def _flatter(walk: RecordedWalk, side: str) -> float:
+def flatter(walk: RecordedWalk, side: str) -> float:
     """Logarithm of how much faster a foot turns while it lies flat than with the other sign of its ankle."""
     on = walk.standing(side)
     if not on.any():

@@ -1,6 +1,7 @@
 """Walks whose files follow other conventions on purpose, or other ways of the laboratory; how often each is said.
 
 scripts/recorded walks --count 20
+scripts/recorded walks --count 30 --ankles
 """
 
 from __future__ import annotations
@@ -17,6 +18,9 @@ from walks.synthetic import Gait, Wrong, gait_of, make, turn
 
 import fes_pin as fp
 from fes_pin.body.measured_walk import data_folder
+from fes_pin.data.trial_files import walk_recordings
+from fes_pin.data.walk_motion import FLATTER, flatter
+from fes_pin.data.walk_recorded import RecordedWalk
 
 Columns = dict[str, np.ndarray]
 Y, Z, X = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
@@ -33,6 +37,37 @@ def limping(gait: Gait, seed: int) -> Gait:
         out.coefficients[1:, k] *= random.uniform(0.1, 0.4)
         out.coefficients[0, k] = -np.radians(random.uniform(4.0, 20.0))
     return out
+
+
+def paced(gait: Gait, seed: int) -> Gait:
+    """Return a gait of 0.7 to 1.45 of its period, and 0.65 to 1.15 of its excursions: slow to fast walking."""
+    random, out = np.random.default_rng([seed, 7]), copy.deepcopy(gait)
+    out.period *= random.uniform(0.7, 1.45)
+    out.coefficients[1:] *= random.uniform(0.65, 1.15)
+    return out
+
+
+def with_ankles(least: float, most: float, drop_deg: float) -> Callable[[Gait, int], Gait]:
+    """Return what scales the excursions of both ankles, and points the feet down by up to an angle."""
+
+    def change(gait: Gait, seed: int) -> Gait:
+        random, out = np.random.default_rng([seed, 8]), copy.deepcopy(gait)
+        for side in "rl":
+            k = out.names.index(f"q_ankle_angle_{side}")
+            out.coefficients[1:, k] *= random.uniform(least, most)
+            out.coefficients[0, k] -= np.radians(random.uniform(0.0, drop_deg))
+        return out
+
+    return change
+
+
+GAITS: Mapping[str, Callable[[Gait, int], Gait]] = {
+    "usual": lambda gait, _seed: gait,
+    "limping": limping,
+    "pointed feet": with_ankles(0.3, 0.7, 20.0),
+    "stiff ankles": with_ankles(0.0, 0.3, 20.0),
+}
+"""Ways of walking in which the test of ankles is measured."""
 
 
 def read(path: Path) -> Columns:
@@ -273,13 +308,33 @@ def named(name: str, said: tuple[str, ...]) -> bool:
     return len(said) == 1 + (name in TWICE) and WRONG[name][1] in " ".join(said)
 
 
+def ankles(gait: Gait, seeds: range) -> None:
+    """Print by what factor flat feet turn faster with the wrong sign of their ankle, and with the right one."""
+    for name, change in GAITS.items():
+        wrong = []
+        for seed in seeds:
+            with tempfile.TemporaryDirectory() as place:
+                make(change(paced(gait, seed), seed), Path(place), Wrong(strides=2, tissue=0.5), seed)
+                (time, moves), (push_time, pushes) = walk_recordings(fp.read_study(place).trials[0])
+            plates = {side: {n[2:]: v for n, v in pushes.items() if n.startswith(f"{side}_")} for side in "rl"}
+            walk = RecordedWalk(time, dict(moves), push_time, plates, {})
+            wrong += [float(np.exp(-flatter(walk, side))) for side in "rl"]
+        told = np.mean(np.array(wrong) > FLATTER)
+        print(f"{name}: wrong {min(wrong):.2f} to {max(wrong):.2f}, {told:.1%} above {FLATTER}; "
+              f"right {1.0 / max(wrong):.2f} to {1.0 / min(wrong):.2f}")  # fmt: skip
+
+
 def main() -> None:
     """Print how often each wrong convention is named, and what is said of right ones."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--count", type=int, default=20)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--ankles", action="store_true", help="measure the test of their sign instead")
     asked = parser.parse_args()
     gait = gait_of(data_folder())
+    if asked.ankles:
+        ankles(gait, range(asked.seed, asked.seed + asked.count))
+        return
     good = dict.fromkeys((*WRONG, *RIGHT), 0)
     for seed in range(asked.seed, asked.seed + asked.count):
         with tempfile.TemporaryDirectory() as place:

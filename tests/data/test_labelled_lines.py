@@ -84,7 +84,6 @@ OTHERS = {
     "names that change": "a{k}: 1.5, b: 2.5",
     "words": "state: walking, angle: 1.5",
     "ratio": "1:2,1.5",
-    "pairs of records": "{k},speed: 1.5\ntorque: 2.5",
 }
 
 
@@ -105,6 +104,72 @@ def test_lines_without_names_stay_as_they_are():
         *("rst:0x1 (POWERON),boot:0x13", "3, 4", "1,2", ""),
     ]
     assert parts_of("q: nan, u: -1e-3 N").numbers == ("nan", "-1e-3") and parts_of("a:,b:2") is None
+
+
+RECORDS = {
+    "a line each": "t: {0:.0f}\nangle: {1:.3f}\ntorque: {2:.3f}",
+    "units": "t: {0:.0f} ms\nangle: {1:.3f} deg\ntorque: {2:.3f} Nm",
+    "rules": "t: {0:.0f}\nangle: {1:.3f}\ntorque: {2:.3f}\n--------",
+    "empty lines": "\nt = {0:.0f}\nangle = {1:.3f}\ntorque = {2:.3f}",
+    "two lines": "t: {0:.0f}, angle: {1:.3f}\ntorque: {2:.3f}",
+    "stamp": "{0:.0f}, angle: {1:.3f}\ntorque: {2:.3f}",
+    "commas": "t: {0:.0f}\nangle: {1:.3f}\ntorque: {2:.3f}",
+}
+
+
+def of_records(form, numbers):
+    lines = [RECORDS[form].format(*one) for one in zip(*numbers, strict=True)]
+    return [one.replace(".", ",") for one in lines] if form == "commas" else lines
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("top", ["", BOOT])
+@pytest.mark.parametrize("form", RECORDS)
+def test_a_record_may_have_several_lines(tmp_path, form, top, seed):
+    numbers = drawn(seed, 60 + 150 * seed)
+    records = of_records(form, numbers)
+    path = tmp_path / "log.txt"
+    path.write_text(top + "\n".join([*records, records[0].partition("\n")[0] * (seed == 1)]) + "\n")
+    one = propose(path, JOINT, True)
+    for name, values in zip(one.recording.names, numbers, strict=True):
+        np.testing.assert_allclose(one.recording.columns[name], values, atol=5e-4)
+    assert one.candidates["position"] == one.recording.names[1:2]
+    assert one.candidates["effort"] == one.recording.names[2:]
+    if form == "units":
+        assert [one.units[n] for n in one.recording.names] == ["ms", "deg", "Nm"]
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_record_that_lost_a_line_is_left_out_and_said(tmp_path, seed):
+    numbers = drawn(seed)
+    lines = [line for one in of_records("a line each", numbers) for line in one.splitlines()]
+    place = int(np.random.default_rng(seed).integers(30, 180))
+    row, lost = place // 3, lines.pop(place)
+    path = tmp_path / "log.txt"
+    path.write_text("\n".join(lines) + "\n")
+    one = propose(path, JOINT, True)
+    assert len(one.recording) == 79, lost
+    for name, values in zip(one.recording.names, numbers, strict=True):
+        np.testing.assert_allclose(one.recording.columns[name], np.delete(values, row), atol=5e-4)
+    assert any("passed over" in words for words in one.recording.said)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_names_in_no_order_are_refused_in_one_line_that_says_what_to_do(tmp_path, seed):
+    random = np.random.default_rng(seed)
+    lines = [f"{random.choice(['A', 'T', 'v'])}: {random.normal():.3f}" for _ in range(90)]
+    path = tmp_path / "log.txt"
+    path.write_text("\n".join(lines) + "\n")
+    with pytest.raises(InputError, match=r"come again in no order, .*: write the lines of each record in one order"):
+        propose(path, JOINT, True)
+
+
+def test_a_long_header_of_keys_is_no_record(tmp_path):
+    keys = [f"{word}: {k}.5" for k, word in enumerate(["mass", "length", "height", "rate", "gain", "offset", "age"])]
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join([*keys, "time,angle", *(f"{0.01 * k:.2f},{k}.0" for k in range(5))]) + "\n")
+    one = propose(path, JOINT, True)
+    assert one.recording.names == ("time", "angle") and len(one.recording) == 5
 
 
 def test_a_broken_line_is_said_with_its_row(tmp_path):

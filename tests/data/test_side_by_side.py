@@ -406,3 +406,40 @@ def test_clocks_that_overlap_are_of_instruments(tmp_path):
     one, (time, *both) = swing(1), swing(2)
     content = text([*one, np.round(time + 0.3, 6), *both], "time_1,angle_1,torque_1,time_2,angle_2,torque_2")
     assert "or 2 instruments at once" in refused(tmp_path, content)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("form", ["{} deg/s", "trial at {} deg/s", "{}°/s", "{} dps", "Knee 0{} deg/s", "{} rpm"])
+def test_a_column_for_each_speed_of_a_dynamometer(tmp_path, seed, form):
+    random = np.random.default_rng(seed)
+    speeds = sorted(random.choice([5, 30, 60, 90, 120, 180, 240, 300], size=2 + seed, replace=False))
+    trials = [swing(10 * seed + k) for k in range(len(speeds))]
+    names = [form.format(speed) for speed in speeds]
+    content = text([trials[0][0], *(one[1] for one in trials)], ",".join(["Time [s]", *names]))
+    assert f"--column position={names[0]}:UNIT" in refused(tmp_path, content)
+    study, _ = made(tmp_path, content, f"position={names[0]}:deg")
+    check(study, {f"a-{k}": (*one[:2], None) for k, one in enumerate(trials, 1)})
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("form", ["{} {} deg/s", "{} ({} deg/s)", "{}_{}dps", "{} [{}°/s]", "{} {} deg/s [unit]"])
+def test_quantities_at_each_speed_of_a_dynamometer(tmp_path, seed, form):
+    speeds, trials = (60, 120, 180), [swing(10 * seed + k) for k in range(3)]
+    names = [form.format(what, speed) for speed in speeds for what in ("angle", "torque")]
+    names = [n.replace("unit", "deg" if n.startswith("angle") else "Nm") for n in names]
+    columns = [trials[0][0], *(c for one in trials for c in one[1:])]
+    said = [UNITS["time_s"], UNITS["position"].format(names[0]), UNITS["effort"].format(names[1])]
+    study, out = made(tmp_path, text(columns, ",".join(["time", *names])), *(said[:1] if "unit" in form else said))
+    check(study, {f"a-{k}": one for k, one in enumerate(trials, 1)})
+    assert any("their names say so" in words for words in out.said)
+
+
+@pytest.mark.parametrize(
+    "names",
+    ["gyro 1 deg/s,gyro 2 deg/s", "omega_1 [dps],omega_2 [dps]", "speed1 dps,speed2 dps", "imu 1 dps,imu 2 dps"],
+)
+def test_channels_of_a_gyroscope_are_no_trials(tmp_path, names):
+    one, other = swing(1), swing(2)
+    content = text([*one, other[2]], f"Time [s],Angle [deg],{names}")
+    said = refused(tmp_path, content)
+    assert "trials side by side" not in said and all(name in said for name in names.split(","))

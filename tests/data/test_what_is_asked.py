@@ -168,3 +168,11 @@ def nested(path, content):
     cells[:] = [np.array(one, dtype=float) for one in content.get("MUPulses", [])]
     pytest.importorskip("scipy.io").savemat(path, {**content, "MUPulses": cells})
     return path
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("name", ["HipTor_L", "tor_knee", "KneeTor"])
+def test_a_torque_may_be_shortened_and_its_constant_is_none(tmp_path, name, seed):
+    names = ("t [s]", "angle [rad]", name, "observed torque constant [Nm/A]")
+    one = propose(csv(tmp_path / "a.csv", names, drawn(seed, 3)), RIGS["joint"], True)
+    assert one.candidates["effort"] == (name,)

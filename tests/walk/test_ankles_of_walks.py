@@ -81,3 +81,17 @@ def test_which_way_the_body_walks_does_not_matter(made, degrees):
     change(made, "ankle", "l")
     said = "the left ankle counts dorsiflexion negative: taken with the other sign"
     assert fp.read_study(made).trials[0].remarks == (said,)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("way", ["usual", "limping", "pointed feet", "stiff ankles"])
+def test_slow_and_fast_walks_are_taken_as_they_are(gait, tmp_path, way, seed):
+    from walking_matrix.conventions import GAITS, paced
+    from walks.synthetic import Wrong, make
+
+    made = tmp_path / "walk"
+    make(GAITS[way](paced(gait, seed), seed), made, Wrong(strides=2, tissue=0.5), seed)
+    assert not [words for words in fp.read_study(made).trials[0].remarks if "ankle" in words]
+    change(made, "ankle", "rl")
+    if way in ("usual", "limping"):
+        assert BOTH in fp.read_study(made).trials[0].remarks

@@ -50,7 +50,7 @@ class TextForm:
     encoding
         Of `ENCODINGS`.
     sheet
-        Of a spreadsheet; "" for its first one.
+        Of a spreadsheet; "" for its first one. Of a file that nests vectors one of its structures; "" for all of it.
     strict
         Whether each line must hold as many numbers as there are names, none of them missing and no two names alike, as
         the study format has it.

@@ -15,17 +15,20 @@ import warnings
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from fes_pin.data.errors import MOST_LISTED, InputError, optional_library
+from fes_pin.data.errors import MOST_LISTED, InputError, listed, optional_library
 from fes_pin.data.files import as_path, read_bytes, read_json
 from fes_pin.data.markers import TIME, c3d_points, trc_points
 from fes_pin.data.motion import STORAGE, is_rotation, read_motion
 from fes_pin.data.recorded.clock import since_first
+from fes_pin.data.recorded.elements import elements_in, of_one_length, units_in
 from fes_pin.data.recorded.form import TextForm
+from fes_pin.data.recorded.matlab_exports import with_names
 from fes_pin.data.recorded.text import read_text_recording, without_twins
 from fes_pin.data.table import MIN_ROWS, Table
 
@@ -78,7 +81,8 @@ def read_recording(path: str | Path, form: TextForm | None = None, wanted: Seque
     if suffix not in _READERS:
         return since_first(read_text_recording(path, form or TextForm(), wanted))
     read_bytes(path)  # their libraries open it themselves
-    recording = _READERS[suffix](path, wanted)
+    sheet = form.sheet if form else ""
+    recording = _nested(path, wanted, sheet) if is_nested(path) else _READERS[suffix](path, wanted)
     sizes = {len(values) for values in recording.columns.values()}
     if len(sizes) > 1:
         lengths = ", ".join(f"{name} {len(values)}" for name, values in recording.columns.items())
@@ -137,21 +141,66 @@ def matlab_vectors(path: Path) -> dict[str, np.ndarray]:
     InputError
         Not a MATLAB file, hardly more than objects of a class, or pymatreader is not installed.
     """
-    return _found_in(path)[0]
+    return _found_in(path).columns
 
 
-def _found_in(path: Path) -> tuple[dict[str, np.ndarray], float | None]:
-    """Every vector of numbers in a file that nests them, by dotted names, and the sample rate that it states, Hz.
+class _Found(NamedTuple):
+    """Vectors by dotted names, rates of samples by the structure that states them, Hz, units, and what is no vector."""
+
+    columns: dict[str, np.ndarray]
+    rates: tuple[tuple[str, float], ...]
+    units: dict[str, str]
+    left: tuple[str, ...]
+
+    def rate_hz(self, names: Collection[str]) -> float | None:
+        """The only rate that is stated of some vectors, next to them or above them; None where there is none."""
+        rates = {rate for above, rate in self.rates if not above or any(n.startswith(f"{above}.") for n in names)}
+        return rates.pop() if len(rates) == 1 else None
+
+
+def _found_in(path: Path, sheet: str = "") -> _Found:
+    """Every vector of numbers in a file that nests them, or in one of its structures.
 
     Of JSON a list of records has a vector of each key, and a null among numbers is a missing sample.
     """
-    content, is_odd = _NESTED[path.suffix.lower()](path)
+    content, is_odd = _content(path, read_bytes(path))
+    if sheet:
+        parts = dict(elements_in(content))
+        if sheet not in parts:
+            expected = f"expected one of its structures, {listed([*parts])}" if parts else "it has no structures"
+            raise InputError(f"{expected}; found {sheet[:40]!r}", file=path, column="sheet")
+        content = with_names(parts[sheet])
     found = dict(_vectors(content))
     if is_odd and len(found) < 2:  # no time with a quantity
         words = "expected arrays of numbers; objects of a class, as timeseries and table, are not read"
         raise InputError(f"{words}: save their times and data as arrays", file=path)
-    rates = {float(value) for name, value in _scalars(content) if SAMPLED.match(name.rpartition(".")[2]) and value > 0}
-    return found, rates.pop() if len(rates) == 1 else None
+    rates = []
+    for name, value in _scalars(content):
+        above, _, last = name.rpartition(".")
+        if value > 0.0 and (SAMPLED.match(last) or STEP.match(last)):
+            rates.append((above, value if SAMPLED.match(last) else float(f"{1.0 / value:.12g}")))
+    found, left = of_one_length(found)
+    return _Found(found, tuple(rates), units_in(content, found), (*left, *_too_deep(content)))
+
+
+@lru_cache(maxsize=2)
+def _content(path: Path, _content: bytes) -> tuple[Any, bool]:
+    """What a file nests; it is read once for all of its trials."""
+    content, is_odd = _NESTED[path.suffix.lower()](path)
+    return with_names(content), is_odd
+
+
+def elements_of(path: Path) -> tuple[str, ...]:
+    """Names of the structures of a file that nests vectors; none of others. Each is read as a sheet is.
+
+    Raises
+    ------
+    InputError
+        As `matlab_vectors`; not a JSON file.
+    """
+    if not is_nested(path):
+        return ()
+    return tuple(dict.fromkeys(n for n, one in elements_in(_content(path, read_bytes(path))[0]) if any(_vectors(one))))
 
 
 def _matlab(path: Path) -> tuple[Any, bool]:
@@ -183,6 +232,11 @@ _NESTED: Mapping[str, Callable[[Path], tuple[Any, bool]]] = {
 """What files hold that nest vectors, by suffix."""
 SAMPLED = re.compile(r"(?i)(fs|fsamp|sfreq|srate|frame_?rate|samp[a-z]*_?(rate|freq[a-z]*)|f_?sampl[a-z]*)(_?hz)?$")
 """Names of a number that is the rate of the samples."""
+SHORT = 0.02
+"""Share of the longest length that several vectors have, up to which others are no recording but marks and settings: a
+motion at 50 Hz next to an EMG at 2 kHz has 0.025."""
+STEP = re.compile(r"(?i)(interval|dt|delta_?t|samp[a-z]*_?(interval|time|period))(_?s)?$")
+"""Names of a number that is the time from one sample to the next, s; `interval` is Spike2's."""
 
 
 def is_nested(path: Path) -> bool:
@@ -190,51 +244,56 @@ def is_nested(path: Path) -> bool:
     return path.suffix.lower() in _NESTED
 
 
-def _nested(path: Path, wanted: Sequence[str] | None) -> Table:
-    columns, _ = _found_in(path)
+def _nested(path: Path, wanted: Sequence[str] | None, sheet: str = "") -> Table:
+    columns, _, units, left = _found_in(path, sheet)
+    if left and not columns:
+        raise InputError(left[0], file=path)
     if wanted is None and columns:  # scalars and tables of other lengths are no columns of the recording
         count = _usual_length(columns)
         columns = {n: v for n, v in columns.items() if len(v) == count}
-    return _made(path, columns, wanted)
+    whole = _made(path, columns, wanted, said=left)
+    return replace(whole, units={n: u for n, u in units.items() if n in whole.names})
 
 
-def by_length(path: Path, chosen: Collection[str]) -> tuple[tuple[str, ...], float | None, tuple[str, ...]]:
+def by_length(
+    path: Path, chosen: Collection[str], sheet: str = ""
+) -> tuple[tuple[str, ...], float | None, tuple[str, ...]]:
     """Names of vectors of one length in a file that nests them, their rate, and a sentence about others.
 
     Parameters
     ----------
     chosen
         What a person says of columns: a vector's name begins it, and decides the length; else the most have it.
+    sheet
+        One of its structures; "" for the whole file.
 
     Returns
     -------
     names : tuple of str
     rate_hz : float or None
-        Of the samples, where the file states it: `fs`, `SampleRate`.
+        Of the samples, where the file states it: `fs`, `SampleRate`, `interval`.
     said : tuple of str
-        Of other vectors that go together.
+        Of other vectors that go together, or are as long.
 
     Raises
     ------
     InputError
         As `matlab_vectors`; not a JSON file.
     """
-    columns, rate_hz = _found_in(path)
+    found = _found_in(path, sheet)
+    columns = found.columns
     groups = _by_length(columns)
     asked = [n for n in columns if any(words == n or words.startswith((f"{n}:", f"{n},")) for words in chosen)]
     count = len(columns[asked[0]]) if asked else _usual_length(columns)
-    others = {n: names for n, names in groups.items() if n != count and len(names) > 1}
+    names = tuple(groups.get(count, ()))
+    others = {n: some for n, some in groups.items() if n != count and (len(some) > 1 or 2 * n >= count)}
     if not others:
-        return tuple(groups.get(count, ())), rate_hz, ()
+        return names, found.rate_hz(names), ()
     parts = "; ".join(f"{n} samples: {_few(names)}" for n, names in list(others.items())[:MOST_LISTED])
     more = f" ... and {len(others) - MOST_LISTED} lengths more" if len(others) > MOST_LISTED else ""
     first = next(iter(others.values()))[0]
     how = f"--column COLUMN={first} takes those of its length"
-    return (
-        tuple(groups[count]),
-        rate_hz,
-        (f"vectors of {count} samples are taken; there are also {parts}{more}; {how}",),
-    )
+    return names, found.rate_hz(names), (f"vectors of {count} samples are taken; there are also {parts}{more}; {how}",)
 
 
 def _by_length(columns: Mapping[str, np.ndarray]) -> dict[int, list[str]]:
@@ -255,6 +314,8 @@ def _usual_length(columns: Mapping[str, np.ndarray]) -> int:
             lists.setdefault(name.rpartition(".")[0], set()).add(len(values))
     alike = {n: v for n, v in columns.items() if len(lists.get(n.rpartition(".")[0], ())) < 2} or columns
     groups = _by_length(alike)
+    longest = max((n for n, names in groups.items() if len(names) > 1), default=0)
+    groups = {n: names for n, names in groups.items() if n > SHORT * longest}
     return max(groups, key=lambda n: (len(groups[n]), n if len(groups[n]) == 1 else 0), default=0)
 
 
@@ -283,6 +344,7 @@ def _of_array(content: Any, name: str) -> Iterator[tuple[str, np.ndarray]]:
         values = np.asarray(content)
     except ValueError:
         return
+    values = values.squeeze() if values.ndim > 2 else values
     if values.dtype.kind not in "biuf" or values.size < MIN_ROWS or values.ndim > 2:
         return
     if values.ndim == 1 or 1 in values.shape:
@@ -291,6 +353,17 @@ def _of_array(content: Any, name: str) -> Iterator[tuple[str, np.ndarray]]:
     table = values if values.shape[0] >= values.shape[1] else values.T
     for place, column in enumerate(table.T, 1):
         yield f"{name}.{place}", column.astype(float)
+
+
+def _too_deep(content: Any, name: str = "") -> Iterator[str]:
+    """A sentence about each array of more than two dimensions, none of which says that it is the time."""
+    if isinstance(content, Mapping | list):
+        pairs = content.items() if isinstance(content, Mapping) else enumerate(content, 1)
+        for key, value in pairs:
+            yield from _too_deep(value, f"{name}.{key}" if name else str(key))
+    elif isinstance(content, np.ndarray) and content.dtype.kind in "biuf" and content.squeeze().ndim > 2:
+        shape = " x ".join(map(str, content.shape))
+        yield f"{name} ({shape}) is left out: vectors and matrices are read; save each of its pages as a matrix"
 
 
 def _scalars(content: Any, name: str = "") -> Iterator[tuple[str, float]]:

@@ -235,8 +235,13 @@ def _counts_in(numbers: Sequence[Sequence[str]], rate: float | None) -> str:
     firsts = [row[0].replace(",", ".") for row in numbers]
     if rate is None or len(firsts) < 2 or not all(map(NUMBER.match, firsts)):
         return ""
-    step = float(firsts[1]) - float(firsts[0])
-    return next((u for u in ("s", "ms") if math.isclose(step * UNITS["time"][u] * rate, 1.0, rel_tol=0.02)), "")
+    return unit_of_step(float(firsts[1]) - float(firsts[0]), rate)
+
+
+def unit_of_step(step: float, rate_hz: float) -> str:
+    """The unit of times, s or ms, in which a step is that of a rate; "" where it is in neither."""
+    units = UNITS["time"]
+    return next((u for u in ("s", "ms") if math.isclose(step * units[u] * rate_hz, 1.0, rel_tol=0.02)), "")
 
 
 def _rate_of_frames(lines: Sequence[str], form: TextForm, names: Sequence[str]) -> float | None:

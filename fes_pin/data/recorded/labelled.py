@@ -1,10 +1,12 @@
-"""Lines of a serial port in which a number stands behind its name: `1200,angle: 1.36 deg,torque:0.2`."""
+"""Lines of a serial port in which a number stands behind its name: `1200,angle: 1.36 deg,torque:0.2`, or one a line."""
 
 import re
 from collections import Counter
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
+from fes_pin.data.errors import listed
 from fes_pin.data.recorded.clock import clock_seconds
 from fes_pin.data.table import MIN_ROWS
 
@@ -29,7 +31,8 @@ def parts_of(line: str) -> Labelled | None:
     text = line.strip()
     if "=" not in text and ":" not in text:
         return None
-    between = next((sign for sign in _BETWEEN if sign in text), "")
+    is_one = (one := _cell(text)) is not None and one[0]  # `angle: 1,36`
+    between = "" if is_one else next((sign for sign in _BETWEEN if sign in text), "")
     cells = [_cell(cell) for cell in text.rstrip(between or None).split(between)] if between else _apart(text)
     if not cells or None in cells or not any(cell and cell[0] for cell in cells):
         return None
@@ -60,26 +63,73 @@ def _apart(text: str) -> list[tuple[str, str, str] | None]:
 def names_before_numbers(lines: Sequence[str]) -> tuple[str, ...]:
     """Names of the columns of lines that have them before their numbers, with their units; () of others.
 
-    The last lines but one, which may be cut off, have the same names.
+    A record is a line, or several whose names come again in one order. The last one may be cut off.
     """
-    last = [line for line in lines if line.strip()][-MIN_ROWS - 1 : -1]
-    found = {(p.names, p.units) if (p := parts_of(line)) else None for line in last}
-    one = next(iter(found), None)
-    if len(last) < MIN_ROWS or len(found) > 1 or one is None:
+    found = [parts_of(line) for line in lines]
+    records = _records(found)
+    count = len(records[0]) if records else 0
+    last = [k for k, line in enumerate(lines) if re.search(r"\d", line)][-(MIN_ROWS + 1) * count :]
+    whole = [record for record in records if set(record) <= set(last)]
+    cells = [[p for k in record if (p := found[k])] for record in whole]
+    units = {tuple(unit for p in record for unit in p.units) for record in cells}
+    if len(whole) < MIN_ROWS or len(units) > 1:
         return ()
-    return tuple(f"{name} [{unit}]" if unit else name for name, unit in zip(*one, strict=True))
+    names = [name for p in cells[0] for name in p.names]
+    return tuple(f"{name} [{unit}]" if unit else name for name, unit in zip(names, units.pop(), strict=True))
+
+
+def why_no_names(lines: Sequence[str]) -> str:
+    """Why lines that name their numbers are not read, and what to do; "" of other lines, and of those that are."""
+    filled = [line for line in lines if line.strip()]
+    names = [", ".join(filter(None, p.names)) for line in filled if (p := parts_of(line))]
+    is_all = all(map(parts_of, [line for line in filled if re.search(r"\d", line)][-MIN_ROWS:]))
+    if not is_all or len(names) < MIN_ROWS * max(len({*names}), 1) or names_before_numbers(lines):
+        return ""
+    known = listed([*dict.fromkeys(names)])
+    return (
+        f"numbers stand behind names that come again in no order, {known}: write the lines of each record in one order"
+    )
+
+
+def _records(found: Sequence[Labelled | None]) -> list[list[int]]:
+    """Places of the lines of each record: their names come in one order; what is between them has no names.
+
+    A record begins as the first one in the file does, or after an empty line or another without names.
+    """
+    count = Counter(p.names for p in found if p)
+    most = max(count.values(), default=0)
+    order = [names for names, times in count.items() if 2 * times > most]
+    after = Counter(p.names for before, p in pairwise(found) if p and before is None and p.names in order)
+    names, times = next(iter(after.most_common(1)), ((), 0))
+    if 2 * times > most:
+        order = [*order[order.index(names) :], *order[: order.index(names)]]
+    records, record = list[list[int]](), list[int]()
+    for place, p in enumerate(found):
+        if p is None:
+            continue
+        is_next = p.names == order[len(record)]
+        record = [*record, place] if is_next else [place] * (p.names == order[0])
+        if len(record) == len(order):
+            records.append(record)
+            record = []
+    return records
 
 
 def without_names(lines: Sequence[str]) -> list[str]:
     """Lines with their numbers alone, where they have the names that most have before them; others as they are.
 
-    A last line that has them no more was cut off, and is called so: it is none of numbers.
+    A record of several lines stands in the last of them. A last line that has those names no more was cut off, and is
+    called so: it is none of numbers.
     """
     found = [parts_of(line) for line in lines]
-    usual = Counter(p.names for p in found if p).most_common(1)
-    found = [p if p and p.names == usual[0][0] else None for p in found]
-    out = [p.between.join(p.numbers) if p else line for line, p in zip(lines, found, strict=True)]
-    last = max((k for k, line in enumerate(lines) if line.strip()), default=0)
-    if any(found) and not found[last]:
+    records = _records(found)
+    out = [line if re.search(r"\w", line) or not records else "" for line in lines]  # `-----` between records
+    for record in records:
+        parts = [p for k in record if (p := found[k])]
+        between = parts[0].between if len(parts) == 1 else ";"
+        out[record[0] : record[-1] + 1] = [""] * (record[-1] - record[0] + 1)
+        out[record[-1]] = between.join(number for p in parts for number in p.numbers)
+    last = max((k for k, line in enumerate(out) if line.strip()), default=0)
+    if records and last != records[-1][-1]:
         out[last] = f"cut off: {lines[last]}"
     return out

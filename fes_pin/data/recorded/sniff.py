@@ -17,7 +17,7 @@ from fes_pin.data.recorded.clock import clock_seconds
 from fes_pin.data.recorded.form import COMMENTS, DECIMALS, DELIMITERS, MISSING, TextForm, cells_of
 from fes_pin.data.recorded.formats import check_suffix, is_text
 from fes_pin.data.recorded.header import NUMBER, Header, cells_in, header_of, is_keyed, ways
-from fes_pin.data.recorded.labelled import names_before_numbers
+from fes_pin.data.recorded.labelled import names_before_numbers, why_no_names
 from fes_pin.data.recorded.sheets import is_spreadsheet
 from fes_pin.data.recorded.text import read_text_recording
 from fes_pin.data.table import MIN_ROWS, Table
@@ -55,7 +55,7 @@ def sniffed(path: Path, stated: Mapping[str, Any] = MappingProxyType({})) -> tup
     columns = len(rows[0][1])
     numbers = [(cells_of(lines[place], form) + [""] * columns)[:columns] for place in below[:2]]
     header = called or turned or (Header() if stated.get("transposed") else header_of(above, form, numbers))
-    if not (turned or called):
+    if not turned:
         header = replace(header, said=(*header.said, *_odd_of_table(header, above, form, (len(rows), columns))))
     if {"names", "header_row", "transposed"} & set(stated):
         header = Header(int(stated.get("header_row", header.row)), rate_hz=header.rate_hz)
@@ -85,8 +85,11 @@ def _likeliest(path: Path, sheet: str) -> tuple[list[str], Rows, TextForm]:
         forms = [TextForm(sheet=sheet)]
     else:
         plain = TextForm(encoding=_encoding(path))
-        if called := names_before_numbers(plain.lines(path)[:LOOKED_AT]):
+        looked_at = plain.lines(path)[:LOOKED_AT]
+        if called := names_before_numbers(looked_at):
             plain = replace(plain, labelled=True, names=called)
+        elif why := why_no_names(looked_at):
+            raise InputError(why, file=path)
         forms = [replace(plain, delimiter=sign, decimal=point) for sign in DELIMITERS for point in DECIMALS]
     every = forms[0].lines(path)
     lines = _without_footer(_first_block(every[:LOOKED_AT]))
@@ -216,7 +219,8 @@ def _widths_like(width: int, is_open: bool, is_known: bool) -> set[int]:
 def _goes_on(above: Sequence[str], form: TextForm, width: int) -> bool:
     """Return whether the nearest lines above one of another kind are rows of numbers, as wide as those below it."""
     number = _NUMBER[form.decimal]
-    nearest = [cells_of(line, form) for line in above[-2 * MIN_ROWS :] if _begins_a_row(line)][-MIN_ROWS:]
+    filled = [line for line in above if line.strip()][-2 * MIN_ROWS :]
+    nearest = [cells_of(line, form) for line in filled if _begins_a_row(line)][-MIN_ROWS:]
     numbers = [sum(_is_number(cell, number) for cell in cells) for cells in nearest]
     fit = [width - 1 <= len(cells) <= width and 2 * n >= width for cells, n in zip(nearest, numbers, strict=True)]
     return len(fit) == MIN_ROWS and all(fit)

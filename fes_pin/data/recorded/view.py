@@ -46,7 +46,7 @@ class View:
     is_joined
         Whether it has several sources.
     sheet
-        Of a spreadsheet; "" for its first one.
+        Of a spreadsheet, or a structure of a file that nests vectors; "" for its first one, or the whole file.
     """
 
     begin_s: float | None = None
