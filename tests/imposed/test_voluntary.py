@@ -1,5 +1,7 @@
 """Effort of a subject who does not relax: it differs between equal cycles, and no passive limb's does."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -9,8 +11,9 @@ from fes_pin.data.plausibility import implausible
 from fes_pin.data.repeats import effort_of_repeats
 from fes_pin.data.schema import schema_of
 from fes_pin.data.templates import rod, wheel
+from fes_pin.diagnosis.by_trial import _likeliest
 from fes_pin.infer.levels import CONFIDENCE_95
-from fes_pin.models.effects import EffortOffset, PeriodicTorque
+from fes_pin.models.effects import EffortGain, EffortOffset, PeriodicTorque
 from fes_pin.models.nominal import nominal_model
 from fes_pin.remainder.unrepeated import over_voluntary, voluntary_effort
 from fes_pin.search.fit import fitted_alone
@@ -91,12 +94,12 @@ def astuple(trial):
     return trial.kind, trial.columns, trial.time
 
 
-def turned(rng, own):
+def turned(rng, own, sways=0.2):
     """A weightless limb that a dynamometer moves, with damping, and a torque of its own at a frequency of its own."""
     t, w, turns = DT * np.arange(4000), 2.0 * np.pi * rng.uniform(0.5, 0.8), rng.uniform(0.0, 6.0)
     q = 0.4 * np.sin(w * t)
     effort = 0.3 * 0.4 * w * np.cos(w * t) - 0.02 * 0.4 * w * w * np.sin(w * t) + 0.002 * rng.standard_normal(len(t))
-    effort += 0.2 * np.sin(0.37 * w * t + turns) + own
+    effort += sways * np.sin(0.37 * w * t + turns) + own
     columns = {"position": q + 1e-5 * rng.standard_normal(len(t)), "effort": effort}
     return columns, t, 0.37 * w
 
@@ -127,3 +130,19 @@ def test_what_a_cause_explains_is_not_voluntary(tmp_path, seed):
             held = fitted_alone(plain + torque + EffortOffset(offset=0.1), study.trials)
             over = over_voluntary(voluntary_effort(held), held)
             assert over["effort_offset"] < CONFIDENCE_95 < over["periodic_torque"]  # a hold explains the offset
+
+
+@pytest.mark.parametrize("size", [0.0, 0.15])
+def test_a_scale_of_each_trial_is_not_told_from_voluntary_effort(tmp_path, size):
+    """A relaxed limb with another amplifier in each trial has it found; of a subject who holds it is not asked."""
+    (tmp_path / "wheel.urdf").write_text(wheel(0.02))
+    rng, trials = np.random.default_rng(21), []
+    for k, scale in enumerate((1.0, 1.4, 0.7)):
+        columns, time, _ = turned(rng, wandering(rng, 4000, 0.8, size) + size, 0.0)
+        trials.append(fp.Trial(f"{k}", "imposed", columns | {"effort": scale * columns["effort"]}, time))
+    start, files = {"inertia_scale": 1.0, "damping": 0.3}, {"urdf": tmp_path / "wheel.urdf"}
+    fitted = fitted_alone(nominal_model(fp.Study("a", "joint", {}, start, trials, files=files)), trials)
+    search = SimpleNamespace(was_stopped=False)
+    found = SimpleNamespace(best=fitted, nominal=fitted, without={})
+    asked = _likeliest((search, found, None), [EffortGain])
+    assert asked == (EffortGain if size == 0.0 else None)
