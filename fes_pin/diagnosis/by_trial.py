@@ -168,7 +168,7 @@ def _likeliest(ran: Ran, kinds: Sequence[type[Effect]]) -> type[Effect] | None:
 
     Of kinds that are not distinguished, as where the effort itself is read, it is the first on the signal path. A kind
     is fitted further only if its first fit, at the noise of the base, gains half of what is required. A subject who
-    does not relax has another effort in each trial: no zero and no scale is told from it.
+    does not relax has another effort in each trial, which a zero or scale imitates.
     """
     search, found, again = ran
     if search.was_stopped or again is not None or voluntary_effort(found.best) is not None:

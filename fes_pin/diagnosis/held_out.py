@@ -1,19 +1,14 @@
 """Trials held out of a diagnosis: evidence for each cause from their likelihood, and gains on their errors."""
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-
-import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.errors_ahead import squared_errors
 from fes_pin.identify.likelihood_fit import LikelihoodFit, fit_of, problem_on
-from fes_pin.infer.covariance import covariance_of
-from fes_pin.infer.held_out import Errors, held_out_gain, marginal_cost
-from fes_pin.infer.levels import IDENTIFIABLE_SHARE
+from fes_pin.infer.held_out import Errors, held_out_gain, identified_folds, marginal_cost
 from fes_pin.infer.maximise import together
 from fes_pin.infer.optimum import minimise
-from fes_pin.infer.problem import normal_equations
 from fes_pin.infer.result import CROSS_VALIDATED, FITTED, Evidence, Gain
 from fes_pin.infer.search import SearchResult
 from fes_pin.prepare.measured import folds_of
@@ -81,13 +76,13 @@ def make_folds(
     Parameters
     ----------
     held
-        Trials of each fold; by default `identified_folds` of the best set.
+        Trials of each fold; by default `folds_that_tell` of the best set.
     """
     if test:
         return [Fold(found.nominal, found.best, found.without, tuple(test))]
     if len(train) < 2:
         return []
-    held = identified_folds(found.best) if held is None else held
+    held = folds_that_tell(found.best) if held is None else held
     fits = {"": found.nominal, "+": found.best, **found.without}
     others = [[t for i, t in enumerate(found.best.trials) if i not in out] for out in held]
     wanted = [(k, n) for k in range(len(held)) for n in fits]
@@ -96,28 +91,9 @@ def make_folds(
     return [Fold(*fitted, tuple(train[i] for i in out), tuple(out)) for fitted, out in zip(each, held, strict=True)]
 
 
-def identified_folds(fitted: LikelihoodFit) -> list[list[int]]:
-    """Return the trials of each fold whose other trials identify the model, and which themselves say something of it.
-
-    Without them no standard deviation grows by more than 1 / `IDENTIFIABLE_SHARE`, and by them alone not every one. A
-    prediction from trials that do not identify the model, as of a joint at rest, says nothing about its causes; nor
-    does a prediction of trials that tell nothing of it, as of a pendulum that is balanced.
-    """
-    moving = np.array([n not in fitted.at_bound for n in fitted.free])
-
-    def deviations(some: Collection[int]) -> np.ndarray:
-        parts = [p for k, p in enumerate(fitted.parts) if k in some]
-        return np.sqrt(np.diag(covariance_of(normal_equations(parts).hessian, moving)))
-
-    every = {*range(len(fitted.parts))}
-    whole = deviations(every)
-    known = np.isfinite(whole)
-
-    def identifies(some: Collection[int]) -> np.ndarray:
-        return IDENTIFIABLE_SHARE * deviations(some)[known] <= whole[known]
-
-    folds = folds_of(fitted.trials)
-    return [out for out in folds if identifies(every - {*out}).all() and identifies(out).any()]
+def folds_that_tell(fitted: LikelihoodFit) -> list[list[int]]:
+    """Return the trials of each fold that is predicted; see `infer.held_out.identified_folds`."""
+    return identified_folds(fitted, fitted.parts, folds_of(fitted.trials))
 
 
 def as_random_as_in_all(fitted: LikelihoodFit, trials: Sequence[Trial]) -> LikelihoodFit:

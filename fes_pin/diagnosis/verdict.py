@@ -29,8 +29,8 @@ from fes_pin.diagnosis.held_out import (
     Fold,
     as_random_as_in_all,
     evidence_of,
+    folds_that_tell,
     gains_of,
-    identified_folds,
     make_folds,
 )
 from fes_pin.diagnosis.likelihood_models import Found, LikelihoodModels, LikelihoodSearch
@@ -208,7 +208,7 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
         if currency == EFFORT and by_effort is not None:
             return by_effort.errors(best.names) if by_effort.knows(best.names) else None
         train, folds, floor = self.models.trials, self.folds(state), unit.found.best
-        held = identified_folds(floor) if len(train) > 1 else []  # the same of both sets
+        held = folds_that_tell(floor) if len(train) > 1 else []  # the same of both sets
         if [[*f.out] for f in folds] != held:
             folds = make_folds(replace(state.found, nominal=best, without={}), train, (), self.refitted, held)
         pairs = [(f.chosen or f.best, floor, f.test) for f in folds]

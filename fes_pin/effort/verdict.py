@@ -10,7 +10,7 @@ import numpy as np
 from fes_pin.effort.fits import EffortSets
 from fes_pin.effort.problem import EffortFit
 from fes_pin.infer.distributions import f_tail
-from fes_pin.infer.held_out import FOLDS, Errors, added_likelihood, deal, held_out_gain
+from fes_pin.infer.held_out import FOLDS, Errors, added_likelihood, deal, held_out_gain, identified_folds
 from fes_pin.infer.levels import CLAIM_LEVEL
 from fes_pin.infer.projection import Projection
 from fes_pin.infer.result import Evidence, Remainder
@@ -50,6 +50,16 @@ class EffortVerdict(Verdict[EffortFit, EffortSets, Weighed]):
         final = self.search.models.final
         return [final(fitted, [~fold[one] for one in self.units]) for fold in self.folds]
 
+    def predicted(self, best: EffortFit) -> np.ndarray:
+        """Return the units in folds that are predicted, by `infer.held_out.identified_folds`; as bool, of each."""
+        pieces = [
+            replace(part, residual=part.residual[rows], jacobian=part.jacobian[rows], local=part.local[rows])
+            for part, one in zip(best.parts, self.units, strict=True)
+            for rows in (one == unit for unit in np.unique(one))
+        ]
+        folds = identified_folds(best, pieces, [np.flatnonzero(fold).tolist() for fold in self.folds])
+        return np.isin(np.arange(len(pieces)), [k for out in folds for k in out])
+
     def left(self, fitted: EffortFit) -> list[np.ndarray]:
         """Return the residual of the effort of each trial by fits without the part of a row."""
         key = (fitted.names, *sorted(fitted.forms.items()))
@@ -69,29 +79,44 @@ class EffortVerdict(Verdict[EffortFit, EffortSets, Weighed]):
         if not best.names:
             return Weighed({}, {}, remainder)
         sets = {"": found.nominal, "+": best, **found.without}
-        roots = self.search.models.roots(best)
-        left = {n: [r * w for r, w in zip(self.left(f), roots, strict=True)] for n, f in sets.items()}
-        errors = {n: self._errors(one) for n, one in left.items()}
+        units = self.predicted(best)
+        left = {n: self._whitened(self._residual(f, units), best, units) for n, f in sets.items()}
+        errors = {n: self._errors(one, units) for n, one in left.items()}
         gains = {n: held_out_gain(errors[""], errors[n], errors["+"], self.search.models.seed) for n in found.without}
         evidence = {}
         for name, less in found.without.items():
-            added = added_likelihood(np.concatenate(left[name]), np.concatenate(left["+"]))
+            added = added_likelihood(left[name], left["+"])
             scatter = self.search.models.excess_scatter(best, less)
             evidence[name] = Evidence(added.added / scatter, added.squares / scatter)
         return Weighed(gains, evidence, remainder, is_robust=True)
 
     def errors_of(self, fitted: EffortFit, best: EffortFit) -> Errors:
         """Return squared errors of the low-passed effort by fits without the part of a row, at the weights of a set."""
-        roots, efforts = self.search.models.roots(best), self.search.models.rows.efforts(fitted.values)
-        errors = self._errors([r * w for r, w in zip(self.left(fitted), roots, strict=True)])
-        spread = self._errors([(u - u.mean()) * w for u, w in zip(efforts, roots, strict=True)])
+        units, efforts = self.predicted(best), self.search.models.rows.efforts(fitted.values)
+        errors = self._errors(self._whitened(self._residual(fitted, units), best, units), units)
+        spread = self._errors(self._whitened([u - u.mean() for u in efforts], best, units), units)
         return replace(errors, spread=spread.squares)
 
-    def _errors(self, left: Sequence[np.ndarray]) -> Errors:
+    def _residual(self, fitted: EffortFit, units: np.ndarray) -> list[np.ndarray]:
+        """Return the residual by fits without the part of a row; that of the fit itself where no part is predicted."""
+        if units.any():
+            return self.left(fitted)
+        return self.search.models.problem(fitted.names, fitted.forms).residuals(fitted.values)[0]
+
+    def _whitened(self, efforts: Sequence[np.ndarray], best: EffortFit, units: np.ndarray) -> np.ndarray:
+        """Return rows at the weights of a set, end to end: of some units, or of all where these are none."""
+        roots = self.search.models.roots(best)
+        rows = np.concatenate([one * w for one, w in zip(efforts, roots, strict=True)])
+        return np.asarray(rows[self._rows_of(units)])
+
+    def _rows_of(self, units: np.ndarray) -> np.ndarray:
+        return np.asarray((units | ~units.any())[np.concatenate(self.units)])
+
+    def _errors(self, left: np.ndarray, units: np.ndarray) -> Errors:
         """Return squared errors by units of evidence; the spread is that of the effort's noise."""
-        unit, flat = np.concatenate(list(self.units)), np.concatenate(list(left))
+        _, unit = np.unique(np.concatenate(self.units)[self._rows_of(units)], return_inverse=True)
         count = np.bincount(unit).astype(float)
-        return Errors(np.bincount(unit, flat**2), count, count)
+        return Errors(np.bincount(unit, left**2), count, count)
 
 
 def lack_of_fit(sets: EffortSets, fitted: EffortFit) -> Remainder:

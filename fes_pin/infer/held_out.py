@@ -1,14 +1,16 @@
 """Gains on held-out data: errors by unit of evidence, gains with their intervals, likelihoods."""
 
 from collections import Counter
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fes_pin.infer.covariance import covariance_of
+from fes_pin.infer.levels import IDENTIFIABLE_SHARE
 from fes_pin.infer.optimum import Optimum
-from fes_pin.infer.problem import normal_equations
+from fes_pin.infer.problem import Linearized, normal_equations
 from fes_pin.infer.result import Evidence, Gain
 from fes_pin.infer.scatter import at_rest
 
@@ -40,6 +42,36 @@ def deal(order: Sequence[int], groups: Sequence[Hashable] | None = None, count: 
     sizes = Counter(of.values())
     dealt = [i for g in sizes for i in order if of[i] == g and sizes[g] > 1]
     return [sorted(dealt[k::count]) for k in range(min(count, len(dealt)))]
+
+
+def identified_folds(fitted: Optimum, units: Sequence[Linearized], folds: Sequence[list[int]]) -> list[list[int]]:
+    """Return the folds whose other units identify the model, and which themselves say something of it.
+
+    Without them no standard deviation grows by more than 1 / `IDENTIFIABLE_SHARE`, and by them alone not every one. A
+    prediction from units that do not identify the model, as of a joint at rest, says nothing about its causes; nor
+    does a prediction of units that tell nothing of it, as of a pendulum that is balanced.
+
+    Parameters
+    ----------
+    units
+        Residuals and sensitivities of each unit of evidence near the fit.
+    folds
+        Units that are held out together, by their numbers.
+    """
+    moving = np.array([n not in fitted.at_bound for n in fitted.free])
+
+    def deviations(some: Collection[int]) -> np.ndarray:
+        hessian = normal_equations([units[k] for k in some]).hessian
+        return np.sqrt(np.diag(covariance_of(hessian, moving)))
+
+    every = {*range(len(units))}
+    whole = deviations(every)
+    known = np.isfinite(whole)
+
+    def identifies(some: Collection[int]) -> np.ndarray:
+        return np.asarray(IDENTIFIABLE_SHARE * deviations(some)[known] <= whole[known])
+
+    return [out for out in folds if identifies(every - {*out}).all() and identifies(out).any()]
 
 
 def percent_of_spread(squares: ArrayLike, around: ArrayLike) -> float:

@@ -11,7 +11,7 @@ from identify.rigs import as_likely
 
 from fes_pin.diagnosis import errors_ahead
 from fes_pin.diagnosis.errors_ahead import free_errors
-from fes_pin.diagnosis.held_out import identified_folds
+from fes_pin.diagnosis.held_out import folds_that_tell
 from fes_pin.infer.held_out import Errors, held_out_gain
 from fes_pin.infer.levels import RUNAWAY
 from fes_pin.infer.problem import Linearized
@@ -74,4 +74,4 @@ def test_folds_predict_trials_that_tell_of_the_model_from_trials_that_identify_i
     parts = [Linearized(rng.standard_normal(80), s * rng.standard_normal((80, 2)), np.zeros((80, 0))) for s in sizes]
     trials = [SimpleNamespace(kind="motion", conditions={}) for _ in sizes]
     fitted = SimpleNamespace(parts=parts, free=("a", "b"), at_bound=(), trials=trials)
-    assert sorted(identified_folds(fitted)) == kept
+    assert sorted(folds_that_tell(fitted)) == kept

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.held_out import identified_folds
+from fes_pin.diagnosis.held_out import folds_that_tell
 from fes_pin.diagnosis.likelihood_models import LikelihoodSearch
 from fes_pin.identify.ahead import free_residuals
 from fes_pin.identify.likelihood import LikelihoodProblem
@@ -45,7 +45,7 @@ def best_predicting(search: LikelihoodSearch, names: Names) -> Names:
         The set that it found.
     """
     models = search.models
-    folds = identified_folds(models.fits[names])
+    folds = folds_that_tell(models.fits[names])
     if not folds:
         return names
     ranked = [n for k in sorted({len(n) for n in models.fits}) for n in models.ranked(k)[:POOL]]
