@@ -47,6 +47,10 @@ def begun_by_effort(models: LikelihoodModels, trials: Sequence[Trial], thorough:
     return Policy(fitted=BEAM, fitted_first=FITTED)
 
 
+OF_SIZES = ("drop_unrepeated", "drop_of_no_model", "drop_impossible", "drop_uncertain")
+"""Claims that ask nothing of a likelihood, and object to values of inverse dynamics too."""
+
+
 class VerdictByEffort(RigVerdict):
     """The verdict on a set that inverse dynamics found: what its efforts do not distinguish is equivalent too."""
 
@@ -144,7 +148,8 @@ class ValuesOfInverseDynamics(InverseDynamics):
         assert isinstance(first.verdict, RigVerdict)
         verdict = ValuesByEffort(search, first.verdict.test)
         found = verdict.in_place_of(search.result(names))
-        return State(verdict, found, verdict.weigh(found), {}, frozenset(names), replaced=first)
+        own = State(verdict, found, verdict.weigh(found), {}, frozenset(names), replaced=first)
+        return None if any(getattr(verdict, claim)(own) for claim in OF_SIZES) else own
 
 
 def never_worse(state: RigState) -> tuple[RigState, list[str]]:

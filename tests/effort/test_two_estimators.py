@@ -9,6 +9,7 @@ from bench import study, trial
 from driven_rigs.laboratory import draw_laboratory
 from driven_rigs.swing_up import draw_swing_up
 from harness.never_worse import withheld
+from harness.voluntary import Voluntary
 
 import fes_pin as fp
 from fes_pin.data.errors import InputError
@@ -86,6 +87,15 @@ def test_values_of_inverse_dynamics_replace_no_cause(by_motion):
     models = SimpleNamespace(by_effort=SimpleNamespace(names=("coulomb_friction", "effort_offset")))
     first = SimpleNamespace(search=SimpleNamespace(models=models, was_stopped=False), names=frozenset(by_motion))
     assert ValuesOfInverseDynamics().state(first) is None
+
+
+def test_values_of_inverse_dynamics_name_no_effort_of_a_subject(tmp_path):
+    """A subject holds an effort that wanders: a tilt lessens every error, and explains no more than a hold."""
+    item = next(Voluntary().plan(650411))
+    study, _ = Voluntary().make(item, tmp_path)
+    found = fp.diagnose(study)
+    assert not item.hidden and not found.causes
+    assert found.verdict == "unexplained" and "voluntary effort is likely" in found.reason
 
 
 def test_a_thorough_search_has_no_set_to_begin_with(tmp_path, monkeypatch):
