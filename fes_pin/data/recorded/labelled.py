@@ -31,13 +31,19 @@ def parts_of(line: str) -> Labelled | None:
     text = line.strip()
     if "=" not in text and ":" not in text:
         return None
-    is_one = (one := _cell(text)) is not None and one[0]  # `angle: 1,36`
-    between = "" if is_one else next((sign for sign in _BETWEEN if sign in text), "")
-    cells = [_cell(cell) for cell in text.rstrip(between or None).split(between)] if between else _apart(text)
-    if not cells or None in cells or not any(cell and cell[0] for cell in cells):
+    between = _between(text)
+    found = [_cell(cell) for cell in text.rstrip(between or None).split(between)] if between else _apart(text)
+    cells = [cell for cell in found if cell]
+    if len(cells) < len(found) or not any(name for name, *_ in cells):
         return None
-    names, numbers, units = zip(*(cell for cell in cells if cell), strict=True)
+    names, numbers, units = zip(*cells, strict=True)
     return Labelled(between or ";", names, numbers, units)
+
+
+def _between(text: str) -> str:
+    """The sign between the cells of a line; "" of blanks, and of a single cell, `angle: 1,36`."""
+    one = _cell(text)
+    return "" if one and one[0] else next((sign for sign in _BETWEEN if sign in text), "")
 
 
 def _cell(text: str) -> tuple[str, str, str] | None:
@@ -68,21 +74,26 @@ def names_before_numbers(lines: Sequence[str]) -> tuple[str, ...]:
     found = [parts_of(line) for line in lines]
     records = _records(found)
     count = len(records[0]) if records else 0
-    last = [k for k, line in enumerate(lines) if re.search(r"\d", line)][-(MIN_ROWS + 1) * count :]
-    whole = [record for record in records if set(record) <= set(last)]
-    cells = [[p for k in record if (p := found[k])] for record in whole]
-    units = {tuple(unit for p in record for unit in p.units) for record in cells}
-    if len(whole) < MIN_ROWS or len(units) > 1:
-        return ()
-    names = [name for p in cells[0] for name in p.names]
-    return tuple(f"{name} [{unit}]" if unit else name for name, unit in zip(names, units.pop(), strict=True))
+    last = {*[k for k, line in enumerate(lines) if _has_digit(line)][-(MIN_ROWS + 1) * count :]}
+    whole = [_columns([p for k in record if (p := found[k])]) for record in records if last.issuperset(record)]
+    return whole[0] if len(whole) >= MIN_ROWS and len({*whole}) == 1 else ()
+
+
+def _has_digit(line: str) -> bool:
+    return re.search(r"\d", line) is not None
+
+
+def _columns(record: Sequence[Labelled]) -> tuple[str, ...]:
+    """Names of the columns of a record, with their units."""
+    pairs = (pair for line in record for pair in zip(line.names, line.units, strict=True))
+    return tuple(f"{name} [{unit}]" if unit else name for name, unit in pairs)
 
 
 def why_no_names(lines: Sequence[str]) -> str:
     """Why lines that name their numbers are not read, and what to do; "" of other lines, and of those that are."""
     filled = [line for line in lines if line.strip()]
     names = [", ".join(filter(None, p.names)) for line in filled if (p := parts_of(line))]
-    is_all = all(map(parts_of, [line for line in filled if re.search(r"\d", line)][-MIN_ROWS:]))
+    is_all = all(map(parts_of, [line for line in filled if _has_digit(line)][-MIN_ROWS:]))
     if not is_all or len(names) < MIN_ROWS * max(len({*names}), 1) or names_before_numbers(lines):
         return ""
     known = listed([*dict.fromkeys(names)])
