@@ -22,6 +22,7 @@ from fes_pin.models.model import Model
 from fes_pin.models.stage import Stage
 from fes_pin.prepare.long_records import in_parts
 from fes_pin.remainder.lack_of_fit import lack_of_fit
+from fes_pin.remainder.unrepeated import voluntary_effort
 
 Run = Callable[[list[Trial]], tuple[LikelihoodSearch, Found]]
 """Search of trials: returns the search and its result."""
@@ -32,7 +33,12 @@ class StudyConditions(Conditions[LikelihoodFit, LikelihoodModels]):
     """Conditions of the trials of a diagnosis."""
 
     def misread(self, trials: Sequence[Trial], searched: Found | None) -> Misread | None:
-        """Return the trial that is an outlier under the causes found, or under the nominal model."""
+        """Return the trial that is an outlier under the causes found, or under the nominal model.
+
+        A subject who does not relax makes outliers too: none is returned where equal cycles differ.
+        """
+        if searched is not None and voluntary_effort(searched.best) is not None:
+            return None
         return find_misread(self.nominal if searched is None else searched.best.model, trials)
 
     def leaves_noise(self, made: Made) -> bool:

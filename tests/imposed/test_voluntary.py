@@ -12,6 +12,7 @@ from fes_pin.data.repeats import effort_of_repeats
 from fes_pin.data.schema import schema_of
 from fes_pin.data.templates import rod, wheel
 from fes_pin.diagnosis.by_trial import _likeliest
+from fes_pin.diagnosis.restate import StudyConditions
 from fes_pin.infer.levels import CONFIDENCE_95
 from fes_pin.models.effects import EffortGain, EffortOffset, PeriodicTorque
 from fes_pin.models.nominal import nominal_model
@@ -133,8 +134,11 @@ def test_what_a_cause_explains_is_not_voluntary(tmp_path, seed):
 
 
 @pytest.mark.parametrize("size", [0.0, 0.15])
-def test_a_scale_of_each_trial_is_not_told_from_voluntary_effort(tmp_path, size):
-    """A relaxed limb with another amplifier in each trial has it found; of a subject who holds it is not asked."""
+def test_a_fault_of_some_trials_is_not_told_from_voluntary_effort(tmp_path, monkeypatch, size):
+    """A relaxed limb with another amplifier in each trial has it found; of a subject who holds it is not asked.
+
+    Nor is a trial taken for one whose condition was misread.
+    """
     (tmp_path / "wheel.urdf").write_text(wheel(0.02))
     rng, trials = np.random.default_rng(21), []
     for k, scale in enumerate((1.0, 1.4, 0.7)):
@@ -146,3 +150,6 @@ def test_a_scale_of_each_trial_is_not_told_from_voluntary_effort(tmp_path, size)
     found = SimpleNamespace(best=fitted, nominal=fitted, without={})
     asked = _likeliest((search, found, None), [EffortGain])
     assert asked == (EffortGain if size == 0.0 else None)
+    monkeypatch.setattr("fes_pin.diagnosis.restate.find_misread", lambda *_: "an outlier")
+    misread = StudyConditions(fitted.model, None).misread(trials, found)
+    assert misread == ("an outlier" if size == 0.0 else None)
