@@ -15,7 +15,7 @@ import tomli_w
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import read_json
-from fes_pin.data.recorded.formats import matlab_vectors
+from fes_pin.data.recorded.nested import matlab_vectors
 from fes_pin.data.table import format_csv
 from fes_pin.data.templates import arm_urdf, slide_urdf
 from fes_pin.data.units import INCH, POUND

@@ -13,7 +13,7 @@ from pathlib import Path
 from fes_pin.data.errors import InputError, listed
 from fes_pin.data.new_columns import column_named
 from fes_pin.data.new_recording import Proposal, ends_in, proposals_of, propose, quantities_held
-from fes_pin.data.recorded.formats import elements_of
+from fes_pin.data.recorded.nested import elements_of
 from fes_pin.data.recorded.parts import Ends, end_at_once
 from fes_pin.data.schema import RigSchema
 from fes_pin.data.side_by_side import COLUMNS, TRIALS

@@ -18,8 +18,9 @@ import numpy as np
 
 from fes_pin.data.errors import InputError, listed
 from fes_pin.data.recorded.form import TextForm
-from fes_pin.data.recorded.formats import by_length, is_nested, is_text, read_recording
+from fes_pin.data.recorded.formats import is_text, read_recording
 from fes_pin.data.recorded.header import Header
+from fes_pin.data.recorded.nested import by_length, is_nested
 from fes_pin.data.recorded.parts import Ends, end_at_once, ends_of
 from fes_pin.data.recorded.sheets import is_spreadsheet, sheets_of
 from fes_pin.data.recorded.sniff import sniffed

@@ -14,7 +14,7 @@ from fes_pin.data.imposed import moved_along
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial, derived_trial
 from fes_pin.effort.columns import Links
-from fes_pin.effort.motion import Band, Motion, Record, band_of
+from fes_pin.effort.motion import Band, Motion, Record, band_of, has_rows
 from fes_pin.effort.problem import HELD_ROWS, Rows
 from fes_pin.effort.search import has_efforts
 from fes_pin.models.effects.coulomb_friction import STATED
@@ -107,16 +107,28 @@ def along_motion(models: Mapping[str, Model], trials: Sequence[Trial], band: Ban
 
 
 def effort_percent(model: Model, trials: Sequence[Trial], band: Band) -> float | None:
-    """Return E of the low-passed effort that a model needs for the motion of trials, percent of its mean square.
+    """Return E of the low-passed effort that a model of a joint needs for the measured motion, percent.
 
-    Rows in which the joint rests do not count: friction may have any size below its limit there. None where a cause of
-    the model is not in that effort, or where the joint only rests.
+    It is the squared error over the square of the recorded effort. Rows in which the joint rests do not count: friction
+    may have any size below its limit there.
+
+    Parameters
+    ----------
+    trials
+        Trials with efforts.
+    band
+        Their band, or that of others by which they are judged.
+
+    Returns
+    -------
+    float, or None
+        None where a cause of the model has no part in that effort, and where trials are too short for the band or rest.
     """
-    rig = model.rig
+    rig, records = model.rig, [Record.of(t) for t in trials]
     assert isinstance(rig, Joint)
-    if left_out(model, trials):
+    if left_out(model, trials) or not has_rows(records, band):
         return None
-    fast = Rows([Record.of(t) for t in trials], band, Links.of_rig(rig)).sizes.fast
+    fast = Rows(records, band, Links.of_rig(rig)).sizes.fast
     squares = power = 0.0
     for trial, predicted in zip(trials, _efforts(model, trials, band), strict=True):
         moves = ~Motion(Record.of(trial), band).resting(fast)

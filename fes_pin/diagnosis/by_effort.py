@@ -47,10 +47,6 @@ def begun_by_effort(models: LikelihoodModels, trials: Sequence[Trial], thorough:
     return Policy(fitted=BEAM, fitted_first=FITTED)
 
 
-OF_SIZES = ("drop_unrepeated", "drop_of_no_model", "drop_impossible", "drop_uncertain")
-"""Claims that ask nothing of a likelihood, and object to values of inverse dynamics too."""
-
-
 class VerdictByEffort(RigVerdict):
     """The verdict on a set that inverse dynamics found: what its efforts do not distinguish is equivalent too."""
 
@@ -130,13 +126,15 @@ class ValuesByEffort(VerdictByEffort):
         return as_wide_as(honest, by_effort.final(by_effort.models.fitted_set(fitted.names)))
 
 
+OF_SIZES = ("drop_unrepeated", "drop_of_no_model", "drop_impossible", "drop_uncertain")
+"""Claims that ask nothing of a likelihood: they object to values of inverse dynamics too."""
+
+
 class ValuesOfInverseDynamics(InverseDynamics):
     """The same with its own values: where few samples enter a likelihood, as between coarse counts, efforts know more.
 
     It adds causes to those of the likelihood and replaces none, where it predicts better in each currency.
     """
-
-    prefers_smaller = False
 
     def state(self, first: RigState) -> RigState | None:
         """Return the state of its set at its own values; None where the set does not hold all causes of the first."""

@@ -51,7 +51,7 @@ class EffortVerdict(Verdict[EffortFit, EffortSets, Weighed]):
         return [final(fitted, [~fold[one] for one in self.units]) for fold in self.folds]
 
     def predicted(self, best: EffortFit) -> np.ndarray:
-        """Return the units in folds that are predicted, by `infer.held_out.identified_folds`; as bool, of each."""
+        """Return which units are in a fold that counts, shape (units,) of bool; see `identified_folds`."""
         pieces = [
             replace(part, residual=part.residual[rows], jacobian=part.jacobian[rows], local=part.local[rows])
             for part, one in zip(best.parts, self.units, strict=True)

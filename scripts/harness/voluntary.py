@@ -18,6 +18,7 @@ CAUSES = ((), ("coulomb_friction",), ("parallel_stiffness",), ("quadratic_dampin
 SIZE, OWN = 0.4, (0.2, 0.6)
 """Of a cause, and of the voluntary effort, as shares of the effort; a fifth is what a passive limb does not vary by."""
 CYCLES_HZ, SECONDS, EVERY = (0.4, 1.0), 20.0, 5
+"""Rates of the cycles, 8 to 20 of them in a trial; every so many samples of a stand's are kept, 100 a second."""
 RELAXED, VOLUNTARY = "relaxed", "voluntary"
 
 

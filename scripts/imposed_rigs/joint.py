@@ -39,6 +39,13 @@ def study(
     """A hanging arm, moved by a stand; each cause acts with about `size` of the effort that it takes without.
 
     Its gravity is known, as with any arm that was weighed.
+
+    Parameters
+    ----------
+    moved
+        Draws a motion, as `drawn` does.
+    seconds
+        Length of a trial, s.
     """
     mass, about, damping = rng.uniform(0.5, 3.0), rng.uniform(0.01, 0.05), rng.uniform(0.05, 0.3)
     inertia, weight = about + mass * 0.04, 9.81 * mass * 0.2

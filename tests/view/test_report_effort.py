@@ -72,6 +72,11 @@ def test_a_model_needs_the_effort_that_moved_it_whatever_the_form_of_its_frictio
     assert effort_percent(arm(tmp_path), [moved], band) > 0.5
 
 
+def test_a_trial_that_is_shorter_than_the_filter_has_no_effort_along_it(tmp_path, recorded):
+    model = arm(tmp_path)
+    assert effort_percent(model, [recorded.part(slice(0, 12))], effort_band(model.rig, [recorded])) is None
+
+
 def test_a_frame_that_swings_is_not_in_the_effort_along_a_motion(tmp_path, recorded):
     model = arm(tmp_path, frame_vibration={})
     assert effort_percent(model, [recorded], effort_band(model.rig, [recorded])) is None
