@@ -45,11 +45,11 @@ def deal(order: Sequence[int], groups: Sequence[Hashable] | None = None, count: 
 
 
 def identified_folds(fitted: Optimum, units: Sequence[Linearized], folds: Sequence[list[int]]) -> list[list[int]]:
-    """Return the folds whose other units identify the model, and which themselves say something of it.
+    """Return the folds whose other units identify the model, and which identify half of it by themselves.
 
-    Without them no standard deviation grows by more than 1 / `IDENTIFIABLE_SHARE`, and by them alone not every one. A
-    prediction from units that do not identify the model, as of a joint at rest, says nothing about its causes; nor
-    does a prediction of units that tell nothing of it, as of a pendulum that is balanced.
+    A standard deviation may grow by no more than 1 / `IDENTIFIABLE_SHARE`. A prediction from units that do not identify
+    the model, as of a joint at rest, says nothing about its causes; nor does a prediction of units that tell little of
+    it, as of a pendulum that is balanced. One fold alone has no scatter, and is none.
 
     Parameters
     ----------
@@ -68,10 +68,13 @@ def identified_folds(fitted: Optimum, units: Sequence[Linearized], folds: Sequen
     whole = deviations(every)
     known = np.isfinite(whole)
 
-    def identifies(some: Collection[int]) -> np.ndarray:
+    def identified(some: Collection[int]) -> np.ndarray:
+        """Return which of the identified parameters some units identify."""
         return np.asarray(IDENTIFIABLE_SHARE * deviations(some)[known] <= whole[known])
 
-    return [out for out in folds if identifies(every - {*out}).all() and identifies(out).any()]
+    half = 0.5 * np.count_nonzero(known)
+    telling = [k for k in folds if identified(every - {*k}).all() and np.count_nonzero(identified(k)) >= half]
+    return telling if len(telling) > 1 else []
 
 
 def percent_of_spread(squares: ArrayLike, around: ArrayLike) -> float:

@@ -65,13 +65,17 @@ def test_predictions_over_a_horizon_are_kept_as_long_as_their_fit(monkeypatch):
         ([1.0, 1.0, 1.0], [[0], [1], [2]]),
         ([1.0, 1.0, 1e-3], [[0], [1]]),  # a trial that tells nothing is no test
         ([1.0, 1e-3], []),  # without the first nothing is identified, and the second tells nothing
-        ([1.0, (1.0, 1e-3), 1.0], [[0], [1], [2]]),  # one that tells of one parameter is a test
+        ([1.0, (1.0, 1e-3), 1.0], [[0], [1], [2]]),  # one that tells of half of the parameters is a test
+        ([1.0, (1.0, 1e-3, 1e-3), 1.0], [[0], [2]]),  # one that tells of a third is none
+        ([1.0, (1.0, 1e-3, 1e-3), (1e-3, 1.0, 1e-3), (1e-3, 1e-3, 1.0)], []),  # the first alone is no scatter
         ([(1.0, 1e-3), (1e-3, 1.0)], []),  # neither identifies both
     ],
 )
 def test_folds_predict_trials_that_tell_of_the_model_from_trials_that_identify_it(sizes, kept):
     rng = np.random.default_rng(len(sizes))
-    parts = [Linearized(rng.standard_normal(80), s * rng.standard_normal((80, 2)), np.zeros((80, 0))) for s in sizes]
+    free = "abc"[: max(2, *map(np.size, sizes))]
+    slopes = [s * rng.standard_normal((80, len(free))) for s in sizes]
+    parts = [Linearized(rng.standard_normal(80), slope, np.zeros((80, 0))) for slope in slopes]
     trials = [SimpleNamespace(kind="motion", conditions={}) for _ in sizes]
-    fitted = SimpleNamespace(parts=parts, free=("a", "b"), at_bound=(), trials=trials)
+    fitted = SimpleNamespace(parts=parts, free=tuple(free), at_bound=(), trials=trials)
     assert sorted(folds_that_tell(fitted)) == kept
