@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from fes_pin.effort.columns import CauseOfEffort, Values
+from fes_pin.effort.pairs import CONFOUNDED, joint_scores
 from fes_pin.effort.problem import HELD_ROWS, HOLD, EffortFit, EffortProblem, Rows, own
 from fes_pin.infer.distributions import chi2_tail
 from fes_pin.infer.family import Family
@@ -139,20 +140,46 @@ class EffortSets(FittedSets[EffortFit, Values]):
         return self.fits[()]
 
     def first(self) -> Names:
-        """Return the best two causes where neither is significant alone, and each is given the other; else none.
+        """Return the best two causes if both are likelier than any one, and each is significant given the other.
 
-        Friction and drag bend a torque to opposite sides: one without the other leaves an error of form that scatters.
+        Friction and an offset of its size oppose each other in half of all motion, and friction and drag bend a torque
+        to opposite sides: one without the other leaves an error that a wrong cause takes up.
         """
-        none = self.fits[()]
         self.extend((), FITTED)
-        best = self.fits[self.ranked(1)[0]]
-        if not self.noise_p_value(none.sse - best.sse, 1) < self.level(best) <= self.p_value(best, none):
+        self.fits |= self.begin(self.fits[()], self._likeliest_pairs(BEAM))
+        if not self.ranked(2):
             return ()
-        for names in self.ranked(1)[:BEAM]:
-            self.extend(names, FITTED)
-        pair = self.fits[self.ranked(2)[0]]
+        best, pair = (self.fits[self.ranked(size)[0]] for size in (1, 2))
         given = (self.p_value(pair, self.without(pair.names, n)) for n in pair.names)
-        return pair.names if self.is_possible(pair) and all(p < self.level(pair) for p in given) else ()
+        is_better = pair.criterion < best.criterion and all(p < self.level(pair) for p in given)
+        return pair.names if is_better and self.is_possible(pair) else ()
+
+    def _likeliest_pairs(self, count: int) -> dict[Names, dict[str, float]]:
+        """Return the start values of the sets of two causes of largest joint score within their bounds."""
+        base = self.fits[()]
+        projection, named = Projection(base.parts), [(n, x) for n, many in self._tried.items() for x in many]
+        each = [columns for n in self._tried for columns in self._whitened(base, n)]
+        squares = [float(np.sum(one**2)) for one in each]
+        out: dict[Names, dict[str, float]] = {}
+        found = joint_scores(projection.residual, [projection(one) for one in each], squares)
+        for pair in sorted(found, key=lambda one: -one.gain):
+            both = [(*named[k], sizes) for k, sizes in zip(pair[:2], pair.sizes, strict=True)]
+            names = tuple(sorted(n for n, *_ in both))
+            if len({*names}) < len(names) or names in out or not all(self._is_within(n, v) for n, _, v in both):
+                continue
+            out[names] = {k: v for n, tried, sizes in both for k, v in {**tried, **self._sized(n, sizes)}.items()}
+            if len(out) == count:
+                break
+        return out
+
+    def _sized(self, name: str, sizes: Iterable[float]) -> dict[str, float]:
+        """Return the amplitudes of a cause by their full names."""
+        return dict(zip((f"{name}.{n}" for n in self.library[name].amplitudes), map(float, sizes), strict=True))
+
+    def _is_within(self, name: str, sizes: Iterable[float]) -> bool:
+        """Return whether the amplitudes of a cause are within their bounds."""
+        limits = self.library[name].amplitudes.values()
+        return all(low < v < high for v, (low, high, _) in zip(sizes, limits, strict=True))
 
     @cached_property
     def _tried(self) -> dict[str, list[dict[str, float]]]:
@@ -198,8 +225,7 @@ class EffortSets(FittedSets[EffortFit, Values]):
                 limits = list(self.library[name].amplitudes.values())
                 sizes = [min(max(s, x[0]), x[1]) for s, x in zip(sizes, limits, strict=True)]
                 if any(sizes) and (best is None or gain > best[0]):
-                    named = zip((f"{name}.{n}" for n in self.library[name].amplitudes), sizes, strict=True)
-                    best = gain, {**tried, **dict(named)}
+                    best = gain, {**tried, **self._sized(name, sizes)}
             if best is not None:
                 out[name] = Candidate(best[0], best[1])
         return out
@@ -380,7 +406,7 @@ def _score(projection: Projection, columns: np.ndarray) -> tuple[float, list[flo
     """Return the gain of the score of columns, and the sizes of a step; no gain where they are confounded."""
     left = projection(columns)
     gram, slope = left.T @ left, left.T @ projection.residual
-    if not np.trace(gram) > 1e-6 * float(np.sum(columns**2)):
+    if not np.trace(gram) > CONFOUNDED * float(np.sum(columns**2)):
         return 0.0, [0.0] * columns.shape[1]
     sizes = np.linalg.lstsq(gram, slope, rcond=1e-9)[0]
     return float(slope @ sizes), [float(x) for x in sizes]
