@@ -109,9 +109,11 @@ class LikelihoodModels(LikelihoodFits):
 
         It is None by least squares: where a model is wrong every further parameter is significant.
         """
-        if self.noise == WHITE:
+        if self.noise == WHITE or any(fitted is one for one in self.in_best_form):
             return None
-        return simplified_form(fitted) or refined_form(fitted, self.library.measured)
+        better = simplified_form(fitted) or refined_form(fitted, self.library.measured)
+        self.in_best_form += [fitted] * (better is None)
+        return better
 
     def begin_again(self, names: Names) -> bool:
         """Fit a set and the nominal model with process noise where that improves the set's penalised likelihood.

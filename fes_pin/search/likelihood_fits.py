@@ -96,6 +96,8 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         The set that another estimator found, with its values; None without one.
     library
         The causes, with their score tests.
+    in_best_form
+        Fits of which no other form is better.
     """
 
     def __init__(
@@ -122,6 +124,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         self._misfits: dict[int, tuple[LikelihoodFit, float]] = {}
         self._rough: Self | None = None
         self._compared: dict[tuple[Names, str], LikelihoodFit] = {}
+        self.in_best_form: list[LikelihoodFit] = []
 
     @property
     def estimator(self) -> str:
