@@ -207,11 +207,11 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
         best, by_effort = state.found.best, self.models.by_effort
         if currency == EFFORT and by_effort is not None:
             return by_effort.errors(best.names) if by_effort.knows(best.names) else None
-        train, folds, floor = self.models.trials, self.folds(state), unit.found.best
+        train, folds, floor = self.models.trials, state.weighed.folds, unit.found.best
         held = folds_that_tell(floor) if len(train) > 1 else []  # the same of both sets
         if [[*f.out] for f in folds] != held:
             folds = make_folds(replace(state.found, nominal=best, without={}), train, (), self.refitted, held)
-        pairs = [(f.chosen or f.best, floor, f.test) for f in folds]
+        pairs = [(f.best, floor, f.test) for f in folds]  # what folds choose again is the same of both
         return squared_errors(pairs or [(best, floor, train)], self.ahead[currency])
 
     def chosen(self, state: RigState) -> list[LikelihoodFit]:

@@ -84,8 +84,8 @@ def choose(first: AnyState, others: Sequence[Estimator], seed: int = 0) -> AnySt
     """Return the state of the first estimator, or of one that predicts materially better; the first such one.
 
     It predicts better where the 95 % interval of the share of the squared error that it removes is above
-    `NOTHING_PERCENT` in one currency, and that share is above `FORM_SHARE` in each other one: what lessens the error of
-    one currency alone is an error of form. With the same set it must be worse in none. Noise is not subtracted: each
+    `NOTHING_PERCENT` in one currency, and it is worse in none. With more causes that share must be above `FORM_SHARE`
+    in each other currency too: a cause that lessens the error of one alone is an error of form. Noise is not subtracted: each
     estimator has its own, and that of a wrong model is large. Data that the study itself holds out are not used: gains
     on them would be optimistic.
     """
@@ -94,7 +94,7 @@ def choose(first: AnyState, others: Sequence[Estimator], seed: int = 0) -> AnySt
         if other is None:
             continue
         compared = _compared(first, other, seed)
-        agrees = (lambda o: not o.is_worse) if other.names == first.names else (lambda o: o.is_felt)
+        agrees = (lambda o: o.is_felt) if len(other.names) > len(first.names) else (lambda o: not o.is_worse)
         better = any(c.is_better and all(agrees(o) for o in compared if o is not c) for c in compared)
         smaller = estimator.prefers_smaller and len(other.names) < len(first.names)
         if better or (smaller and compared and not any(c.is_worse for c in compared)):
