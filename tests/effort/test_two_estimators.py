@@ -15,10 +15,14 @@ import fes_pin as fp
 from fes_pin.data.errors import InputError
 from fes_pin.diagnosis import by_effort
 from fes_pin.diagnosis.by_effort import ValuesOfInverseDynamics, named_by_one
+from fes_pin.diagnosis.likelihood_models import LikelihoodModels, LikelihoodSearch
 from fes_pin.diagnosis.verdict import RigVerdict
 from fes_pin.effort import search
 from fes_pin.infer.estimators import CHOICE
 from fes_pin.infer.search import FITTED
+from fes_pin.infer.verdict import State
+from fes_pin.models.effects import CoulombFriction, EffortOffset
+from fes_pin.models.nominal import nominal_model
 from fes_pin.search import likelihood_fits
 from fes_pin.search.likelihood_fits import LikelihoodFits
 
@@ -96,6 +100,24 @@ def test_values_of_inverse_dynamics_name_no_effort_of_a_subject(tmp_path):
     found = fp.diagnose(study)
     assert not item.hidden and not found.causes
     assert found.verdict == "unexplained" and "voluntary effort is likely" in found.reason
+
+
+def test_two_sets_are_compared_by_their_own_fits_without_each_fold(tmp_path):
+    """Folds choose friction again in either case: what they choose says nothing of the set that lacks it."""
+    right, wrong = ("coulomb_friction",), ("effort_offset",)
+    shown = arm(tmp_path, friction=0.1)
+    models = LikelihoodModels(nominal_model(shown), shown.trials, [CoulombFriction, EffortOffset])
+    models.nominal()
+    models.extend(())
+    search = LikelihoodSearch(models, lambda share, words: None)
+    verdict, error = RigVerdict(search, ()), {}
+    for names in (right, wrong):
+        found = search.result(names)
+        state = State(verdict, found, verdict.weigh(found), {}, frozenset(names))
+        assert {f.names for f in verdict.chosen(state)} == {right}
+        errors = verdict.errors_in(state, verdict.currencies[0], state)
+        error[names] = errors.squares.sum() / errors.spread.sum()
+    assert error[right] < 0.5 * error[wrong]
 
 
 def test_a_thorough_search_has_no_set_to_begin_with(tmp_path, monkeypatch):
