@@ -76,6 +76,8 @@ def read_recording(path: str | Path, form: TextForm | None = None, wanted: Seque
         return since_first(read_text_recording(path, form or TextForm(), wanted))
     read_bytes(path)  # their libraries open it themselves
     sheet = form.sheet if form else ""
+    if sheet and not is_nested(path):
+        raise InputError("expected a spreadsheet, which has sheets", file=path, column="sheet")
     recording = nested_table(path, wanted, sheet) if is_nested(path) else _READERS[suffix](path, wanted)
     sizes = {len(values) for values in recording.columns.values()}
     if len(sizes) > 1:

@@ -98,7 +98,20 @@ def _matlab(path: Path) -> tuple[Any, bool]:
     with reading(path, "a MATLAB file"), warnings.catch_warnings(record=True) as objects:
         warnings.simplefilter("always")
         content = {key: one for key, one in reader.read_mat(str(path)).items() if not str(key).startswith("#")}
-    return content, bool(objects)
+    return _in_order(content) if HDF5 in read_bytes(path)[:1024] else content, bool(objects)
+
+
+def _in_order(content: Any) -> Any:
+    """What an HDF5 file nests, by name, where `trial2` is before `trial10`: its reader gives names in any order."""
+    if isinstance(content, list):
+        return [_in_order(one) for one in content]
+    if not isinstance(content, dict):
+        return content
+    return {name: _in_order(content[name]) for name in sorted(content, key=_by_number)}
+
+
+def _by_number(name: str) -> list[tuple[int, str]]:
+    return [(int(one), "") if one.isdecimal() else (-1, one) for one in re.findall(r"\d+|\D+", name)]
 
 
 def _of_records(content: Any) -> Any:
@@ -119,6 +132,8 @@ NESTED: Mapping[str, Callable[[Path], tuple[Any, bool]]] = {
     ".json": lambda path: (_of_records(read_json(path)), False),
 }
 """What files hold that nest vectors, by suffix."""
+HDF5 = b"\x89HDF\r\n\x1a\n"
+"""How an HDF5 file begins, after a block of 512 bytes where MATLAB wrote it."""
 SAMPLED = re.compile(r"(?i)(fs|fsamp|sfreq|srate|frame_?rate|samp[a-z]*_?(rate|freq[a-z]*)|f_?sampl[a-z]*)(_?hz)?$")
 """Names of a number that is the rate of the samples."""
 SHORT = 0.02
