@@ -41,8 +41,8 @@ NOISE_ORDER = 8
 """Of differences in which the noise of an effort is measured: of a sine of 5 Hz at 50 Hz they leave 0.02 %."""
 COMMANDED, SURELY_COMMANDED = 0.1, 0.9
 """Share of the differences of an effort from which a controller commands it, and from which a stated kind is doubtful.
-Of 64 draws of the four generators of driven rigs in `tests/effort/test_direction.py` 0.27 is the least, and of 40 efforts
-that were read 0.02 the largest."""
+Of 64 draws of the four generators of driven rigs in `tests/effort/test_direction.py` 0.27 is the least.
+Of 40 efforts that were read 0.02 is the largest."""
 NOISY = 1e-3
 """Noise, as a share of an effort, from which it is noise of its own: rounding and 12 bits leave less."""
 EXPLAINED = 0.95
