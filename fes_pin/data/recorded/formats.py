@@ -7,7 +7,7 @@
 | `.c3d` | ezc3d | `c3d` |
 | `.xdf`, `.xdfz` | pyxdf | `xdf` |
 | `.xlsx`, `.xls`, `.ods` ... | python-calamine | `spreadsheet` |
-| `.mot`, `.sto`, `.trc`, `.json` | none | |
+| `.mot`, `.sto`, `.trc`, `.json`, `.jsonl` | none | |
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -30,6 +30,10 @@ from fes_pin.data.table import MIN_ROWS, Table
 
 UNREADABLE = {
     ".numbers": "a spreadsheet of Numbers; save it as .xlsx or CSV",
+    ".tdms": "a TDMS file of LabVIEW; save it as CSV, with LabVIEW or npTDMS",
+    **dict.fromkeys((".npy", ".npz"), "a file of NumPy; save its arrays as columns of CSV or Parquet"),
+    **dict.fromkeys((".h5", ".hdf5"), "an HDF5 file of no known layout; save its arrays as columns of CSV or Parquet"),
+    **dict.fromkeys((".bag", ".db3", ".mcap"), "a log of ROS; save its topics as CSV"),
     **dict.fromkeys((".pkl", ".pickle"), "a pickle, which runs code when it is read; save it as CSV or Parquet"),
     **dict.fromkeys((".zip", ".gz", ".7z"), "an archive; unpack it first"),
 }
