@@ -75,7 +75,10 @@ def grouped_files(proposals: Sequence[Proposal], schema: RigSchema, stated: Mapp
     groups = _stated(tuple(by_path), stated) if stated else _by_name(proposals, schema)
     if not groups:
         first, *others = proposals
-        return [FilesOfTrial({"": one}, one) for one in (replace(first, said=first.said + _doubt(proposals)), *others)]
+        return [
+            FilesOfTrial({"": one}, one)
+            for one in (replace(first, said=first.said + _quantities_or_trials(proposals)), *others)
+        ]
     return [files_of_trial({source: by_path[path] for source, path in files.items()}, schema) for files in groups]
 
 
@@ -131,7 +134,7 @@ def _by_name(proposals: Sequence[Proposal], schema: RigSchema) -> list[dict[str,
     return next((trials for k in range(len(words[0])) if (trials := _apart_in(k, paths, words))), [])
 
 
-def _doubt(proposals: Sequence[Proposal]) -> tuple[str, ...]:
+def _quantities_or_trials(proposals: Sequence[Proposal]) -> tuple[str, ...]:
     """What is said of files that are taken as trials, and may as well be quantities of one trial: no header tells.
 
     They hold one column without a name next to the same times, and their names differ by more than a number.
