@@ -107,6 +107,23 @@ def read_json(path: str | Path) -> Any:
         raise InputError(f"expected JSON: {error}", file=path, row=getattr(error, "lineno", None)) from None
 
 
+def read_json_lines(path: str | Path) -> list[Any]:
+    """What each line of a file of JSON lines holds, but for empty ones.
+
+    Raises
+    ------
+    InputError
+        As `read_text`, and for a line that is no JSON, with its row.
+    """
+    out = []
+    for row, line in enumerate(read_text(path).splitlines(), 1):
+        try:
+            out += [json.loads(line)] if line.strip() else []
+        except (ValueError, RecursionError) as error:
+            raise InputError(f"expected JSON: {error}", file=path, row=row) from None
+    return out
+
+
 def own_json(path: Path) -> dict[str, Any]:
     """A table that fes_pin wrote itself; empty where there is none, or where it is no longer one."""
     with suppress(OSError, ValueError):

@@ -251,9 +251,12 @@ def as_seen(
 
 
 def _without_copies(names: Sequence[str], recording: Table) -> tuple[str, ...]:
-    """Columns of which no two hold the same numbers, as the times before each channel do; the first of them."""
+    """Columns of which no two hold the same numbers, as the times before each channel do; the first of them.
+
+    Columns that hold no number are none of these.
+    """
     read, kept = recording.columns, list[str]()
-    for name in names:
+    for name in (n for n in names if n not in read or np.isfinite(read[n]).any()):
         others = [read[other] for other in kept if other in read]
         if name not in read or not any(np.array_equal(read[name], other, equal_nan=True) for other in others):
             kept.append(name)

@@ -6,7 +6,6 @@ import re
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from fnmatch import fnmatchcase
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -75,7 +74,11 @@ def grouped_files(proposals: Sequence[Proposal], schema: RigSchema, stated: Mapp
     by_path = {one.recording.path: one for one in proposals}
     groups = _stated(tuple(by_path), stated) if stated else _by_name(proposals, schema)
     if not groups:
-        return [FilesOfTrial({"": one}, one) for one in proposals]
+        first, *others = proposals
+        return [
+            FilesOfTrial({"": one}, one)
+            for one in (replace(first, said=first.said + _quantities_or_trials(proposals)), *others)
+        ]
     return [files_of_trial({source: by_path[path] for source, path in files.items()}, schema) for files in groups]
 
 
@@ -108,7 +111,7 @@ def _rises(values: np.ndarray) -> bool:
 def _stated(paths: Sequence[Path], stated: Mapping[str, str]) -> list[dict[str, Path]]:
     found: dict[str, list[Path]] = {}
     for source, pattern in stated.items():
-        of_it = [p for p in paths if fnmatchcase(p.name, pattern) or fnmatchcase(p.stem, pattern)]
+        of_it = [p for p in paths if pattern and (p.match(pattern) or p.with_suffix("").match(pattern))]
         if not of_it:
             raise InputError(f"expected a pattern of one of the files, found {pattern!r}", column=f"--source {source}")
         found[source] = of_it
@@ -129,6 +132,21 @@ def _by_name(proposals: Sequence[Proposal], schema: RigSchema) -> list[dict[str,
     if alike or len({len(some) for some in words}) > 1:
         return []
     return next((trials for k in range(len(words[0])) if (trials := _apart_in(k, paths, words))), [])
+
+
+def _quantities_or_trials(proposals: Sequence[Proposal]) -> tuple[str, ...]:
+    """What is said of files that are taken as trials, and may as well be quantities of one trial: no header tells.
+
+    They hold one column without a name next to the same times, and their names differ by more than a number.
+    """
+    times = [[one.recording.columns[n] for n in one.candidates.get("time_s", ())[:1]] for one in proposals]
+    words = {re.sub(r"\d+", "", one.recording.path.stem) for one in proposals}
+    is_bare = all(one.form and not one.form.header_row and len(one.recording.columns) == 2 for one in proposals)
+    if len(words) < 2 or not is_bare or not all(times) or any(not np.array_equal(t, times[0]) for t in times):
+        return ()
+    names = " and ".join(one.recording.path.name for one in proposals[1:4])
+    taken = f"it and {names} have the same times and one column without a name each, and are taken as a trial each"
+    return (f"{taken}; where they are quantities of one trial, say --source NAME=FILE of each",)
 
 
 def _apart_in(place: int, paths: Sequence[Path], words: Sequence[Sequence[str]]) -> list[dict[str, Path]]:

@@ -1,7 +1,7 @@
 """The diagnosis that reports a verdict on a rig, or that its fits did not converge."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,6 +17,7 @@ from fes_pin.diagnosis.likelihood_models import Found, LikelihoodModels, Likelih
 from fes_pin.diagnosis.rejected import UNMOVED
 from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.diagnosis.verdict import RigState, RigVerdict
+from fes_pin.identify.afar import at_a_bound
 from fes_pin.identify.correlation_time import words_of_reading
 from fes_pin.identify.fit import rough_noise
 from fes_pin.identify.likelihood import is_simulated
@@ -24,7 +25,7 @@ from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.estimators import choose
 from fes_pin.infer.result import CROSS_VALIDATED, FITTED, HELD_OUT, STOPPED, Cause, Gain, ParameterEstimate, Remainder
 from fes_pin.infer.scatter import as_wide_as_estimates_differ, as_wide_as_trials_differ, with_honest_intervals
-from fes_pin.infer.verdict import ADEQUATE, word_of
+from fes_pin.infer.verdict import ADEQUATE, Rejected, word_of
 from fes_pin.infer.why import why_of
 from fes_pin.models.describe import fitted_equation, fitted_sentence
 from fes_pin.models.model import Model
@@ -62,6 +63,7 @@ def diagnosis_of(
     causes.sort(key=lambda c: -c.gain_held_out.percent)
     said += [*named_by_one(first, state), *words_of_reading(best.noise, best.model.rig, trials[0])]
     said += _words_of_far(search.models, found.nominal)
+    said += words_of_bounds(state.rejected, found.best, search.models.model)
     reached = [e for e in (fitted[1].free, held and held[1].free) if e is not None]
     word = word_of(bool(causes), left)
     return Diagnosis(
@@ -86,6 +88,14 @@ def diagnosis_of(
         why=why_of(state),
         ahead=AheadErrors(search.models.horizon_s, *fitted, *(held or (None, None))),
     )
+
+
+def words_of_bounds(rejected: Mapping[str, Rejected], fitted: LikelihoodFit, believed: Model) -> list[str]:
+    """Return a sentence for each cause that explains much and is not named as a nominal parameter ended at a bound."""
+    ended = " and ".join(f"{n} = {fitted.values[n]:.4g}" for n in sorted(at_a_bound(fitted, believed)))
+    of_none = [n for n, one in rejected.items() if one.claim == "drop_of_no_model" and one.gain.low > 0.0]
+    why = f"is not named, as {ended} ends at a bound: hold it in [rig], or mend what is believed of the rig"
+    return [f"{n} explains {rejected[n].gain.percent:.3g} % and {why}" for n in of_none] if ended else []
 
 
 def _seen(models: LikelihoodModels, nominal: LikelihoodFit, verdict: str) -> dict[str, ParameterEstimate]:

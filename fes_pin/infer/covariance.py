@@ -17,6 +17,7 @@ def covariance_of(hessian: np.ndarray, free: np.ndarray) -> np.ndarray:
     if not np.isfinite(hessian).all():
         return np.full_like(hessian, np.inf)
     out = np.zeros_like(hessian)
+    free = np.asarray(free, dtype=bool)  # an empty mask has no kind of its own
     inner = hessian[np.ix_(free, free)]
     diagonal = np.diag(inner).copy()
     seen = diagonal > np.finfo(float).tiny  # below it a variance is not finite

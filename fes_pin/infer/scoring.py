@@ -212,9 +212,9 @@ class _Scoring:
         return np.asarray(self.z + np.diag(self._widths()))
 
     def run(self, steps: int) -> Reached:
-        """Take at most `steps` steps, and return their end."""
+        """Take at most `steps` steps, and return their end: the beginning where nothing moves."""
         begin, scale = self.now.cost, self.scale
-        done = not math.isfinite(begin)
+        done = not (math.isfinite(begin) and len(self.z))
         while not done and steps > 0:
             before = self.now.cost
             done = self._step()

@@ -51,6 +51,27 @@ def test_what_is_said_is_not_proposed_again(monkeypatch, capsys, tmp_path):
     assert "split" not in trials(tmp_path)[0]
 
 
+@pytest.mark.parametrize(("names", "is_said"), [(("alpha", "volts"), True), (("run1", "run2"), False)])
+def test_files_without_names_at_the_same_times_are_doubted(names, is_said, monkeypatch, capsys, tmp_path):
+    rows = [np.column_stack([TIME, one]) for one in (swing(TIME), np.sin(3.0 * TIME))]
+    for name, table in zip(names, rows, strict=True):
+        np.savetxt(tmp_path / name, table, "%.5f", ",")
+    files, named = [tmp_path / n for n in names], ("--column", "time_s=column1:s")
+    first = ("--column", "position=column2:rad")
+    assert run(monkeypatch, "new-study", *files, *ROD, *named, *first, "--out", tmp_path / "s") == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert ("where they are quantities of one trial, say --source NAME=FILE of each" in said) == is_said
+
+
+def test_a_source_is_named_by_the_end_of_its_path(monkeypatch, tmp_path):
+    angle = write(tmp_path / "one/angle.csv", time_s=TIME, position=swing(TIME))
+    volts = write(tmp_path / "one/volts.csv", time_s=TIME, effort=np.sin(3.0 * TIME))
+    sources = ("--source", "angle=one/angle.csv", "--source", f"volts={volts}")
+    assert run(monkeypatch, "new-study", angle, volts, *ROD, *sources, "--out", tmp_path / "s") == 0
+    (trial,) = trials(tmp_path / "s")
+    assert set(trial["sources"]) == {"angle", "volts"}
+
+
 def test_one_quantity_a_file(monkeypatch, capsys, tmp_path):
     for number in (1, 2):
         for word, values in (("pos", swing(TIME, number)), ("tau", np.sin(3.0 * TIME))):

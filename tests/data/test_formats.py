@@ -10,6 +10,7 @@ from fes_pin.data import errors
 from fes_pin.data.as_read import HeldFile
 from fes_pin.data.errors import InputError
 from fes_pin.data.new_study import new_study
+from fes_pin.data.recorded.form import TextForm
 from fes_pin.data.recorded.formats import read_recording
 from fes_pin.data.schema import known_rigs
 from fes_pin.data.study import read_study
@@ -104,6 +105,11 @@ def records(path):
     path.write_text(json.dumps({"mass": 0.5, "entries": rows, "gains": [1, 2, 3, 4]}))
 
 
+def json_lines(path):
+    rows = [{"t_ms": 1e3 * t, "angle_deg": [a], "torque_mNm": u} for t, a, u in zip(TIME, ANGLE, TORQUE, strict=True)]
+    path.write_text("\n".join(map(json.dumps, rows)))
+
+
 def vectors(path):
     log = {"t_ms": 1e3 * TIME, "angle_deg": ANGLE, "torque_mNm": TORQUE}
     path.write_text(json.dumps([{"kind": "swing", "log": {n: v.tolist() for n, v in log.items()}}]))
@@ -112,6 +118,7 @@ def vectors(path):
 WRITERS = {
     "a.json": records,
     "b.json": vectors,
+    "a.jsonl": json_lines,
     "a.parquet": parquet,
     "a.mat": matlab_5,
     "b.mat": matlab_73,
@@ -139,6 +146,13 @@ def test_a_recording_of_each_format_becomes_a_study(tmp_path, name):
     with pytest.raises(InputError, match=r"cannot be read as|expected a line endheader|expected JSON") as caught:
         read_study(tmp_path)
     assert len(str(caught.value).splitlines()) == 1
+
+
+@pytest.mark.parametrize("name", [n for n in WRITERS if not n.endswith(("json", "jsonl", "mat"))])
+def test_a_sheet_is_refused_of_a_file_that_has_none(tmp_path, name):
+    WRITERS[name](tmp_path / name)
+    with pytest.raises(InputError, match="sheet: expected a spreadsheet, which has sheets"):
+        read_recording(tmp_path / name, TextForm(sheet="Angle"))
 
 
 def test_columns_of_other_lengths_are_refused(tmp_path):

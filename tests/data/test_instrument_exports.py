@@ -392,3 +392,34 @@ def test_numbers_above_a_title_of_one_word_are_no_rows_where_it_is_a_key(tmp_pat
     above = lines_of(time[:5], values[:5], ",")
     path = written(tmp_path / "a.csv", *above, "Data:", *lines_of(time, values, ","))
     assert sniffed(path)[0].first_row == 7
+
+
+def lvm(path, time, values, times, point):
+    """As LabVIEW writes a measurement; `times`: none, one column of them, or one for each channel."""
+    rows = {
+        "No": lambda t, row: ["", *row],
+        "One": lambda t, row: [t, *row],
+        "Multi": lambda t, row: [t, row[0], t, row[1]],
+    }
+    keys = {"Y_Unit_Label": ("deg", "Nm"), "X_Dimension": ("Time", "Time"), "Delta_X": ("1.000000E-2", "1.000000E-2")}
+    apart, end = ("\t\t" if times == "Multi" else "\t"), "***End_of_Header***"
+    named = ["X_Value", "Angle", *(["X_Value"] if times == "Multi" else []), "Torque", "Comment"]
+    about = ["LabVIEW Measurement\t", f"X_Columns\t{times}", "Date\t2026/01/02", end, "\t"]
+    head = [f"{key}\t{apart.join(two)}\t" for key, two in keys.items()]
+    body = [
+        "\t".join(x if isinstance(x, str) else f"{x:.6f}" for x in rows[times](t, row))
+        for t, row in zip(time, values, strict=True)
+    ]
+    text = [one.replace(".", point) for one in [*head, end, "\t".join(named), *body]]
+    return written(path, *about, *text)
+
+
+@pytest.mark.parametrize("times", ["No", "One", "Multi"])
+@pytest.mark.parametrize("point", [".", ","])
+def test_a_measurement_of_labview_has_its_names_units_and_rate(times, point, tmp_path):
+    time, values = drawn(3)
+    study, _ = study_of(tmp_path, lvm(tmp_path / "a.lvm", time, values, times, point))
+    (trial,) = study.trials
+    np.testing.assert_allclose(trial.time, time, atol=1e-9)
+    np.testing.assert_allclose(np.degrees(trial["position"]), values[:, 0], atol=1e-6)
+    np.testing.assert_allclose(trial["effort"], values[:, 1], atol=1e-6)

@@ -56,6 +56,34 @@ def saved(folder, content, name="a.mat"):
     return folder / name
 
 
+def saved_73(folder, content):
+    """As MATLAB writes version 7.3: HDF5 behind 512 bytes, elements of struct arrays and cells as references."""
+    h5py = pytest.importorskip("h5py")
+
+    def put(group, name, value):
+        if isinstance(value, dict) or value.dtype.names:
+            made, kind = group.create_group(name), b"struct"
+            fields = value if isinstance(value, dict) else {n: value[n] for n in value.dtype.names}
+            for field, one in fields.items():
+                put(made, field, one)
+        elif value.dtype == object:
+            refs = [put(file["#refs#"], f"{len(file['#refs#'])}", one).ref for one in value.flat]
+            made, kind = group.create_dataset(name, data=np.array([refs], dtype=h5py.ref_dtype)), b"cell"
+        else:
+            made, kind = group.create_dataset(name, data=value[None, :]), b"double"
+        if kind != b"cell" or "struct" not in str(group.attrs.get("MATLAB_class")):
+            made.attrs["MATLAB_class"] = np.bytes_(kind)
+        return made
+
+    with h5py.File(folder / "a.mat", "w", userblock_size=512) as file:
+        file.create_group("#refs#")
+        for name, value in content.items():
+            put(file, name, value)
+    with (folder / "a.mat").open("r+b") as written:
+        written.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM")
+    return folder / "a.mat"
+
+
 def check(study, structs, names):
     assert [t.name for t in study.trials] == [f"a-{name}" for name in names]
     for trial, one in zip(study.trials, structs, strict=True):
@@ -74,6 +102,13 @@ def test_structures_that_end_apart_are_trials(tmp_path, form, seed):
     (said,) = [words for words in made.said if "--split none" in words]
     assert ("their names say so" if form == "trials" else "they do not end at once") in said
     assert made.contents["study.toml"].count("[columns") == 1
+
+
+@pytest.mark.parametrize("form", ["cell of structs", "trials", "struct array"])
+def test_trials_of_an_hdf5_file_are_in_the_order_of_their_numbers(tmp_path, form):
+    structs, (make, name) = [struct(k, 120 + 10 * k) for k in range(12)], FORMS[form]
+    content = {n: v for n, v in make(structs).items() if n != "subject"}
+    check(study_of(tmp_path / "s", saved_73(tmp_path, content))[0], structs, [name.format(k) for k in range(1, 13)])
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+import fes_pin as fp
+from fes_pin.data.by_itself import resting
 from fes_pin.data.plausibility import implausible
 from fes_pin.data.rests import MATTERS, rest_share
 from fes_pin.data.study import Study
@@ -78,3 +80,10 @@ def test_an_imposed_motion_is_no_rest_where_its_effort_is_constant(tmp_path):
     start = {"inertia_scale": 1.0, "damping": 0.1}
     study = Study(trials=(Trial("a", "imposed", columns, time),), start=start, **known)
     assert not any("rest for" in said for said in implausible(study))
+
+
+@pytest.mark.parametrize("count", [3, 9])
+def test_a_trial_of_fewer_than_ten_samples_shows_no_rest(count):
+    columns = {"position": np.linspace(0.0, 0.1, count), "effort": np.ones(count)}
+    trial = fp.Trial("short", "motion", columns, 0.01 * np.arange(count))
+    assert resting(trial, "effort", slice(count // 10)) is None

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,7 +10,9 @@ from view.reported import ankle_diagnosis, ankle_study, measured
 
 import fes_pin as fp
 from fes_pin.diagnosis.decide.rivals import estimates
-from fes_pin.infer.result import Change, ParameterEstimate
+from fes_pin.diagnosis.reported import words_of_bounds
+from fes_pin.infer.result import Change, Gain, ParameterEstimate
+from fes_pin.infer.verdict import Rejected
 from fes_pin.models.nominal import nominal_model
 from fes_pin.view.report import report_html
 from fes_pin.view.sections import value_and_interval
@@ -87,3 +90,14 @@ def test_friction_that_is_not_there_is_fitted_at_its_bound_or_with_a_deviation()
         assert one.interval == fitted.interval("coulomb_friction.torque_nm")
         at_bound += one.at_bound
     assert at_bound
+
+
+@pytest.mark.parametrize(("value", "said"), [(10.0, 1), (0.0, 0)])
+def test_a_cause_that_a_bound_keeps_from_being_named_is_said(value, said):
+    """A bound of 0, as of a damping, keeps none from it."""
+    fitted = SimpleNamespace(values={"gravity_scale": value}, at_bound=("gravity_scale",))
+    believed = SimpleNamespace(parameters=lambda: {"gravity_scale": 1.0})
+    rejected = {"parallel_stiffness": Rejected(1e-172, 1.0, Gain(99.8, 99.6, 99.9), "drop_of_no_model")}
+    found = words_of_bounds(rejected, fitted, believed)
+    assert len(found) == said and all("parallel_stiffness explains 99.8 %" in one for one in found)
+    assert all("gravity_scale = 10 ends at a bound" in one for one in found)

@@ -68,6 +68,15 @@ def test_no_driven_rig_is_doubted(generator, seed, tmp_path):
     assert not [one for one in measured_study(made).warnings if "kind" in one]
 
 
+@pytest.mark.parametrize("seed", DRAWS)
+@pytest.mark.parametrize("hum_hz", [61.0, 88.0])
+def test_hum_that_all_channels_pick_up_is_no_answer_of_a_controller(hum_hz, seed):
+    clean = imposed(seed, noise=0.05)
+    hum = np.sin(2.0 * np.pi * hum_hz * clean.time + seed)
+    both = clean.with_columns(effort=clean["effort"] + 0.1 * hum, position=clean["position"] + 1e-4 * hum)
+    assert direction_of([both]).answering < 0.05 and direction_of([both]).kind == "imposed"
+
+
 def test_a_stated_kind_that_data_contradict_is_said(tmp_path):
     wrong = study(tmp_path, [imposed(k, kind="motion", noise=0.6) for k in (3, 4)])
     assert {t.kind for t in wrong.trials} == {"motion"} and not wrong.trials[0].remarks

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fes_pin.infer.covariance import covariance_of
 from fes_pin.infer.scoring import Evaluation, fisher_scoring
 
 X = np.linspace(-1.0, 2.0, 400)
@@ -119,3 +120,9 @@ def test_a_parameter_beside_which_a_prediction_runs_away_stays_where_it_is():
     assert found.values["slope"] == pytest.approx(0.5)
     assert found.held == ()
     assert found.values["offset"] == pytest.approx(float(np.mean(line.y - 0.5 * X)), abs=0.05)
+
+
+def test_a_fit_of_which_nothing_moves_is_its_beginning():
+    found = fisher_scoring(Line(), {"slope": 0.5, "offset": 4.0}, [], {}, 12, with_noise=False)
+    assert found.converged and found.values == {} and found.gained == 0.0
+    assert covariance_of(np.zeros((0, 0)), np.array([])).shape == (0, 0)

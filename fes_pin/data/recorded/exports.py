@@ -1,4 +1,4 @@
-"""Headers of programs whose exports describe each channel apart from the columns: AcqKnowledge, OpenSignals."""
+"""Headers of programs that describe each channel apart from the columns: AcqKnowledge, OpenSignals, LabVIEW."""
 
 import json
 import re
@@ -9,7 +9,8 @@ from fes_pin.data.recorded.form import TextForm, cells_of
 from fes_pin.data.units import UNITS, known_unit
 
 _CHANNELS = re.compile(r"^(\d+) channels?$")
-_EACH = re.compile(r"^(\d+(?:\.\d*)?)\s*(\w+)/sample\b")
+_EACH = re.compile(r"^(\d+(?:\.\d*)?(?:[eE][+-]?\d+)?)\s*(\w+)/sample\b")
+_LABVIEW_END = "***End_of_Header***"
 FASTEST_HZ = 1e9
 """No logger samples faster (a round figure): what a header states beyond is no rate."""
 
@@ -25,7 +26,8 @@ class ChannelHeader(NamedTuple):
 
 def channels_of(lines: Sequence[str], form: TextForm, columns: int) -> ChannelHeader | None:
     """What lines above the numbers describe of this many columns; None where they are of another program."""
-    return _acqknowledge(lines, form, columns) or _opensignals(lines, form, columns)
+    known = (read(lines, form, columns) for read in (_acqknowledge, _opensignals, _labview))
+    return next((found for found in known if found), None)
 
 
 def _acqknowledge(lines: Sequence[str], form: TextForm, columns: int) -> ChannelHeader | None:
@@ -44,6 +46,23 @@ def _acqknowledge(lines: Sequence[str], form: TextForm, columns: int) -> Channel
         return None
     units = {k: unit for k, unit in enumerate([*cells[:ahead], *pairs[1::2]]) if unit}
     return ChannelHeader((*["Time"] * ahead, *pairs[::2]), units, _rate_hz(texts[:start]), row + 1)
+
+
+def _labview(lines: Sequence[str], form: TextForm, columns: int) -> ChannelHeader | None:
+    """Keys with a cell for each column down to `***End_of_Header***`, then the names, and `Comment` of the remarks."""
+    ends = [k for k, line in enumerate(lines) if line.startswith(_LABVIEW_END)]
+    names = cells_of(lines[ends[-1] + 1], form) if ends and ends[-1] + 1 < len(lines) else []
+    if names[-1:] == ["Comment"] and len(names) == columns + 1:
+        names = names[:-1]
+    if len(names) != columns:
+        return None
+    keyed = {cells[0]: cells[1:] for line in lines[: ends[-1]] if (cells := cells_of(line, form))}
+    units = {k: unit for k, unit in enumerate(keyed.get("Y_Unit_Label", []), 1) if unit and k < columns}
+    if set(keyed.get("X_Dimension", [])) - {""} == {"Time"}:
+        units |= {k: "s" for k, name in enumerate(names) if name == "X_Value"}
+    steps = {step.replace(",", ".") for step in keyed.get("Delta_X", []) if step}
+    rate = _rate_hz([f"{steps.pop()} sec/sample"]) if len(steps) == 1 else None
+    return ChannelHeader(tuple(names), units, rate, ends[-1] + 2)
 
 
 def _rate_hz(texts: Sequence[str]) -> float | None:

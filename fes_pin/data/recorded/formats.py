@@ -7,7 +7,7 @@
 | `.c3d` | ezc3d | `c3d` |
 | `.xdf`, `.xdfz` | pyxdf | `xdf` |
 | `.xlsx`, `.xls`, `.ods` ... | python-calamine | `spreadsheet` |
-| `.mot`, `.sto`, `.trc`, `.json` | none | |
+| `.mot`, `.sto`, `.trc`, `.json`, `.jsonl` | none | |
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -30,6 +30,10 @@ from fes_pin.data.table import MIN_ROWS, Table
 
 UNREADABLE = {
     ".numbers": "a spreadsheet of Numbers; save it as .xlsx or CSV",
+    ".tdms": "a TDMS file of LabVIEW; save it as CSV, with LabVIEW or npTDMS",
+    **dict.fromkeys((".npy", ".npz"), "a file of NumPy; save its arrays as columns of CSV or Parquet"),
+    **dict.fromkeys((".h5", ".hdf5"), "an HDF5 file of no known layout; save its arrays as columns of CSV or Parquet"),
+    **dict.fromkeys((".bag", ".db3", ".mcap"), "a log of ROS; save its topics as CSV"),
     **dict.fromkeys((".pkl", ".pickle"), "a pickle, which runs code when it is read; save it as CSV or Parquet"),
     **dict.fromkeys((".zip", ".gz", ".7z"), "an archive; unpack it first"),
 }
@@ -76,6 +80,8 @@ def read_recording(path: str | Path, form: TextForm | None = None, wanted: Seque
         return since_first(read_text_recording(path, form or TextForm(), wanted))
     read_bytes(path)  # their libraries open it themselves
     sheet = form.sheet if form else ""
+    if sheet and not is_nested(path):
+        raise InputError("expected a spreadsheet, which has sheets", file=path, column="sheet")
     recording = nested_table(path, wanted, sheet) if is_nested(path) else _READERS[suffix](path, wanted)
     sizes = {len(values) for values in recording.columns.values()}
     if len(sizes) > 1:

@@ -1,4 +1,4 @@
-"""Vectors in files that nest them, `.mat` and `.json`: by dotted names, those of one length, with their rates."""
+"""Vectors in files that nest them, as `.mat` and `.json`: by dotted names, those of one length, with their rates."""
 
 import re
 import warnings
@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fes_pin.data.errors import MOST_LISTED, InputError, listed
-from fes_pin.data.files import read_bytes, read_json
+from fes_pin.data.files import read_bytes, read_json, read_json_lines
 from fes_pin.data.recorded.elements import elements_in, of_one_length, units_in
 from fes_pin.data.recorded.libraries import library, made, reading
 from fes_pin.data.recorded.matlab_exports import with_names
@@ -98,7 +98,20 @@ def _matlab(path: Path) -> tuple[Any, bool]:
     with reading(path, "a MATLAB file"), warnings.catch_warnings(record=True) as objects:
         warnings.simplefilter("always")
         content = {key: one for key, one in reader.read_mat(str(path)).items() if not str(key).startswith("#")}
-    return content, bool(objects)
+    return _in_order(content) if HDF5 in read_bytes(path)[:1024] else content, bool(objects)
+
+
+def _in_order(content: Any) -> Any:
+    """What an HDF5 file nests, by name, where `trial2` is before `trial10`: its reader gives names in any order."""
+    if isinstance(content, list):
+        return [_in_order(one) for one in content]
+    if not isinstance(content, dict):
+        return content
+    return {name: _in_order(content[name]) for name in sorted(content, key=_by_number)}
+
+
+def _by_number(name: str) -> list[tuple[int, str]]:
+    return [(int(one), "") if one.isdecimal() else (-1, one) for one in re.findall(r"\d+|\D+", name)]
 
 
 def _of_records(content: Any) -> Any:
@@ -108,17 +121,28 @@ def _of_records(content: Any) -> Any:
     if not isinstance(content, list):
         return content
     if len(content) >= MIN_ROWS and all(isinstance(one, dict) for one in content):
-        return {key: _of_records([one.get(key) for one in content]) for key in content[0]}
+        return {key: _of_key([one.get(key) for one in content]) for key in content[0]}
     if all(one is None or isinstance(one, int | float) for one in content):
         return [np.nan if one is None else one for one in content]
     return [_of_records(one) for one in content]
 
 
+def _of_key(values: list[Any]) -> Any:
+    """What records hold under a key: of lists of numbers, as many in each record, an array with a row a record."""
+    widths = {len(one) if isinstance(one, list) else 0 for one in values}
+    if len(widths) == 1 and 0 not in widths and all(isinstance(x, int | float) for one in values for x in one):
+        return np.array(values, dtype=float)
+    return _of_records(values)
+
+
 NESTED: Mapping[str, Callable[[Path], tuple[Any, bool]]] = {
     ".mat": _matlab,
     ".json": lambda path: (_of_records(read_json(path)), False),
+    **dict.fromkeys((".jsonl", ".ndjson"), lambda path: (_of_records(read_json_lines(path)), False)),
 }
 """What files hold that nest vectors, by suffix."""
+HDF5 = b"\x89HDF\r\n\x1a\n"
+"""How an HDF5 file begins, after a block of 512 bytes where MATLAB wrote it."""
 SAMPLED = re.compile(r"(?i)(fs|fsamp|sfreq|srate|frame_?rate|samp[a-z]*_?(rate|freq[a-z]*)|f_?sampl[a-z]*)(_?hz)?$")
 """Names of a number that is the rate of the samples."""
 SHORT = 0.02
