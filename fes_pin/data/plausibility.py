@@ -276,10 +276,10 @@ def _comes_to_rest(values: np.ndarray, at: np.ndarray) -> bool:
     """
     steps = np.abs(np.diff(values))
     moved = steps[steps > 0.0]
-    beside = steps[np.diff(at.astype(int)) != 0]
-    if not len(moved) or not len(beside):
+    entered = steps[np.diff(at.astype(int)) != 0]
+    if not len(moved) or not len(entered):
         return False
-    return bool(np.median(beside) <= max(A_COUNT * moved.min(), SLOWLY * np.median(moved)))
+    return bool(np.median(entered) <= max(A_COUNT * moved.min(), SLOWLY * np.median(moved)))
 
 
 def _is_clipped(trial: Trial, name: str) -> bool:

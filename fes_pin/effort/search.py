@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Protocol
@@ -44,6 +44,10 @@ class LikelihoodValues(Protocol):
     @property
     def free(self) -> Sequence[str]:
         """Names of the fitted parameters."""
+
+    @property
+    def values(self) -> Mapping[str, float]:
+        """Values of all parameters."""
 
 
 @dataclass(frozen=True, eq=False)
