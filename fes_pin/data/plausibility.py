@@ -48,6 +48,8 @@ COMMON = 0.05
 """Share of equal neighbours from which a reading is coarse: equal samples in a row then say nothing."""
 CLIPPED = 0.01
 """Share of a column's samples at its very largest or smallest value from which it counts as clipped."""
+A_COUNT, SLOWLY = 1.5, 0.1
+"""Steps of a reading that comes to rest or leaves it: at most so many of its least, or that share of its usual ones."""
 COUNTS = 20
 """Different whole numbers from which on a column of nothing else is a counter's, not a quantity in SI units."""
 SHORTEST, JUMP = 5, 3.0
@@ -264,8 +266,24 @@ def _unrepeated(study: Study, trials: Sequence[Trial]) -> Iterable[str]:
         yield f"{differs} of the motion, {share}: no passive mechanism does, so that voluntary effort is likely"
 
 
+def _comes_to_rest(values: np.ndarray, at: np.ndarray) -> bool:
+    """Return whether a column slows down before it stays at a value, and goes on as slowly: it was read, not held.
+
+    Parameters
+    ----------
+    at
+        Where it stays, shape (n,).
+    """
+    steps = np.abs(np.diff(values))
+    moved = steps[steps > 0.0]
+    entered = steps[np.diff(at.astype(int)) != 0]
+    if not len(moved) or not len(entered):
+        return False
+    return bool(np.median(entered) <= max(A_COUNT * moved.min(), SLOWLY * np.median(moved)))
+
+
 def _is_clipped(trial: Trial, name: str) -> bool:
-    """Return whether a column stays at an extreme far more often than it stays elsewhere."""
+    """Return whether a column arrives at an extreme at speed, and stays far more often than it stays elsewhere."""
     values = trial[name]
     still = np.diff(values) == 0.0
     for extreme in (values.max(), values.min()):
@@ -273,7 +291,8 @@ def _is_clipped(trial: Trial, name: str) -> bool:
         if np.count_nonzero(at & still) < max(CLIPPED * len(values), RUN):
             continue
         elsewhere = still[~at]
-        if len(elsewhere) and np.mean(still[at]) > 0.5 and np.mean(elsewhere) < COMMON:
+        stays = len(elsewhere) and np.mean(still[at]) > 0.5 and np.mean(elsewhere) < COMMON
+        if stays and not _comes_to_rest(values, values == extreme):
             return True
     return False
 
@@ -324,6 +343,9 @@ def _held(trial: Trial, name: str) -> list[str]:
     inside = values[ends[longest] + 1]
     apart = 1.0 - (len(changes) + lengths[longest] - 1) / max(len(values) - 1, 1)
     if lengths[longest] >= RUN and apart < COMMON and values.min() < inside < values.max():
+        rows = np.arange(len(values))
+        if _comes_to_rest(values, (rows > ends[longest]) & (rows <= ends[longest + 1])):
+            return []
         begin = float(trial.time[ends[longest] + 1])
         held = f"{name} stays at {inside:.4g} for {lengths[longest]} samples"
         return [f"{held} from {begin:.4g} s on in trial {trial.name}"]

@@ -42,7 +42,7 @@ class LikelihoodModels(LikelihoodFits):
         by_effort = self.by_effort
         if by_effort is None or not by_effort.knows(fitted.names):
             return fitted
-        other = by_effort.final(by_effort.models.fitted_set(fitted.names))
+        other = by_effort.near(fitted)
         return as_wide_as_estimates_differ(fitted, other, by_effort.of_other_forms(fitted.free, other))
 
     def nominal(self) -> LikelihoodFit:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Protocol
@@ -44,6 +44,10 @@ class LikelihoodValues(Protocol):
     @property
     def free(self) -> Sequence[str]:
         """Names of the fitted parameters."""
+
+    @property
+    def values(self) -> Mapping[str, float]:
+        """Values of all parameters."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,6 +124,19 @@ class FoundByEffort:
     def final(self, fitted: EffortFit) -> EffortFit:
         """Return the final values of a set, with their intervals, and with the delay of commands where it shows."""
         return self._best[0] if fitted is self.state.found.best else self._final(fitted)[0]
+
+    def near(self, fitted: LikelihoodValues) -> EffortFit:
+        """Return the final values of the set of another fit, at the maximum that is nearest to the shapes of that fit.
+
+        Two estimates of one truth are near each other. A periodic torque has a maximum at many periods, and a farther
+        one says nothing of the error of an estimate (Hausman, Econometrica 46, 1978, compares consistent ones).
+        """
+        whole, causes = self.models.fitted_set(fitted.names), self.models.library
+        same = {*fitted.free} & {*whole.free} - {*self.of_other_forms(fitted.free, whole)}
+        if not any(f"{name}.{x}" in same for name in fitted.names for x in causes[name].free):
+            return self.final(whole)
+        begun = {n: fitted.values[n] for n in same if "." in n}
+        return self.final(self.models.fit(fitted.names, {**whole.values, **begun}, whole.forms))
 
     @property
     def is_carried(self) -> bool:

@@ -85,9 +85,9 @@ def choose(first: AnyState, others: Sequence[Estimator], seed: int = 0) -> AnySt
 
     It predicts better where the 95 % interval of the share of the squared error that it removes is above
     `NOTHING_PERCENT` in one currency, and it is worse in none. With more causes that share must be above `FORM_SHARE`
-    in each other currency too: a cause that lessens the error of one alone is an error of form. Noise is not subtracted: each
-    estimator has its own, and that of a wrong model is large. Data that the study itself holds out are not used: gains
-    on them would be optimistic.
+    in each other currency too: a cause that lessens the error of one alone is an error of form. Noise is not
+    subtracted: each estimator has its own, and that of a wrong model is large. Data that the study itself holds out are
+    not used: gains on them would be optimistic.
     """
     for estimator in others:
         other = estimator.state(first)

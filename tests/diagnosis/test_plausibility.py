@@ -140,6 +140,25 @@ def test_a_warning_says_what_is_odd(case):
     assert words in found
 
 
+@pytest.mark.parametrize("grows", [0.005, -0.005])
+def test_a_reading_that_slows_down_before_it_stays_is_neither_clipped_nor_held(grows):
+    """An encoder of 1 mrad at 1 kHz, whose joint sticks for 0.1 s where it turns first, as far out as ever or not."""
+    time = np.arange(0.0, 8.0, 1e-3)
+    phase = 2.0 * np.pi * (0.15 * time + 0.2 * time**2)
+    first = np.argmax(phase > 0.5 * np.pi)
+    phase = np.concatenate([phase[:first], np.full(100, 0.5 * np.pi), phase[first:-100]])
+    swing = 3.0 * np.sin(phase) * (1.0 + grows * np.maximum(phase - 0.5 * np.pi, 0.0))
+
+    def odd(position):
+        columns = {"position": np.round(position / 1e-3) * 1e-3, "effort": np.sin(time)}
+        found = said(replace(study_of("joint"), trials=(Trial("a", "motion", columns, time),)))
+        return [one for one in found if "clipping" in one or "stays at" in one]
+
+    assert odd(swing) == []
+    assert len(odd(np.minimum(swing, 1.5))) == 1
+    assert len(odd(np.where((time > 4.2) & (time < 4.26), 0.1234, swing))) == 1
+
+
 def test_what_no_pendulum_does_by_itself():
     rng = np.random.default_rng(0)
     noise = lambda t: 1e-3 * rng.standard_normal(len(t))  # noqa: E731

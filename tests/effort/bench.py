@@ -15,10 +15,10 @@ URDF = f"""<robot name="arm"><link name="base"/><link name="moving">
 <limit lower="-9" upper="9" effort="1e3" velocity="1e3"/></joint></robot>""".format(about=INERTIA - MASS * LEVER**2)
 
 
-def trial(seed, count=0.0, friction=0.0, offset=0.0, drag=0.0, play=0.0, frame=None, seconds=8.0):
+def trial(seed, count=0.0, friction=0.0, offset=0.0, drag=0.0, play=0.0, frame=None, teeth=None, seconds=8.0):
     """Efforts that were commanded and positions that were read, by an encoder of a `count`, behind a `play`.
 
-    `frame` has a coupling, a frequency and a damping ratio.
+    `frame` has a coupling, a frequency and a damping ratio, `teeth` a torque and its waves per rad.
     """
     rng = np.random.default_rng(seed)
     time = np.arange(round(seconds / DT)) * DT
@@ -26,10 +26,12 @@ def trial(seed, count=0.0, friction=0.0, offset=0.0, drag=0.0, play=0.0, frame=N
     wanted = sum(0.35 * (np.sin(2.0 * np.pi * f * time + p) - np.sin(p)) for f, p in waves)
     state, effort, read = np.zeros(4), np.empty(len(time)), np.empty(len(time))
     pushed, rate, followed = 0.0, 0.0, 0.0
+    size, waves_per_rad = teeth or (0.0, 0.0)
     coupling, omega, zeta = (frame[0], 2.0 * np.pi * frame[1], frame[2]) if frame else (0.0, 0.0, 0.0)
 
     def moves(x, _, command):
         torque = command + offset - DAMPING * x[1] - WEIGHT * np.sin(x[0]) - drag * x[1] * abs(x[1])
+        torque += size * np.sin(waves_per_rad * x[0])
         pull = (torque - friction * np.tanh(x[1] / 0.02)) / INERTIA
         swings = -(omega**2) * x[2] - 2.0 * zeta * omega * x[3] - coupling * pull
         return [x[1], pull - swings, x[3], swings]

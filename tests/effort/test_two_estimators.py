@@ -52,6 +52,20 @@ def test_both_estimators_agree_on_an_arm(tmp_path):
     assert not [w for w in found.warnings if "is named by" in w]
 
 
+def test_an_estimate_is_compared_with_the_maximum_near_it(tmp_path):
+    """A search of efforts that stays at half the waves says nothing of the error of the right ones."""
+    teeth = arm(tmp_path, teeth=(0.05, 20.0))
+    found = search.searched(fp.nominal_model(teeth).rig, teeth.trials, 0)
+    names, sets = ("cogging",), found.models
+    far = {"cogging.in_phase": 0.0, "cogging.quadrature": 0.01, "cogging.waves": 10.0}
+    sets.fits[names] = sets.fit(names, far, {})
+    right = {"cogging.in_phase": 0.05, "cogging.quadrature": 0.0, "cogging.waves": 20.0}
+    other = found.near(SimpleNamespace(names=names, free=(*right,), values=right))
+    assert abs(sets.fits[names].values["cogging.waves"] - 20.0) > 3.0
+    assert other.values["cogging.waves"] == pytest.approx(20.0, abs=0.2)
+    assert other.values["cogging.in_phase"] == pytest.approx(0.05, rel=0.1)
+
+
 def test_a_set_that_lessens_the_error_of_effort_alone_is_no_answer(tmp_path, monkeypatch):
     """Inverse dynamics is made to name a cause that is not there: the motion contradicts it, and a warning says so."""
     original = by_effort.searched
