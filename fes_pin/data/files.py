@@ -1,6 +1,7 @@
 """Files of a study: read as text, kept inside its folder, written whole or not at all."""
 
 import json
+import math
 import os
 import shutil
 import tempfile
@@ -102,9 +103,15 @@ def read_json(path: str | Path) -> Any:
     """
     text = read_text(path)
     try:
-        return json.loads(text)
+        return json.loads(text, parse_int=_whole)
     except (ValueError, RecursionError) as error:
         raise InputError(f"expected JSON: {error}", file=path, row=getattr(error, "lineno", None)) from None
+
+
+def _whole(digits: str) -> int | float:
+    """An integer; inf where it is beyond what a float can be, as JSON's `1e400` is."""
+    number = float(digits)
+    return int(digits) if math.isfinite(number) else number
 
 
 def own_json(path: Path) -> dict[str, Any]:

@@ -28,8 +28,8 @@ SAID = (
         for what in ("kind=imposed", "from=0.1", "to=0.3", "a.csv:from=9", "damping=x", "rig.damping=0.1")
     ),
     *(("--header-row", "1"), ("--header-row", "0"), ("--first-row", "9"), ("--names", "t,q,u"), ("--transposed",)),
-    *(("--resample", "50"), ("--resample", "1e6"), ("--fill",), ("--role", "a.csv=held_out"), ("--sheet", "trials.1")),
-    *(("--sheet", "data"), ("--group", "a*=x"), ("--name", "my study"), ("--offset", "a=fit"), ("--source", "a=*a")),
+    *(("--resample", "50"), ("--resample", "1e6"), ("--fill",), ("--role", "a.csv=held_out"), ("--sheet", "data")),
+    *(("--group", "a*=x"), ("--name", "my study"), ("--offset", "a=fit"), ("--source", "a=*a")),
     *(("--set", "to=nan"), ("--set", "load_kg=1"), ("--set", "position0=0.1"), ("--resample", "0"), ("--split", "x")),
 )
 """What a person may say of a recording, right and wrong; `--column` is said of its names."""
@@ -61,10 +61,10 @@ class Call:
 
 def said(rng: Rng, names: list[str], most: int = 4) -> list[str]:
     """Options, of which some are right, for columns of these names: a rig, which column is which, and others."""
-    if len(names) < 2 or rng.uniform() < 0.2:
+    if len(names) < 2 or rng.uniform() < 0.1:
         return [*RIGS[int(rng.integers(len(RIGS)))], *_others(rng, most)]
     taken = ("position", "effort")[: int(rng.integers(1, 3))]
-    if is_odd := rng.uniform() < 0.3:
+    if is_odd := rng.uniform() < 0.2:
         taken = tuple(str(one) for one in rng.permutation(TAKEN)[:2])
     words = list(RIGS[int(rng.integers(len(RIGS))) if is_odd else int(rng.integers(3))])
     if rng.uniform() < 0.2:
@@ -72,7 +72,7 @@ def said(rng: Rng, names: list[str], most: int = 4) -> list[str]:
     for own, name in zip(taken, names[1:], strict=False):
         unit = f":{one_of(rng, UNITS)}" if rng.uniform() < 0.1 else ""
         words += ["--column", f"{own}={name}{unit}{one_of(rng, MORE) if is_odd else ''}"]
-    return words + (_others(rng, most) if is_odd or rng.uniform() < 0.4 else [])
+    return words + (_others(rng, most) if is_odd or rng.uniform() < 0.3 else [])
 
 
 def _others(rng: Rng, most: int) -> list[str]:
@@ -87,7 +87,7 @@ def of_recording(work: Path, rng: Rng, content: bytes, names: list[str], suffix:
     """One recording, that is spoilt where `target` says so, and a study of it elsewhere."""
     path = work / f"a{suffix}"
     path.write_bytes(content)
-    is_spoilt = rng.uniform() < 0.4
+    is_spoilt = rng.uniform() < 0.3
     words = ["new-study", str(path), *said(rng, names)]
     return Call([*words, "--out", str(work / "made")], path if is_spoilt else None, work / "made")
 
@@ -133,8 +133,7 @@ def of_walk(work: Path, rng: Rng) -> Call:
 
 def _of_suffix(work: Path, rng: Rng) -> Call:
     suffix = one_of(rng, (".json", ".json", ".mat"))
-    names = ["t", "angle", "torque"] if rng.uniform() < 0.5 else ["data.t", "data.angle", "data.torque"]
-    return of_recording(work, rng, nested(rng, suffix), names, suffix)
+    return of_recording(work, rng, *nested(rng, suffix), suffix)
 
 
 RECORDED: dict[str, Callable[[Path, Rng], Call]] = {

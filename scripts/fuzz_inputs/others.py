@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import re
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ ODD_VALUES: tuple[Any, ...] = (
     *(float("nan"), float("inf"), 10**400, [[[1.0, 2.0]]], {"": [1, 2, 3]}, ["1", "2", "3", "4"]),
 )
 KEYS = (
-    "t",
+    "t_s",
     "time_s",
     "angle",
     "Angle",
@@ -37,15 +38,15 @@ KEYS = (
 
 def serial(rng: Rng) -> tuple[bytes, list[str]]:
     """Lines of a serial port that name their numbers, some broken, and the names."""
-    names = [str(n) for n in rng.permutation(("t", "angle", "Torque"))] if rng.uniform() < 0.5 else ["t", "angle"]
+    names = [one_of(rng, ("t_ms", "t_ms", "t")), "angle", "Torque"][: int(rng.integers(2, 4))]
     if rng.uniform() < 0.3:
-        names = [one_of(rng, ("t", "ms", "angle", "Torque", "q", "millis")) for _ in range(int(rng.integers(2, 4)))]
+        names = [one_of(rng, ("t", "ms", "angle", "Torque", "q", "t_ms")) for _ in range(int(rng.integers(2, 4)))]
     equals, between = one_of(rng, (": ", "=", ":", " = ", " ")), one_of(rng, (", ", " ", "\t", "; ", "\n"))
-    units = [one_of(rng, ("", "", "", " deg", "Nm", " ms", " %", " furlong")) for _ in names]
+    units = [one_of(rng, ("",) * 9 + (" deg", "Nm", " ms", " %", " furlong")) for _ in names]
     odd = float(rng.choice((0.0, 0.02, 0.1)))
     lines = ["Booting...", "ready"][: int(rng.integers(3))]
     for k in range(int(rng.choice((60, 60, 30, 30, 3, 1, 0)))):
-        values = [10 * k if n in ("t", "ms", "millis") else 20.0 * np.sin(k / 5 + j) for j, n in enumerate(names)]
+        values = [10 * k if n in ("t", "ms", "t_ms") else 20.0 * np.sin(k / 5 + j) for j, n in enumerate(names)]
         lines.append(between.join(f"{n}{equals}{v:.4g}{u}" for n, v, u in zip(names, values, units, strict=True)))
         if rng.uniform() < odd:
             lines.append(one_of(rng, ("overrun", "angle: ", "", lines[-1][:5], "t: nan", "E (123) i2c: timeout")))
@@ -55,51 +56,66 @@ def serial(rng: Rng) -> tuple[bytes, list[str]]:
 def side_by_side(rng: Rng) -> tuple[bytes, list[str]]:
     """Two to four trials in the columns of one table, which may end apart, and the names of the columns."""
     form = one_of(rng, ("{n}", "{n}_{k}", "trial{k}_{n}", "{n} {k}", "trial{k}_{n}", "{k}", "T{k}.{n}"))
-    each = ["t", "angle", "torque"][int(rng.integers(2)) : int(rng.integers(2, 4))]
+    each = [one_of(rng, ("time_s", "time_s", "t")), "angle", "torque"][int(rng.integers(2)) : int(rng.integers(2, 4))]
     count = int(rng.integers(2, 5))
     names = [form.format(n=n, k=k) for k in range(1, count + 1) for n in each]
     if shared := rng.uniform() < 0.5:
-        names = ["time", *names]
+        names = ["time_s", *names]
     longest = int(rng.choice((40, 40, 40, 8, 2)))
     ends = [int(rng.integers(longest // 2, longest + 1)) if rng.uniform() < 0.6 else longest for _ in range(count)]
     between = one_of(rng, (",", ",", ",", ";"))
     rows = [names] if rng.uniform() < 0.8 else [[f"Trial {k // len(each)}" for k in range(len(names))], names]
     for k in range(longest):
-        cells = [f"{0.01 * k if n == 't' else np.sin(k / 5):.4g}" if k < end else "" for end in ends for n in each]
+        cells = [
+            f"{0.01 * k if n in ('t', 'time_s') else np.sin(k / 5):.4g}" if k < end else ""
+            for end in ends
+            for n in each
+        ]
         rows.append([f"{0.01 * k:.4g}", *cells] if shared else cells)
     return "\n".join(between.join(row) for row in rows).encode(), names
 
 
-def nested(rng: Rng, suffix: str) -> bytes:
-    """A file that nests vectors of one length and of others, records, words and nothing."""
+def nested(rng: Rng, suffix: str) -> tuple[bytes, list[str]]:
+    """A file that nests vectors of one length and of others, records, words and nothing; names of some vectors."""
+    made = _node(rng, 0)
     if suffix == ".json":
-        made = [_node(rng, 0)] if rng.uniform() < 0.2 else _node(rng, 0)
-        return json.dumps(made, default=lambda v: v.tolist()).encode()
-    out = io.BytesIO()
-    scipy.io.savemat(
-        out, {f"v{k}": _matlab(_node(rng, 1)) for k in range(int(rng.integers(1, 4)))}, long_field_names=True
-    )
-    return out.getvalue()
+        content = json.dumps([made] if rng.uniform() < 0.2 else made, default=lambda v: v.tolist()).encode()
+    else:
+        out = io.BytesIO()
+        scipy.io.savemat(out, _matlab(made if isinstance(made, dict) and made else {"v": made}), long_field_names=True)
+        content = out.getvalue()
+    return content, [*_leaves(made)]
+
+
+def _leaves(node: Any, name: str = "") -> Iterator[str]:
+    if isinstance(node, dict):
+        for key, value in node.items():
+            yield from _leaves(value, f"{name}.{key}" if name else key)
+    elif isinstance(node, np.ndarray):
+        yield name
 
 
 def _node(rng: Rng, depth: int) -> Any:
-    kind = int(rng.integers(8))
-    if depth > 2 or kind == 0:
+    """Trials of vectors; what is no trial, and odd values, at any depth."""
+    if depth > 2:
         return ODD_VALUES[int(rng.integers(len(ODD_VALUES)))]
-    if kind < 3:
-        return {one_of(rng, (*KEYS, *NAMES[:8])): _vector(rng, 40) for _ in range(int(rng.integers(1, 5)))}
-    if kind == 3:
-        return [{"t": 0.01 * k, "angle": float(np.sin(k / 5)), "on": k > 3} for k in range(int(rng.integers(30)))]
-    if kind == 4:
-        return [_trial(rng) for _ in range(int(rng.integers(1, 4)))]
-    if kind == 5:
-        return {"data": _trial(rng)}
-    return {one_of(rng, KEYS): _node(rng, depth + 1) for _ in range(int(rng.integers(1, 4)))}
+    make: tuple[Callable[[], Any], ...] = (
+        lambda: ODD_VALUES[int(rng.integers(len(ODD_VALUES)))],
+        lambda: {one_of(rng, (*KEYS, *NAMES[:8])): _vector(rng, 40) for _ in range(int(rng.integers(1, 5)))},
+        lambda: [{"t_s": 0.01 * k, "angle": np.sin(k / 5), "on": k > 3} for k in range(int(rng.integers(30)))],
+        lambda: [_trial(rng) for _ in range(int(rng.integers(1, 4)))],
+        lambda: {"trials": [_trial(rng) for _ in range(int(rng.integers(1, 4)))]},
+        lambda: {"data": _trial(rng)},
+        lambda: _trial(rng),
+        lambda: {one_of(rng, KEYS): _node(rng, depth + 1) for _ in range(int(rng.integers(1, 4)))},
+        lambda: {**_trial(rng), one_of(rng, KEYS): _node(rng, depth + 1)},
+    )
+    return make[int(rng.integers(len(make)))]()
 
 
 def _trial(rng: Rng) -> dict[str, Any]:
     count = int(rng.choice((3, 30, 40)))
-    trial: dict[str, Any] = {n: _vector(rng, count) for n in ("t", "angle", "torque")}
+    trial: dict[str, Any] = {n: _vector(rng, count) for n in ("t_s", "angle", "torque")}
     return trial | ({"fs": 100.0} if rng.uniform() < 0.5 else {})
 
 

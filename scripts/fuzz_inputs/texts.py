@@ -41,7 +41,7 @@ NAMES = (
     *("Angle", "角度", "a,b", 'a"b', "a;b", "nan", "1", "time_s", "Time", "velocity", "F1", "counts", "_", "q" * 3000),
 )
 EFFORTS = ("Torque (Nm)", "Torque", *NAMES)
-TIME_NAMES = ("t", "time_s", "Time [ms]", "Time (s)", "t_us", "time", "Timestamp", "Zeit", "", "x", "Date")
+TIME_NAMES = ("time_s", "Time (s)", "t", "Time [ms]", "t_us", "time", "Timestamp", "Zeit", "", "x", "Date")
 UNITS = ("", "-", "s", "ms", "deg", "Nm", "N", "rad", "V", "mN m", "°", "µs", "furlong", "[deg]", "(Nm)", "counts", "3")
 ENCODINGS = ("utf-8", "utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "cp1252", "latin-1", "utf-7")
 SEPARATORS = (",", ";", "\t", " ", "  ", "|", ", ")
