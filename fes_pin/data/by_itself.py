@@ -26,8 +26,8 @@ def before_pulses(trial: Trial, name: str) -> Mean | None:
 
 def resting(trial: Trial, name: str, part: slice, still: str = "position") -> Mean | None:
     """Return the mean of a reading in a part of a trial in which another one stands still; None where that moves."""
-    moves = np.ptp(trial[still][part]) > STILL * np.ptp(trial[still])
-    return None if moves else _mean(trial[name][part])
+    mean = _mean(trial[name][part])
+    return None if mean is None or np.ptp(trial[still][part]) > STILL * np.ptp(trial[still]) else mean
 
 
 def _mean(values: np.ndarray) -> Mean | None:
