@@ -114,9 +114,13 @@ def _node(rng: Rng, depth: int) -> Any:
 
 
 def _trial(rng: Rng) -> dict[str, Any]:
-    count = int(rng.choice((3, 30, 40)))
-    trial: dict[str, Any] = {n: _vector(rng, count) for n in ("t_s", "angle", "torque")}
-    return trial | ({"fs": 100.0} if rng.uniform() < 0.5 else {})
+    """A trial of three vectors, of which each may be another one."""
+    count = int(rng.choice((30, 40)))
+    right = {n: np.sin(np.arange(count) / 5) for n in ("angle", "torque")} | {"t_s": 0.01 * np.arange(count)}
+    trial: dict[str, Any] = {
+        n: right[n] if rng.uniform() < 0.85 else _vector(rng, count) for n in ("t_s", "angle", "torque")
+    }
+    return trial | ({"fs": 100.0} if rng.uniform() < 0.3 else {})
 
 
 def _vector(rng: Rng, count: int) -> Any:

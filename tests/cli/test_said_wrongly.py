@@ -7,10 +7,11 @@ import warnings
 import numpy as np
 import pytest
 from cli.test_own import LENGTH, MASS, TRIALS, fails, plain, run
+from diagnosis.hidden import study_of
 
 from fes_pin.data.by_itself import resting
 from fes_pin.data.motion import GROUND_REACTION, REQUIRED
-from fes_pin.data.study import read_study
+from fes_pin.data.study import read_study, write_study
 from fes_pin.data.trial import Trial
 from fes_pin.data.trial_files import write_trial
 from fes_pin.models.nominal import nominal_model
@@ -125,3 +126,21 @@ def test_a_body_that_nobody_has_names_its_study(monkeypatch, capsys, tmp_path):
     assert run(monkeypatch, *words, "--set", "mass_kg=10", "--set", "height_m=1.8") == 0
     capsys.readouterr()
     assert fails(monkeypatch, capsys, "check", tmp_path).startswith(f"fes-pin: {tmp_path}, mass_kg: must lie between")
+
+
+@pytest.mark.parametrize("offset", ["tau=fit", "tau=0.001"])
+@pytest.mark.parametrize("logger", ["pos", "tau"])
+def test_a_clock_that_stands_is_between_no_two_rows_of_another(monkeypatch, capsys, tmp_path, logger, offset):
+    words, path = two_loggers(tmp_path), tmp_path / f"a_{logger}.csv"
+    first, *rows = path.read_text().splitlines()
+    path.write_text(
+        "\n".join([first, *(f"{rows[100 + k % 2].split(',')[0]},{r.split(',')[1]}" for k, r in enumerate(rows))])
+    )
+    assert "expected time to increase" in fails(monkeypatch, capsys, *words, "--split", "none", "--offset", offset)
+
+
+def test_a_condition_of_a_study_that_no_joint_has_names_the_study(monkeypatch, capsys, tmp_path):
+    write_study(study_of("ankle", n_motion=1, n_isometric=1, duration_s=1.0), tmp_path)
+    text = (tmp_path / "study.toml").read_text()
+    (tmp_path / "study.toml").write_text(re.sub(r"angle_rad = [\d.]+", "angle_rad = 1e20", text))
+    assert fails(monkeypatch, capsys, "check", tmp_path).startswith(f"fes-pin: {tmp_path}, angle_rad: reaches 1e+20")
