@@ -144,3 +144,8 @@ def test_a_condition_of_a_study_that_no_joint_has_names_the_study(monkeypatch, c
     text = (tmp_path / "study.toml").read_text()
     (tmp_path / "study.toml").write_text(re.sub(r"angle_rad = [\d.]+", "angle_rad = 1e20", text))
     assert fails(monkeypatch, capsys, "check", tmp_path).startswith(f"fes-pin: {tmp_path}, angle_rad: reaches 1e+20")
+
+
+def test_a_quote_that_does_not_end_is_read_as_it_is(monkeypatch, capsys, tmp_path):
+    (tmp_path / "a.csv").write_text('time_s,"' + "x" * 200_000 + "\n0,1\n1,2\n2,3\n")
+    assert 'position="xxx' in fails(monkeypatch, capsys, "new-study", tmp_path / "a.csv", *ROD)
