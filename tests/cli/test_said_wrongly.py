@@ -107,6 +107,17 @@ def test_a_model_that_is_unstable_is_named(monkeypatch, capsys, tmp_path, record
     assert said.startswith(f"fes-pin: {model}: the prediction of position is not finite")
 
 
+def test_a_model_whose_inertia_no_body_has_is_one_line(monkeypatch, capsys, tmp_path, recording):
+    assert run(monkeypatch, "new-study", recording, *ROD) == 0
+    model = tmp_path / "model.toml"
+    model.write_text(
+        re.sub(r"^inertia = .*", "inertia = -1", model_toml(nominal_model(read_study(tmp_path))), flags=re.M)
+    )
+    capsys.readouterr()
+    said = fails(monkeypatch, capsys, "predict", model, tmp_path / "a.csv", "--out", tmp_path / "p.csv")
+    assert said.startswith(f"fes-pin: {model}, row") and "constants.inertia: expected a number above 0" in said
+
+
 def test_a_line_of_code_that_overflows_is_not_printed(monkeypatch, tmp_path):
     def overflowing(*given):
         warnings.warn("overflow encountered in square", RuntimeWarning, stacklevel=1)
