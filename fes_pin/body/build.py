@@ -296,7 +296,8 @@ def body_of(study: Study) -> tuple[Body, np.ndarray]:
     known, table = study.constants, {}
     file = study.files.get("urdf", study.files.get("segments"))
     if file is None:
-        body = Body.from_subject(known["mass_kg"], known["height_m"])
+        with errors_of(study.folder):
+            body = Body.from_subject(known["mass_kg"], known["height_m"])
     elif file is study.urdf:
         body = Body._of_urdf(file, file.read_bytes(), known.get("height_m"))
     else:

@@ -5,6 +5,7 @@ import math
 import os
 import re
 import sys
+import warnings
 from collections.abc import Callable, Mapping
 from contextlib import redirect_stdout
 from contextvars import ContextVar
@@ -218,7 +219,10 @@ class Commands(TyperGroup):
         if not standalone_mode:
             return super().main(args, standalone_mode=False, **given)
         _make_streams_whole()
-        with one_command(), claims_held(), redirect_stdout(Held(sys.stdout)) as held:
+        with warnings.catch_warnings(), one_command(), claims_held(), redirect_stdout(Held(sys.stdout)) as held:
+            # a line of code that overflowed tells a person nothing: what is not finite is judged where it is used;
+            # -W, and filters that are set, come first
+            warnings.filterwarnings("ignore", category=RuntimeWarning, append=True)
             code = self._run(held, args, given)
         raise SystemExit(code)
 

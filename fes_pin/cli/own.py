@@ -276,16 +276,18 @@ def _tried(made: NewStudy, wanted: Wanted, catalogue: Catalogue) -> tuple[Study,
     text = str(made.contents["study.toml"])
     try:
         study = study_of_text(text, wanted.folder, made.origins, catalogue.schemas())
+        if all(trial.role == "held_out" for trial in study.trials):
+            raise InputError("expected at least one trial to fit; all are held_out", column="--role")
         if study.schema.owner is None:
             return study, list(dict.fromkeys(words for trial in study.trials for words in trial.remarks)) or None
         return study, odd_numbers(study)[1]
     except InputError as error:
         if error.file != wanted.folder / "study.toml":
             raise
-        raise InputError(error.message, column=_option_of(error.column or "", wanted)) from None
+        raise InputError(error.message, column=_option_of(error.column or "", wanted, made)) from None
 
 
-def _option_of(key: str, wanted: Wanted) -> str:
+def _option_of(key: str, wanted: Wanted, made: NewStudy) -> str:
     """The option that said what stands under a key of a study.toml."""
     table, _, last = key.rpartition(".")
     if table == "study" or key == "rig.urdf":
@@ -295,6 +297,9 @@ def _option_of(key: str, wanted: Wanted) -> str:
         return f"--column {column}" if column != "file" else "--resample" if "resample" in last else "--fill"
     if table.startswith("trial[") and last in ("role", "group"):
         return f"--{last}"
-    if table.startswith("trial[") and wanted.schema.owner is not None:
-        return f"--set {wanted.files[int(table[6:-1])].name}:{last}"
+    trial, _, within = table.partition(".")
+    if within == "offset_s":
+        return f"--offset {last}"
+    if trial.startswith("trial[") and wanted.schema.owner is not None:
+        return f"--set {made.files_of(int(trial[6:-1]))[0].name}:{within or last}"
     return f"--set {last}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -85,10 +86,11 @@ def predict(
         outputs.check_file(out)
         check_table(out)
     schema = loaded.rig.described()
-    with _by_option(pairs("--set", setting)):
+    with _of_file(model), _by_option(pairs("--set", setting)):
         odd = check_study(ToPredict(measured, schema, loaded.rig.constants, trial), loaded)
-    given = [load_log(model).applied(one) for one in measured]
-    found = [predicted_trial(loaded, one) if horizon is None else _along(model, loaded, one, horizon) for one in given]
+        given = [load_log(model).applied(one) for one in measured]
+        ahead = partial(_along, model, loaded, horizon_s=horizon) if horizon is not None else None
+        found = [ahead(one) if ahead else predicted_trial(loaded, one) for one in given]
     errors = _errors(loaded, load_random(model), given, found, horizon)
     if (residuals or out is None) and not errors:
         columns = " or ".join(dict.fromkeys(n for one in found for n in one.columns))
@@ -162,6 +164,17 @@ def _by_option(settings: Collection[str]) -> Iterator[None]:
     except InputError as error:
         if error.row is None and error.column in settings:
             raise InputError(error.message, column=f"--set {error.column}") from None
+        raise
+
+
+@contextmanager
+def _of_file(model: Path) -> Iterator[None]:
+    """Name the model in an error that names no file and no option: it is the model that cannot be simulated."""
+    try:
+        yield
+    except InputError as error:
+        if error.file is None and not (error.column or "").startswith("--"):
+            raise InputError(error.message, file=model, column=error.column) from None
         raise
 
 

@@ -54,6 +54,13 @@ class AsRead(ReadOnly):
     interpolated: bool = False
     stated: frozenset[str] = frozenset()
 
+    def file_of(self, column: str) -> str | None:
+        """The file that holds a column of a trial or of a walk; None where several may."""
+        files = list(self.sha256)
+        if len(files) == len(self.recordings):  # of a walk, in the order of its recordings
+            files = [f for f, (_, columns) in zip(files, self.recordings, strict=True) if column in columns]
+        return files[0] if len(files) == 1 else None
+
 
 class HeldFile(PosixPath):
     """A path with the bytes that were there when it was read: whoever reads it reads those."""

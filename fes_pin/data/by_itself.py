@@ -25,10 +25,9 @@ def before_pulses(trial: Trial, name: str) -> Mean | None:
 
 
 def resting(trial: Trial, name: str, part: slice, still: str = "position") -> Mean | None:
-    """Return the mean of a reading in a part of a trial in which another one stands still; None where it moves."""
-    while_still = trial[still][part]
-    moves = not len(while_still) or np.ptp(while_still) > STILL * np.ptp(trial[still])
-    return None if moves else _mean(trial[name][part])
+    """Return the mean of a reading in a part of a trial in which another one stands still; None where that moves."""
+    mean = _mean(trial[name][part])
+    return None if mean is None or np.ptp(trial[still][part]) > STILL * np.ptp(trial[still]) else mean
 
 
 def _mean(values: np.ndarray) -> Mean | None:

@@ -1,6 +1,7 @@
 """Files of a study: read as text, kept inside its folder, written whole or not at all."""
 
 import json
+import math
 import os
 import shutil
 import tempfile
@@ -102,7 +103,7 @@ def read_json(path: str | Path) -> Any:
     """
     text = read_text(path)
     try:
-        return json.loads(text)
+        return json.loads(text, parse_int=_whole)
     except (ValueError, RecursionError) as error:
         raise InputError(f"expected JSON: {error}", file=path, row=getattr(error, "lineno", None)) from None
 
@@ -118,10 +119,16 @@ def read_json_lines(path: str | Path) -> list[Any]:
     out = []
     for row, line in enumerate(read_text(path).splitlines(), 1):
         try:
-            out += [json.loads(line)] if line.strip() else []
+            out += [json.loads(line, parse_int=_whole)] if line.strip() else []
         except (ValueError, RecursionError) as error:
             raise InputError(f"expected JSON: {error}", file=path, row=row) from None
     return out
+
+
+def _whole(digits: str) -> int | float:
+    """An integer; inf where it is beyond what a float can be, as JSON's `1e400` is."""
+    number = float(digits)
+    return int(digits) if math.isfinite(number) else number
 
 
 def own_json(path: Path) -> dict[str, Any]:

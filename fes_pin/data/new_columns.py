@@ -146,6 +146,8 @@ class NewColumns:
     def _time_of(self, source: str) -> Source | None:
         seen = Seen([one.files[source] for one in self.trials])
         option = self.wanted.columns.get("time_s")
+        if option == "":
+            raise InputError("expected NAME:UNIT, or rate=HZ of a file without times", column="--column time_s")
         if option is not None and (not source or option.startswith("rate=") or column_named(option, seen.names)):
             return self.stated("time_s", option, seen)
         rates = {p.rate_hz for p in seen.proposals}

@@ -266,8 +266,8 @@ def _without_copies(names: Sequence[str], recording: Table) -> tuple[str, ...]:
 def _rising(names: tuple[str, ...], recording: Table) -> tuple[str, ...]:
     """Columns of times without those that hardly ever rise, as dates of too few digits do, where others rise."""
     read = recording.columns
-    rise = tuple(n for n in names if n not in read or np.median(np.diff(read[n][np.isfinite(read[n])])) > 0.0)
-    return rise or names
+    steps = {n: np.diff(read[n][np.isfinite(read[n])]) for n in names if n in read}
+    return tuple(n for n in names if n not in steps or (steps[n].size and np.median(steps[n]) > 0.0)) or names
 
 
 def _readings(column: str, names: tuple[str, ...]) -> tuple[str, ...]:

@@ -4,6 +4,7 @@ What the files do not say is taken from options, or asked of a person at a termi
 """
 
 import re
+import tomllib
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
@@ -44,6 +45,11 @@ class NewStudy:
     taken: tuple[tuple[str, str, str], ...]
     origins: Mapping[str, Path]
     said: tuple[str, ...] = ()
+
+    def files_of(self, trial: int) -> list[Path]:
+        """The recordings of one `[[trial]]`, by its place in study.toml."""
+        table = tomllib.loads(str(self.contents["study.toml"]))["trial"][trial]
+        return [self.origins[place] for place in table.get("sources", table).values() if place in self.origins]
 
 
 Guess = Callable[[Mapping[str, float], Collection[str]], Mapping[str, float]]

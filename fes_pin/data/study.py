@@ -142,7 +142,10 @@ class Study(ReadOnly):
         if odd := [one for one in trials if not isinstance(one, Trial)]:
             raise InputError(f"expected trials, found a {type(odd[0]).__name__}", column="trials")
         for trial in trials:
-            check_trial(trial, schema, threshold_us=-math.inf)  # `check` judges the widths of all together
+            try:
+                check_trial(trial, schema, threshold_us=-math.inf)  # `check` judges the widths of all together
+            except InputError as error:
+                raise InputError(error.message, file=error.file or self.folder, column=error.column) from None
         if twice := [name for name, count in Counter(t.name for t in trials).items() if count > 1]:
             raise InputError(f"two trials are named {twice[0]!r}; expected a name for each", column="trials")
 

@@ -4,6 +4,7 @@ They say what the rig is and how its recordings are written; an option of new-st
 """
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from functools import partial
@@ -223,7 +224,10 @@ def source_from_option(column: str, option: str, names: Sequence[str]) -> dict[s
         return {"name": option}
     first, *more = option.split(",")
     if first.startswith("rate=") and column == "time_s":
-        return {"rate_hz": number_in(first.removeprefix("rate="), error)}
+        rate_hz = number_in(first.removeprefix("rate="), error)
+        if more or not 0.0 < rate_hz < math.inf:
+            raise error(f"expected rate=HZ above 0, alone; found {option!r}")
+        return {"rate_hz": rate_hz}
     name, colon, unit = first.rpartition(":") if first not in names else (first, "", "")
     out: dict[str, Any] = {"name": name if colon else first} | ({"unit": unit} if unit and colon else {})
     if out["name"] not in names:

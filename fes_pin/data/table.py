@@ -127,6 +127,20 @@ def check_times(
         raise error(found + hint, name, late)
 
 
+def increasing_steps(table: Table) -> np.ndarray:
+    """The steps of a table's times, s, shape (n - 1,).
+
+    Raises
+    ------
+    InputError
+        One is not above 0, with its row.
+    """
+    steps = np.diff(table.time)
+    if not (steps > 0.0).all():
+        raise table.error("expected time to increase", "time_s", int(np.argmin(steps > 0.0)) + 1)
+    return steps
+
+
 def _first_off_grid(time: np.ndarray, steps: np.ndarray, step: float, half_digit: float) -> int | None:
     """First sample that no equally spaced times, printed with this last digit, explain."""
     odd = np.abs(steps - step) > STEP_TOLERANCE * step

@@ -103,9 +103,10 @@ class Trial(ReadOnly):
         self._freeze()
 
     def error(self, message: str, column: str, sample: int | None = None) -> InputError:
-        """The error that names a column, this trial and a sample."""
+        """The error that names a column, the file that it was read from, this trial and a sample."""
         place = f"trial {self.name}" + ("" if sample is None else f", sample {sample}")
-        return InputError(f"{message} ({place})", column=column)
+        file = self.as_read.file_of(column) if self.as_read is not None and column in self.columns else None
+        return InputError(f"{message} ({place})", file=file, column=column)
 
     def key_error(self, key: str, message: str) -> InputError:
         """The error that names a key, or a column, and this trial."""

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import argparse
+import gc
 import os
 import tempfile
 import time
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
-from fuzz_inputs.cases import KINDS, READING_KINDS
+from fuzz_inputs.cases import KINDS, READING_KINDS, Result
+from fuzz_inputs.check import Ask
 
 
 def main() -> None:
@@ -28,36 +30,48 @@ def main() -> None:
     kinds = READING_KINDS if given.reading else KINDS
     numbers = [n for n in numbers if given.only or given.kind in (None, kinds[n % len(kinds)])]
     workers = 1 if given.only else given.workers
-    began, bad, codes, slowest = time.monotonic(), 0, {0: 0, 2: 0}, 0.0
+    began, bad, slowest = time.monotonic(), 0, 0.0
+    codes: dict[str, list[int]] = {}
     jobs = [(numbers[k::workers], given.seed, given.reading, bool(given.only)) for k in range(workers)]
     with ProcessPoolExecutor(workers) as pool:
-        for code_counts, faults, slow in pool.map(_run, jobs):
+        for found, faults, slow in pool.map(_run, jobs):
             bad += faults
             slowest = max(slowest, slow)
-            for code, count in code_counts.items():
-                codes[code] = codes.get(code, 0) + count
+            for kind, ended in found.items():
+                codes.setdefault(kind, []).extend(ended)
+    for kind, ended in codes.items():
+        print(f"  {kind}: {ended.count(0)} answered, {ended.count(2)} rejected in one line")
+    answered, rejected = (sum(ended.count(code) for ended in codes.values()) for code in (0, 2))
     print(
-        f"{len(numbers)} cases of seed {given.seed}: {codes[0]} answered, {codes[2]} rejected in one line, {bad} broke "
+        f"{len(numbers)} cases of seed {given.seed}: {answered} answered, {rejected} rejected in one line, {bad} broke "
         f"a rule; slowest {slowest:.0f} s; {time.monotonic() - began:.0f} s in all"
     )
     raise SystemExit(bool(bad))
 
 
-def _run(job: tuple[list[int], int, bool, bool]) -> tuple[dict[int, int], int, float]:
+def _run(job: tuple[list[int], int, bool, bool]) -> tuple[dict[str, list[int]], int, float]:
+    """Codes by kind, cases that broke a rule, and the longest call, s."""
     import fes_pin.diagnosis.diagnosis  # noqa: PLC0415
     import fes_pin.view.report  # noqa: F401, PLC0415
+    from fuzz_inputs.batch import in_batches  # noqa: PLC0415
     from fuzz_inputs.cases import run_case  # noqa: PLC0415
-    from fuzz_inputs.check import warm_up  # noqa: PLC0415
+    from fuzz_inputs.check import call, warm_up  # noqa: PLC0415
 
     numbers, seed, reading, whole = job
-    codes: dict[int, int] = {}
+    codes: dict[str, list[int]] = {}
     bad, slowest = 0, 0.0
     cache = Path(os.environ.setdefault("FES_PIN_CACHE", str(Path(tempfile.gettempdir()) / f"fuzz-cache-{os.getuid()}")))
-    with tempfile.TemporaryDirectory(prefix="fuzz") as folder:
+    memory = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
+    with tempfile.TemporaryDirectory(prefix="fuzz", dir=memory) as folder:
         warm_up(Path(folder))
-        for number in numbers:
-            result = run_case(number, seed, Path(folder) / "case", cache, reading)
-            codes[result.answer.code] = codes.get(result.answer.code, 0) + 1
+
+        def run(number: int, ask: Ask) -> Result:
+            place = Path(folder) / ("alone" if ask is call else "case")  # both may run at once
+            return run_case(number, seed, place, cache, reading, ask)
+
+        gc.freeze()  # what forks share stays shared
+        for result in (run(n, call) for n in numbers) if whole or not reading else in_batches(numbers, run):
+            codes.setdefault(result.name.split()[1], []).append(result.answer.code)
             slowest = max(slowest, result.answer.seconds)
             if result.faults:
                 bad += 1

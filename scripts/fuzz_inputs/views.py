@@ -26,16 +26,21 @@ def with_views(study: Path, rng: np.random.Generator) -> None:
     """Give the trials of a study views of their files, of which some start again or have holes."""
     place = study / "study.toml"
     head, *tables = re.split(r"(?=^\[\[trial\]\]$)", place.read_text(encoding="utf-8"), flags=re.M)
-    for k in range(len(tables)):
-        names = rng.choice(list(KEYS), int(rng.integers(3)), replace=False)
-        said = [f"{name} = {rng.choice(KEYS[name])}" for name in names]
-        table = re.sub(r"^file = .*\n", "", tables[k], flags=re.M) if "sources" in names else tables[k]
-        tables[k] = "\n".join([table.rstrip(), *said]) + "\n\n"
-    sources = "".join(f'[sources.{n}]\ntime_s = "time_s"\n' for n in "ab") if rng.uniform() < 0.5 else ""
-    place.write_text(head + sources + "".join(tables), encoding="utf-8")
+    place.write_text(head + views(rng, tables), encoding="utf-8")
     for path in sorted(study.glob("trials/*.csv")):
         if rng.uniform() < 0.5:
             path.write_text(_broken(path.read_text(encoding="utf-8"), rng), encoding="utf-8")
+
+
+def views(rng: np.random.Generator, tables: list[str]) -> str:
+    """Tables `[[trial]]`, with keys of views."""
+    out = [f'[sources.{n}]\ntime_s = "time_s"\n' for n in "ab"] if rng.uniform() < 0.5 else []
+    for table in tables:
+        names = rng.choice(list(KEYS), int(rng.integers(3)), replace=False)
+        given = [f"{name} = {rng.choice(KEYS[name])}" for name in names]
+        of_file = re.sub(r"^file = .*\n", "", table, flags=re.M) if "sources" in names else table
+        out.append("\n".join([of_file.rstrip(), *given]) + "\n\n")
+    return "".join(out)
 
 
 def _broken(text: str, rng: np.random.Generator) -> str:

@@ -1,10 +1,16 @@
 """A slice of `scripts/fuzz`: odd and spoilt input gets an answer or one line, and its checks see what they look for."""
 
+import os
+import signal
+import tomllib
+
 import numpy as np
 import pytest
-from fuzz_inputs.cases import KINDS, READING_KINDS, run_case
+from fuzz_inputs.batch import in_batches
+from fuzz_inputs.cases import KINDS, READING_KINDS, Result, run_case
 from fuzz_inputs.check import Answer, call
 from fuzz_inputs.oddities import ODDITIES
+from fuzz_inputs.stated import mistyped
 from fuzz_inputs.studies import RIGS, small_study
 
 from fes_pin.data.errors import InputError
@@ -13,6 +19,7 @@ from fes_pin.models.compile.program import cache_folder
 from fes_pin.models.nominal import nominal_model
 from fes_pin.prepare.measured import check_study, measured_study
 
+RNG = np.random.default_rng
 FILES = [n for n in range(14) if KINDS[n % len(KINDS)] in {"csv", "model", "trial"}]
 
 
@@ -58,6 +65,41 @@ def test_broken_promises_are_seen():
     assert faults(2, err="two\nlines\n") and faults(2, err="") and faults(2, "out", "line\n")
     assert faults(2, err="line\n", written=True) and faults(0, err="Traceback (most recent call last)")
     assert faults(0, strays=["open /etc/passwd"])
+    assert faults(0, err="x.py:3: RuntimeWarning: overflow")
+    given = ["check", "/tmp/made/study"]
+    assert Answer(2, "", "fes-pin: nothing is right\n", 1.0, ()).faults(False, given)
+    assert not Answer(2, "", "fes-pin: study: nothing is right\n", 1.0, ()).faults(False, given)
+
+
+def test_many_cases_in_one_process_end_as_each_alone(tmp_path):
+    def run(number, ask):
+        return run_case(number, 5, tmp_path / ("alone" if ask is call else "case"), cache_folder(), True, ask)
+
+    together = list(in_batches(range(len(READING_KINDS)), run))
+    alone = [run(number, call) for number in range(len(READING_KINDS))]
+    assert [(r.name, r.answer.code, r.faults) for r in together] == [(r.name, r.answer.code, r.faults) for r in alone]
+
+
+def test_a_case_that_ends_its_process_is_seen_and_the_others_go_on():
+    def run(number, ask):
+        if number == 1 and ask is not call:
+            os.kill(os.getpid(), signal.SIGXCPU)
+        return Result(
+            f"{number} none", Answer(0, "", "", 1.0, ()), ["of the batch"] * (number == 2 and ask is not call)
+        )
+
+    first, ended, odd, last = in_batches(range(4), run)
+    assert not first.faults and not last.faults
+    assert ended.faults == [f"ended its process, exit code {-signal.SIGXCPU}"]
+    assert odd.faults == ["of the batch (not in a process of its own)"]
+
+
+@pytest.mark.parametrize("number", range(20))
+def test_what_is_mistyped_is_toml_again(number):
+    text = mistyped(
+        '[study]\nname = "a"\n[rig]\nurdf = "b"\n[rig.passive]\nx = 1.0\n[[trial]]\nat = [1]\n', RNG(number)
+    )
+    assert isinstance(tomllib.loads(text), dict)
 
 
 def test_a_file_written_elsewhere_is_seen(tmp_path):

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from fes_pin.data.recorded.regular import LONGEST_GAP, resampled
-from fes_pin.data.table import Table
+from fes_pin.data.table import Table, increasing_steps
 
 EVENTS = "events"
 """The value of `rows` in [columns.file] that says so."""
@@ -68,9 +68,7 @@ def sampled_events(table: Table, rate_hz: float) -> Table:
     InputError
         Times that do not increase; as `resampled`.
     """
-    steps = np.diff(table.time)
-    if not (steps > 0).all():
-        raise table.error("expected time to increase", "time_s", int(np.argmax(steps <= 0)) + 1)
+    increasing_steps(table)
     begin = float(table.time[0])
     counted = replace(table, columns={**table.columns, table.names[0]: table.time - begin})
     held = resampled(counted, table.names, rate_hz)

@@ -2,6 +2,7 @@
 
 import csv
 import re
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -116,6 +117,7 @@ def cells_of(line: str, form: TextForm) -> list[str]:
     if form.delimiter == " ":
         return [cell.strip('"') for cell in cells]
     if '"' in line:
-        cells = next(csv.reader([line], delimiter=form.delimiter, skipinitialspace=True), [])
+        with suppress(csv.Error):  # of a cell beyond csv's limit, which is no number
+            cells = next(csv.reader([line], delimiter=form.delimiter, skipinitialspace=True), [])
     out = [cell.strip() for cell in cells]
     return out[:-1] if len(out) > 1 and not out[-1] else out

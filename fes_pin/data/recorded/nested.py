@@ -1,5 +1,6 @@
 """Vectors in files that nest them, as `.mat` and `.json`: by dotted names, those of one length, with their rates."""
 
+import math
 import re
 import warnings
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -65,7 +66,7 @@ def _found_in(path: Path, sheet: str = "") -> _Found:
     rates = []
     for name, value in _scalars(content):
         above, _, last = name.rpartition(".")
-        if value > 0.0 and (SAMPLED.match(last) or STEP.match(last)):
+        if 0.0 < value < math.inf and (SAMPLED.match(last) or STEP.match(last)):
             rates.append((above, value if SAMPLED.match(last) else float(f"{1.0 / value:.12g}")))
     found, left = of_one_length(found)
     return _Found(found, tuple(rates), units_in(content, found), (*left, *_too_deep(content)))

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fes_pin.data.table import STEP_TOLERANCE, Table
+from fes_pin.data.table import STEP_TOLERANCE, Table, increasing_steps
 
 MOST_PER_SAMPLE = 100
 """Samples for each that was recorded, at most: beyond that nothing but straight lines is added."""
@@ -86,9 +86,7 @@ def check_steps(table: Table, rate_hz: float) -> tuple[str, ...]:
     InputError
         Times that do not increase, or a longer hole, with the row.
     """
-    steps = np.diff(table.time)
-    if not (steps > 0).all():
-        raise table.error("expected time to increase", "time_s", int(np.argmax(steps <= 0)) + 1)
+    steps = increasing_steps(table)
     longest, usual = int(np.argmax(steps)), float(np.median(steps))
     longer = max(usual, 1.0 / rate_hz)
     if steps[longest] > LONGEST_GAP * longer * (1.0 + STEP_TOLERANCE):  # the rate may be a rounded one

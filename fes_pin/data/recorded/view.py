@@ -17,7 +17,7 @@ from fes_pin.data.recorded.clock_offset import clock_offset
 from fes_pin.data.recorded.parts import HOLES, RESTARTS, RESTS, changes, cut, holes, moving, restarts, rows_of
 from fes_pin.data.recorded.regular import at_times
 from fes_pin.data.schema import any_number, check_known, one_of, positive
-from fes_pin.data.table import MIN_ROWS, Table
+from fes_pin.data.table import MIN_ROWS, Table, increasing_steps
 
 FITTED = "fit"
 """The offset of a clock that the recordings themselves show."""
@@ -224,7 +224,9 @@ def joined(tables: Mapping[str, Table], offsets: Mapping[str, float | str], held
             raise table.error(f"is also in {first}; expected it in one of the sources", min(shared))
         offset = offsets.get(name, 0.0)
         own = {n: v for n, v in table.columns.items() if n != "time_s"}
+        increasing_steps(table)  # or nothing stands between two of its rows
         if isinstance(offset, str):
+            increasing_steps(leading)
             offset, words = clock_offset(leading, table)
             said.append(f"{1e3 * offset:.3g} ms are added to the times of {name}: {words}")
         elif offset:

@@ -11,7 +11,7 @@ from fes_pin.data.channels import CHANNELS, ENVELOPE, RATE, VOLUNTARY, Channel, 
 from fes_pin.data.errors import InputError
 from fes_pin.data.imposed import MOTION, imposed_motion, same_motion
 from fes_pin.data.read_only import ReadOnly
-from fes_pin.data.schema import IMPOSED, START_S, RigSchema
+from fes_pin.data.schema import IMPOSED, START_S, NumberKey, RigSchema
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial, derived_trial
 from fes_pin.models.in_channel import in_channel
@@ -60,6 +60,8 @@ class Rig(ReadOnly):
     """Names of other rigs whose effects it can have as well."""
     needed: ClassVar[tuple[str, ...]] = ()
     """Constants without which there are no equations."""
+    computed: ClassVar[Mapping[str, NumberKey]] = {}
+    """Constants that a model states and no study does, as what is read off a URDF, and what each may be."""
     elsewhere: ClassVar[str] = "turn the rig's base, or add a sensor on the other side of the joint or frame"
     """A change of the experiment that distinguishes causes where no input does."""
     settings: ClassVar[tuple[str, ...]] = ("",)
@@ -75,7 +77,7 @@ class Rig(ReadOnly):
         if not isinstance(listed, list | tuple) or sorted(n for n in names if n in listed) != sorted(map(str, listed)):
             raise InputError(f"expected names among {', '.join(names)}, each once", column="fitted")
         check_parameters(self, schema.start)
-        known = {**schema.constants, **schema.passive, **schema.start}
+        known = {**self.computed, **schema.constants, **schema.passive, **schema.start}
         given = {n: (v, known.get(n, ANY_NUMBER)) for n, v in self.constants.items()}
         constants = {n: checked_number(v, f"constants.{n}", key) for n, (v, key) in given.items()}
         for low, high in (channel.ends for channel in CHANNELS.values()):

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fes_pin.data.errors import InputError
-from fes_pin.data.schema import IMPOSED, START_S, RigSchema, any_number, not_negative, positive
+from fes_pin.data.schema import IMPOSED, START_S, NumberKey, RigSchema, any_number, not_negative, positive
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.data.urdf import check_one_joint, stated_of_joint
@@ -60,6 +60,7 @@ class Joint(Rig):
     gravity_scale: float = parameter(1.0, lower=-10.0, upper=10.0, scale=0.1)
 
     name, needed = "joint", ("inertia", "gravity_cos", "gravity_sin", "revolute")
+    computed: ClassVar[Mapping[str, NumberKey]] = {"inertia": positive("kg m2 or kg", False)}
     settings = ("--set position0=0.5 --set velocity0=0", "--set kind=imposed")
     rate_of: ClassVar[Mapping[str, str]] = {"velocity": "position"}
     begins = "A column position gives the initial state by its first sample."
