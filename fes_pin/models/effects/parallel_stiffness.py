@@ -46,12 +46,12 @@ class ParallelStiffness(Effect):
         return {**super().grids(measured), "rest_angle_rad": places}
 
     def limits(self, measured: Measured) -> Bounds:
-        """The spring rests at an angle that the joint comes near; elsewhere it would be a constant torque."""
+        """The spring rests no farther off than the joint moves; elsewhere it would be a constant torque."""
         angles = next((measured[n] for n in ("angle_rad", "position", "length_m") if n in measured), None)
         if angles is None:
             return {}
         low, high = float(np.min(angles)), float(np.max(angles))
-        return {"rest_angle_rad": (low - 0.5 * (high - low), high + 0.5 * (high - low))}
+        return {"rest_angle_rad": (2.0 * low - high, 2.0 * high - low)}
 
     def apply(self, value: Scalar, s: Signals) -> Scalar:
         x = s.q - self.rest_angle_rad
