@@ -200,7 +200,7 @@ def _answering(trials: Sequence[Trial]) -> tuple[float, float]:
     is_held = not np.median(np.abs(np.concatenate([np.diff(t["effort"]) for t in trials])))
     size = 0.0 if is_held else 1.4826 * float(np.median(np.abs(high)))
     noise = size / math.sqrt(math.comb(2 * NOISE_ORDER, NOISE_ORDER))
-    shares = []
+    shares = [np.zeros(0)]
     for trial in trials:
         effort, reading = (without_jumps(np.diff(trial[n], ORDER)) for n in ("effort", "position"))
         if not effort.any() or not reading.any():
@@ -212,7 +212,8 @@ def _answering(trials: Sequence[Trial]) -> tuple[float, float]:
         missed = spectrum(left, trial.dt)[1]
         is_upper = (frequency > OF_BAND * frequency[-1]) & (every > 0.0)
         shares.append(1.0 - missed[is_upper] / every[is_upper])
-    return float(np.median(np.concatenate(shares))) if shares else 0.0, noise / usual
+    each = np.concatenate(shares)
+    return float(np.median(each)) if len(each) else 0.0, noise / usual
 
 
 def _spectrum_of_positions(trials: Sequence[Trial]) -> tuple[np.ndarray, np.ndarray, float]:
