@@ -342,7 +342,7 @@ def _torques(s: Sizes) -> list[CauseOfEffort]:
             None,
             {"stiffness_nm_per_rad": POSITIVE},
             rests,
-            {"rest_angle_rad": (s.low - 0.5 * reach, s.high + 0.5 * reach)},
+            {"rest_angle_rad": (s.low - reach, s.high + reach)},
             [hardens],
         ),
         CauseOfEffort("joint_stop", joint_stop, None, {"stiffness": POSITIVE}, stops, {"angle_rad": (s.low, s.high)}),
