@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import ChainMap
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -156,18 +157,16 @@ class EffortSets(FittedSets[EffortFit, Values]):
 
     def _likeliest_pairs(self, count: int) -> dict[Names, dict[str, float]]:
         """Return the start values of the sets of two causes of largest joint score within their bounds."""
-        base = self.fits[()]
-        projection, named = Projection(base.parts), [(n, x) for n, many in self._tried.items() for x in many]
+        base, out = self.fits[()], dict[Names, dict[str, float]]()
+        projection, places = Projection(base.parts), [(n, tried) for n, many in self._tried.items() for tried in many]
         each = [columns for n in self._tried for columns in self._whitened(base, n)]
         squares = [float(np.sum(one**2)) for one in each]
-        out: dict[Names, dict[str, float]] = {}
         found = joint_scores(projection.residual, [projection(one) for one in each], squares)
         for pair in sorted(found, key=lambda one: -one.gain):
-            both = [(*named[k], sizes) for k, sizes in zip(pair[:2], pair.sizes, strict=True)]
-            names = tuple(sorted(n for n, *_ in both))
-            if len({*names}) < len(names) or names in out or not all(self._is_within(n, v) for n, _, v in both):
-                continue
-            out[names] = {k: v for n, tried, sizes in both for k, v in {**tried, **self._sized(n, sizes)}.items()}
+            both = {places[k][0]: (places[k][1], sizes) for k, sizes in zip(pair[:2], pair.sizes, strict=True)}
+            if len(both) > 1 and all(self._is_within(n, sizes) for n, (_, sizes) in both.items()):
+                starts = ({**tried, **self._sized(n, sizes)} for n, (tried, sizes) in both.items())
+                out.setdefault(tuple(sorted(both)), dict(ChainMap(*starts)))
             if len(out) == count:
                 break
         return out
