@@ -139,7 +139,8 @@ def _quantities_or_trials(proposals: Sequence[Proposal]) -> tuple[str, ...]:
 
     They hold one column without a name next to the same times, and their names differ by more than a number.
     """
-    times = [[one.recording.columns[n] for n in one.candidates.get("time_s", ())[:1]] for one in proposals]
+    clocks = [(one.recording.columns, one.candidates.get("time_s", ())[:1]) for one in proposals]
+    times = [[columns[n] for n in clock if n in columns] for columns, clock in clocks]  # texts are no columns
     words = {re.sub(r"\d+", "", one.recording.path.stem) for one in proposals}
     is_bare = all(one.form and not one.form.header_row and len(one.recording.columns) == 2 for one in proposals)
     if len(words) < 2 or not is_bare or not all(times) or any(not np.array_equal(t, times[0]) for t in times):

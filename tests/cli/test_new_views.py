@@ -63,6 +63,21 @@ def test_files_without_names_at_the_same_times_are_doubted(names, is_said, monke
     assert ("where they are quantities of one trial, say --source NAME=FILE of each" in said) == is_said
 
 
+def test_a_time_beyond_every_number_is_rejected_in_one_line(monkeypatch, capsys, tmp_path):
+    times = [f"{10 * k}" if k != 7 else "1e400" for k in range(40)]
+    path = tmp_path / "a.csv"
+    path.write_text("t,position\nms,rad\n" + "".join(f"{t},{k % 5}\n" for k, t in enumerate(times)))
+    assert "a.csv" in fails(monkeypatch, capsys, "new-study", path, *ROD)
+
+
+def test_a_check_of_readings_whose_squares_are_beyond_every_number_says_so(monkeypatch, capsys, tmp_path):
+    reading = np.where(np.arange(len(TIME)) % 2 == 0, 9.999e299, np.sin(TIME))
+    path = write(tmp_path / "a.csv", time_s=TIME, position=np.where(TIME < 3.0, reading, np.sin(TIME)))
+    assert run(monkeypatch, "new-study", path, "--slide", "1", "--out", tmp_path / "s") == 0
+    assert run(monkeypatch, "check", tmp_path / "s") == 0
+    assert "cannot be fitted" in " ".join(capsys.readouterr().out.split())
+
+
 def test_a_source_is_named_by_the_end_of_its_path(monkeypatch, tmp_path):
     angle = write(tmp_path / "one/angle.csv", time_s=TIME, position=swing(TIME))
     volts = write(tmp_path / "one/volts.csv", time_s=TIME, effort=np.sin(3.0 * TIME))
