@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -69,7 +68,6 @@ def predict(
     from fes_pin.data.table import check_table, table_bytes
     from fes_pin.diagnosis.replay import trial_table
     from fes_pin.identify.stored import load_log, load_random
-    from fes_pin.models.predict import predicted_trial
     from fes_pin.models.store import load_model
     from fes_pin.prepare.measured import check_study
 
@@ -89,8 +87,7 @@ def predict(
     with _of_file(model), _by_option(pairs("--set", setting)):
         odd = check_study(ToPredict(measured, schema, loaded.rig.constants, trial), loaded)
         given = [load_log(model).applied(one) for one in measured]
-        ahead = partial(_along, model, loaded, horizon_s=horizon) if horizon is not None else None
-        found = [ahead(one) if ahead else predicted_trial(loaded, one) for one in given]
+        found = [_predicted(model, loaded, one, horizon) for one in given]
     errors = _errors(loaded, load_random(model), given, found, horizon)
     if (residuals or out is None) and not errors:
         columns = " or ".join(dict.fromkeys(n for one in found for n in one.columns))
@@ -178,12 +175,15 @@ def _of_file(model: Path) -> Iterator[None]:
         raise
 
 
-def _along(path: Path, model: Model, trial: Trial, horizon_s: float) -> Trial:
-    """A trial's outputs predicted from what was measured so long before."""
+def _predicted(path: Path, model: Model, trial: Trial, horizon_s: float | None) -> Trial:
+    """A trial's outputs, simulated, or predicted from what was measured so long before."""
     from fes_pin.data.trial import derived_trial
     from fes_pin.identify.ahead import predict_ahead
     from fes_pin.identify.stored import load_random
+    from fes_pin.models.predict import predicted_trial
 
+    if horizon_s is None:
+        return predicted_trial(model, trial)
     random = load_random(path)
     if random is None:
         message = "expected a table [random], as diagnose writes it: --horizon needs to know the noise"

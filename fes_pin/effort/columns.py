@@ -16,6 +16,7 @@ import numpy as np
 
 from fes_pin.effort.motion import Motion, noise_of_speed
 from fes_pin.models.effects.coulomb_friction import STATED
+from fes_pin.models.effects.parallel_stiffness import ParallelStiffness
 from fes_pin.models.rigs.joint import Joint
 
 Values = Mapping[str, float]
@@ -342,7 +343,7 @@ def _torques(s: Sizes) -> list[CauseOfEffort]:
             None,
             {"stiffness_nm_per_rad": POSITIVE},
             rests,
-            {"rest_angle_rad": (s.low - reach, s.high + reach)},
+            dict(ParallelStiffness().limits({"position": np.array([s.low, s.high])})),
             [hardens],
         ),
         CauseOfEffort("joint_stop", joint_stop, None, {"stiffness": POSITIVE}, stops, {"angle_rad": (s.low, s.high)}),

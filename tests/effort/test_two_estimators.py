@@ -13,7 +13,7 @@ from harness.voluntary import Voluntary
 
 import fes_pin as fp
 from fes_pin.data.errors import InputError
-from fes_pin.diagnosis import by_effort
+from fes_pin.diagnosis import by_effort, likelihood_models
 from fes_pin.diagnosis.by_effort import ValuesOfInverseDynamics, named_by_one
 from fes_pin.diagnosis.likelihood_models import LikelihoodModels, LikelihoodSearch
 from fes_pin.diagnosis.verdict import RigVerdict
@@ -132,6 +132,18 @@ def test_two_sets_are_compared_by_their_own_fits_without_each_fold(tmp_path):
         errors = verdict.errors_in(state, verdict.currencies[0], state)
         error[names] = errors.squares.sum() / errors.spread.sum()
     assert error[right] < 0.5 * error[wrong]
+
+
+def test_a_fit_in_its_best_form_is_asked_for_a_better_one_once(tmp_path, monkeypatch):
+    asked, original = [], likelihood_models.refined_form
+    monkeypatch.setattr(likelihood_models, "refined_form", lambda *given: asked.append(given) or original(*given))
+    shown = arm(tmp_path)
+    models = LikelihoodModels(nominal_model(shown), shown.trials, [EffortOffset])
+    models.nominal()
+    models.extend(())
+    (fitted,) = (f for names, f in models.fits.items() if names)
+    assert [models.better_form(fitted) for _ in range(3)] == [None] * 3
+    assert len(asked) == 1
 
 
 def test_a_thorough_search_has_no_set_to_begin_with(tmp_path, monkeypatch):

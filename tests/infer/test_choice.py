@@ -261,6 +261,8 @@ SURE, UNSURE = np.full(12, 1.0), np.tile([-40.0, 60.0], 6)
         (0.0 * SURE, -50.0 * SURE, "", True, False),  # the larger set predicts effort better
         (50.0 * SURE, 0.0 * SURE, "a", False, True),  # the same set: worse in none
         (50.0 * SURE, -50.0 * SURE, "a", False, False),
+        (0.0 * SURE, 50.0 * SURE, "b", False, True),  # another cause in its place: worse in none
+        (-SURE, 50.0 * SURE, "b", False, False),
     ],
 )
 def test_the_other_answers_by_every_currency(motion, effort, names, prefers_smaller, answers):
