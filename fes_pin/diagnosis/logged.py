@@ -18,10 +18,17 @@ from fes_pin.identify.effort_timing import (
     words_of_lateness,
 )
 from fes_pin.identify.likelihood import LikelihoodProblem, is_simulated
-from fes_pin.identify.likelihood_fit import LikelihoodFit, at_noise, maximum_from, with_white_process_noise
+from fes_pin.identify.likelihood_fit import (
+    LikelihoodFit,
+    at_noise,
+    maximum_from,
+    refit,
+    with_white_process_noise,
+)
 from fes_pin.identify.recording import low_pass_of, words_of_low_pass
 from fes_pin.infer.corrected import Correction
 from fes_pin.infer.levels import PARAMETER_PENALTY
+from fes_pin.prepare.long_records import in_parts
 
 Fault = LogFault[LikelihoodFit]
 
@@ -121,12 +128,21 @@ def with_timing_of(log: Log, timed: Log) -> Log:
 def comparable(one: LikelihoodFit, other: LikelihoodFit) -> tuple[LikelihoodFit, LikelihoodFit]:
     """Return two fits of the same readings under noise of the same kind.
 
-    Measurement noise has the longer correlation time, and process noise is white if that of one is. Free simulations
-    have the autoregressive noise that their own residuals support.
+    Trials are cut into parts if those of one are: in a corrected record a controller may no longer answer. Measurement
+    noise has the longer correlation time, and process noise is white if that of one is. Free simulations have the
+    autoregressive noise that their own residuals support.
     """
+    one, other = _in_parts_as(one, other), _in_parts_as(other, one)
     correlation_s = max(one.noise.correlation_s, other.noise.correlation_s)
     timed = bool(one.noise.timed or other.noise.timed)
     return _as_random(one, correlation_s, timed), _as_random(other, correlation_s, timed)
+
+
+def _in_parts_as(fitted: LikelihoodFit, other: LikelihoodFit) -> LikelihoodFit:
+    """Return a fit, again to its trials in parts where those of another fit of these are in more parts."""
+    if len(fitted.trials) >= len(other.trials):
+        return fitted
+    return refit(fitted, in_parts(fitted.model.rig, fitted.trials))
 
 
 def _as_random(fitted: LikelihoodFit, correlation_s: float, timed: bool) -> LikelihoodFit:

@@ -10,8 +10,12 @@ from models.cases import RIGS
 from fes_pin.data.study import read_study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.diagnosis import diagnose_joint
+from fes_pin.diagnosis.logged import comparable
+from fes_pin.infer.corrected import lead_of
 from fes_pin.infer.result import CROSS_VALIDATED
+from fes_pin.models.nominal import nominal_model
 from fes_pin.prepare.long_records import SHORTEST_S, in_parts
+from fes_pin.search.likelihood_fits import LikelihoodFits
 
 DT = 0.01
 
@@ -50,6 +54,19 @@ def test_a_trial_that_no_controller_answers_is_not_cut():
 def test_a_rig_that_begins_at_rest_is_not_cut():
     whole = trial(20.0, kind="isometric")
     assert in_parts(RIGS["muscle"], [whole]) == [whole]
+
+
+def test_answers_of_a_whole_trial_and_of_its_parts_are_compared_in_parts(tmp_path):
+    """No controller may answer in a corrected record: its trial is whole then, and that of the record in four parts."""
+    study = read_study(draw((), 0.3, 33, tmp_path).study)
+    longest, nominal = max(study.trials, key=len), nominal_model(study)
+    parts = in_parts(nominal.rig, [longest])
+    whole, cut = (LikelihoodFits(nominal, trials, ()).nominal() for trials in ([longest], parts))
+    assert len(whole.parts) == 1 < len(cut.parts)
+    for pair in (comparable(whole, cut), comparable(cut, whole)):
+        assert [[len(p.residual) for p in one.parts] for one in pair] == [[len(p.residual) for p in cut.parts]] * 2
+        lead, least = lead_of(*pair)
+        assert abs(lead) < least
 
 
 def test_a_single_trial_bears_out_its_cause(tmp_path):
