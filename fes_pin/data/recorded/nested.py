@@ -2,7 +2,6 @@
 
 import math
 import re
-import warnings
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
@@ -14,7 +13,7 @@ import numpy as np
 from fes_pin.data.errors import MOST_LISTED, InputError, listed
 from fes_pin.data.files import read_bytes, read_json, read_json_lines
 from fes_pin.data.recorded.elements import elements_in, of_one_length, units_in
-from fes_pin.data.recorded.libraries import library, made, reading
+from fes_pin.data.recorded.libraries import library, made, read_apart, reading
 from fes_pin.data.recorded.matlab_exports import with_names
 from fes_pin.data.table import MIN_ROWS, Table
 
@@ -95,11 +94,11 @@ def elements_of(path: Path) -> tuple[str, ...]:
 
 def _matlab(path: Path) -> tuple[Any, bool]:
     """What a MATLAB file holds, and whether it holds objects of a class as well."""
-    reader = library("pymatreader", "matlab", path)
-    with reading(path, "a MATLAB file"), warnings.catch_warnings(record=True) as objects:
-        warnings.simplefilter("always")
-        content = {key: one for key, one in reader.read_mat(str(path)).items() if not str(key).startswith("#")}
-    return _in_order(content) if HDF5 in read_bytes(path)[:1024] else content, bool(objects)
+    library("pymatreader", "matlab", path)
+    with reading(path, "a MATLAB file"):
+        found, warned = read_apart("pymatreader", "read_mat", path)
+    content = {key: one for key, one in found.items() if not str(key).startswith("#")}
+    return _in_order(content) if HDF5 in read_bytes(path)[:1024] else content, warned > 0
 
 
 def _in_order(content: Any) -> Any:
