@@ -50,10 +50,10 @@ def begun_by_effort(models: LikelihoodModels, trials: Sequence[Trial], thorough:
 class VerdictByEffort(RigVerdict):
     """The verdict on a set that inverse dynamics found: what its efforts do not distinguish is equivalent too."""
 
-    def alike(self, found: Found, name: str) -> tuple[str, ...]:
+    def alike(self, state: RigState, name: str) -> tuple[str, ...]:
         """Return a cause and its equivalents."""
-        by_effort, known = self.models.by_effort, super().alike(found, name)
-        rest, near = {*found.best.names} - {name}, [f.names for f in by_effort.alike] if by_effort else []
+        by_effort, known = self.models.by_effort, super().alike(state, name)
+        rest, near = state.names - {name}, [f.names for f in by_effort.alike] if by_effort else []
         more = {n for names in near if rest < {*names} for n in {*names} - rest}
         return name, *sorted({*known, *more} - {name})
 
@@ -189,7 +189,7 @@ def named_by_one(first: RigState, answer: RigState) -> list[str]:
         return [f"efforts name no cause: {models.refusal}"] * bool(models.refusal)
     verdict = answer.verdict
     assert isinstance(verdict, RigVerdict)
-    alike = {n: {*verdict.alike(answer.found, n)} for n in answer.names}
+    alike = {n: {*verdict.alike(answer, n)} for n in answer.names}
     by_motion, by_efforts = {*first.names}, {n for one in by_effort.alike for n in one.names}
     words = []
     for name in sorted({*first.names, *by_effort.names, *answer.names} & {*by_effort.models.library}):

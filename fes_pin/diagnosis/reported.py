@@ -53,8 +53,8 @@ def diagnosis_of(
     state, said = never_worse(chosen)
     verdict, found = state.verdict, state.found
     assert isinstance(verdict, RigVerdict)
-    left, best = verdict.lack_of_fit(state), _with_intervals(state, white.fit if chosen is first else first.found.best)
-    best = search.models.as_wide_as_efforts(best)
+    other = white.fit if chosen.verdict is first.verdict else first.found.best
+    left, best = verdict.lack_of_fit(state), search.models.as_wide_as_efforts(_with_intervals(state, other))
     fitted, *others = verdict.errors(state)
     held = others[0] if others else None
     on = HELD_OUT if trials[1] else CROSS_VALIDATED if held else FITTED
@@ -160,7 +160,7 @@ def _cause(verdict: RigVerdict, state: RigState, one: Effect, best: LikelihoodFi
     """
     fitted, on = judged
     found, name, evidence = state.found, one.name, verdict.evidence(state)[one.name]
-    alike = verdict.alike(found, name)
+    alike = verdict.alike(state, name)
     return Cause(
         name=name,
         sentence=fitted_sentence(one, best.model.rig),

@@ -173,11 +173,12 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
 
     def is_rarely_chosen(self, state: RigState, name: str) -> bool:
         """Return whether most folds choose neither a cause nor one of its equivalents."""
-        return not is_chosen(share_of(self.chosen(state), self.alike(state.found, name)))
+        return not is_chosen(share_of(self.chosen(state), self.alike(state, name)))
 
-    def alike(self, found: Found, name: str) -> tuple[str, ...]:
+    def alike(self, state: RigState, name: str) -> tuple[str, ...]:
         """Return a cause and its equivalents."""
-        return self.models.alike(found, name)
+        known = self.models.alike(state.found, name)
+        return name, *sorted({*known[1:], *filter(None, [state.tied.get(name)])})
 
     @property
     def ahead(self) -> dict[str, float | None]:

@@ -88,6 +88,9 @@ def choose(first: AnyState, others: Sequence[Estimator], seed: int = 0) -> AnySt
     in each other currency too: a cause that lessens the error of one alone is an error of form. Noise is not
     subtracted: each estimator has its own, and that of a wrong model is large. Data that the study itself holds out are
     not used: gains on them would be optimistic.
+
+    Where neither predicts better, and the other has one cause in the place of another, the data do not distinguish the
+    two: they are equivalents in the state of the first.
     """
     for estimator in others:
         other = estimator.state(first)
@@ -101,7 +104,19 @@ def choose(first: AnyState, others: Sequence[Estimator], seed: int = 0) -> AnySt
             said = "predicts better" if better else "predicts as well with fewer causes"
             words = f"{estimator.words(other)} {said}: {'; '.join(map(str, compared))}"
             return replace(other, steps=(*first.steps, *other.steps, Step(CHOICE, words=words)))
+        is_worse = any(c.is_worse for c in compared) and not any(c.is_better for c in compared)
+        if compared and not is_worse:
+            first = _tied(first, other, f"{estimator.words(other)}: {'; '.join(map(str, compared))}")
     return first
+
+
+def _tied(first: AnyState, other: AnyState, compared: str) -> AnyState:
+    """Return a state in which the cause that another has in the place of one of its own is an equivalent of that."""
+    mine, theirs = sorted(first.names - other.names), sorted(other.names - first.names)
+    if not len(mine) == len(theirs) == 1:
+        return first
+    said = Step(CHOICE, words=f"{theirs[0]} in the place of {mine[0]} predicts neither better nor worse by {compared}")
+    return replace(first, tied={**first.tied, mine[0]: theirs[0]}, steps=(*first.steps, said))
 
 
 def _compared(first: AnyState, other: AnyState, seed: int) -> list[Compared]:

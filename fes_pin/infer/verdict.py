@@ -158,6 +158,8 @@ class State(Generic[F, M, W]):
         The claims that changed the state, in their order.
     replaced
         The state of another estimator of the same data that this one replaces; None if no estimator was replaced.
+    tied
+        By candidate, that which another estimator has in its place, where neither predicts better.
     """
 
     verdict: Verdict[F, M, W]
@@ -167,6 +169,7 @@ class State(Generic[F, M, W]):
     settled: frozenset[str]
     steps: tuple[Step, ...] = ()
     replaced: State[Any, Any, Any] | None = None
+    tied: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def search(self) -> Search[F, M]:

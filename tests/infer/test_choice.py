@@ -1,6 +1,6 @@
 """A second estimator of the same data: fits of its own type, judged by errors alone, candidates at two sites."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 import numpy as np
@@ -219,6 +219,7 @@ class Stated:
     names: frozenset
     errors: dict
     steps: tuple = ()
+    tied: dict = field(default_factory=dict)
 
     @property
     def verdict(self):
@@ -272,7 +273,31 @@ def test_the_other_answers_by_every_currency(motion, effort, names, prefers_smal
     other = Stated(frozenset(names), {"motion": hundred - motion, "effort": hundred - effort})
     chosen = choose(first, [Known(other, prefers_smaller)])
     assert (chosen.errors is other.errors) is answers
-    assert bool(chosen.steps) is answers
+    assert bool(chosen.steps) is (answers or bool(chosen.tied))
+
+
+@pytest.mark.parametrize(
+    ("motion", "effort", "names", "tied"),
+    [
+        (-5.0 * SURE, 50.0 * SURE, "b", {"a": "b"}),  # each predicts better in one currency
+        (0.0 * SURE, 0.0 * SURE, "b", {"a": "b"}),  # neither does in any
+        (0.0 * SURE, UNSURE, "b", {"a": "b"}),
+        (-5.0 * SURE, 0.0 * SURE, "b", {}),  # the first predicts better
+        (0.0 * SURE, 50.0 * SURE, "b", None),  # the other does, and answers
+        (-5.0 * SURE, 50.0 * SURE, "a", {}),  # the same set
+        (0.0 * SURE, 0.0 * SURE, "bc", {}),  # the smaller set answers
+    ],
+)
+def test_two_causes_are_equivalents_where_neither_estimator_predicts_better(motion, effort, names, tied):
+    hundred = np.full(12, 100.0)
+    first = Stated(frozenset("a"), {"motion": hundred, "effort": hundred})
+    other = Stated(frozenset(names), {"motion": hundred - motion, "effort": hundred - effort})
+    chosen = choose(first, [Known(other, False)])
+    if tied is None:
+        assert chosen.names == other.names and not chosen.tied
+        return
+    assert chosen.names == first.names and chosen.tied == tied
+    assert ["predicts neither better nor worse" in str(s) for s in chosen.steps] == [True] * len(tied)
 
 
 def test_a_currency_without_errors_of_both_is_not_compared():
