@@ -24,7 +24,7 @@ from fes_pin.identify.likelihood import is_simulated
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.estimators import choose
 from fes_pin.infer.result import CROSS_VALIDATED, FITTED, HELD_OUT, STOPPED, Cause, Gain, ParameterEstimate, Remainder
-from fes_pin.infer.scatter import as_wide_as_estimates_differ, as_wide_as_trials_differ, with_honest_intervals
+from fes_pin.infer.scatter import as_wide_as_estimates_differ, with_honest_intervals
 from fes_pin.infer.verdict import ADEQUATE, Rejected, word_of
 from fes_pin.infer.why import why_of
 from fes_pin.models.describe import fitted_equation, fitted_sentence
@@ -106,16 +106,14 @@ def _seen(models: LikelihoodModels, nominal: LikelihoodFit, verdict: str) -> dic
 
 
 def _with_intervals(state: RigState, other: LikelihoodFit | None) -> LikelihoodFit:
-    """Return the fit of a set with intervals that include the differences between folds, and between two estimators.
+    """Return the fit of a set with its intervals, which include the differences between two estimators.
 
     Parameters
     ----------
     other
         Fit by another estimator, which counts if it is of the same set; None without one.
     """
-    again = [f.best for f in state.weighed.folds if f.within]
-    assert isinstance(state.verdict, RigVerdict)
-    best = as_wide_as_trials_differ(state.verdict.with_intervals(state.found.best), again)
+    best = state.verdict.estimated(state)
     if other is None or other.names != best.names:
         return best
     return as_wide_as_estimates_differ(best, with_honest_intervals(other))

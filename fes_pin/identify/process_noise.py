@@ -28,8 +28,8 @@ FIRST_TIME_S = 0.1
 SMALLEST = 1e-6
 """Smallest process noise, as a share of the driving effort or of a reading's range: it counts as none."""
 SLOWEST = 0.1
-"""Longest time constant of a random process, as a share of the longest trial: a process that changes fewer than ten
-times in a trial could not be distinguished from an offset."""
+"""Longest time constant of a random process, as a share of all trials together: a process that changes fewer than ten
+times in them could not be distinguished from an offset. It is at most the longest trial."""
 
 
 def spread_of_start(model: Model, trial: Trial) -> dict[str, float]:
@@ -84,7 +84,8 @@ def without_memory(noise: StateSpaceNoise, trials: Sequence[Trial]) -> StateSpac
 
 def noise_limits(model: Model, trials: Sequence[Trial], correlation_s: float = 0.0) -> dict[str, tuple[float, float]]:
     """Return bounds of every parameter of the noise, by name."""
-    step, longest = max(t.dt for t in trials), max(t.duration for t in trials)
+    step, durations = max(t.dt for t in trials), [t.duration for t in trials]
+    slowest = max(min(SLOWEST * sum(durations), max(durations)), 2.0 * step)
     out: dict[str, tuple[float, float]] = {}
     for name, noise in rough_noise(model, trials, correlation_s).items():
         values = np.concatenate([t[name] for t in trials if name in t.columns])
@@ -94,5 +95,5 @@ def noise_limits(model: Model, trials: Sequence[Trial], correlation_s: float = 0
     for name, size in driving_size(model, trials).items():
         out[f"std.{name}"] = (SMALLEST * size, 10.0 * size)
     for name in ("effort", "force", "reading"):
-        out[f"time.{name}"] = (step, max(SLOWEST * longest, 2.0 * step))
+        out[f"time.{name}"] = (step, slowest)
     return out

@@ -202,6 +202,10 @@ class Verdict(ABC, Generic[F, M, W]):
         """Return the lack of fit of a set, in view of the rejected candidates and of the estimator replaced."""
         return state.weighed.lack_of_fit
 
+    def estimated(self, state: State[F, M, W]) -> F:
+        """Return the fit of a set with the intervals of its estimates."""
+        return state.found.best
+
     def evidence(self, state: State[F, M, W]) -> dict[str, Evidence | None]:
         """Return the evidence for each claim; None where a lack of fit leaves it to errors of held-out data.
 
@@ -335,8 +339,8 @@ class Verdict(ABC, Generic[F, M, W]):
         return self._without_weakest(state, list(state.weighed.gains) if is_none else [])
 
     def drop_uncertain(self, state: State[F, M, W]) -> State[F, M, W] | None:
-        """Reject the weakest of the candidates whose size is not certain."""
-        sets, best = state.search.sets, state.found.best
+        """Reject the weakest of the candidates whose size is not certain, by the intervals of the answer."""
+        sets, best = state.search.sets, self.estimated(state)
         return self._without_weakest(state, [n for n in state.weighed.gains if not sets.is_certain(best, n)])
 
     def _without_weakest(self, state: State[F, M, W], some: Sequence[str]) -> State[F, M, W] | None:
