@@ -134,10 +134,14 @@ class Bench:
     def _accelerates(self, drive: np.ndarray, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         b, x = self.base, self.hidden
         torque = drive - b.damping * v - b.weight * np.sin(q) + x.get("effort_offset", 0.0)
-        torque = torque - x.get("parallel_stiffness", 0.0) * (q - x.get("rest", 0.0))
-        torque = torque - x.get("quadratic_damping", 0.0) * v * np.abs(v)
-        torque = torque - x.get("joint_stop", 0.0) * np.maximum(q - x.get("at", 0.0), 0.0)
-        torque = torque - x.get("cogging", 0.0) * np.sin(x.get("waves", 0.0) * q)
+        if size := x.get("parallel_stiffness"):
+            torque -= size * (q - x["rest"])
+        if size := x.get("quadratic_damping"):
+            torque -= size * v * np.abs(v)
+        if size := x.get("joint_stop"):
+            torque -= size * np.maximum(q - x["at"], 0.0)
+        if size := x.get("cogging"):
+            torque -= size * np.sin(x["waves"] * q)
         return torque / b.inertia
 
 

@@ -104,7 +104,7 @@ class NoForm(Bench):
     def _step(
         self, drive: np.ndarray, q: np.ndarray, v: np.ndarray, bristles: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        h, x = self.dt / max(1, round(self.dt / FINE_S)), np.stack([q, v, bristles])
+        h, x = self.dt / max(1, round(self.dt / FINE_S)), np.array([q, v, bristles])
         first = self._rates(drive, x)
         second = self._rates(drive, x + 0.5 * h * first)
         third = self._rates(drive, x + 0.75 * h * second)
@@ -116,7 +116,7 @@ class NoForm(Bench):
         q, v, z = state
         torque, bends = self._hides(drive, q, v, z)
         torque = torque + drive - self.base.damping * v - self.base.weight * np.sin(q)
-        return np.stack([v, torque / self.base.inertia, bends])
+        return np.array([v, torque / self.base.inertia, bends])
 
     def _hides(self, drive: np.ndarray, q: np.ndarray, v: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Torque of what is hidden, and the rate of its memory."""
