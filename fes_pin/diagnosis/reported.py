@@ -24,7 +24,6 @@ from fes_pin.identify.likelihood import is_simulated
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.estimators import choose
 from fes_pin.infer.result import CROSS_VALIDATED, FITTED, HELD_OUT, STOPPED, Cause, Gain, ParameterEstimate, Remainder
-from fes_pin.infer.scatter import as_wide_as_estimates_differ, with_honest_intervals
 from fes_pin.infer.verdict import ADEQUATE, Rejected, word_of
 from fes_pin.infer.why import why_of
 from fes_pin.models.describe import fitted_equation, fitted_sentence
@@ -51,10 +50,11 @@ def diagnosis_of(
     estimators = (InverseDynamics(), ValuesOfInverseDynamics(), white, LeastSquares())
     chosen: RigState = choose(first, estimators, search.models.seed)
     state, said = never_worse(chosen)
-    verdict, found = state.verdict, state.found
+    verdict = state.verdict
     assert isinstance(verdict, RigVerdict)
     other = white.fit if chosen.verdict is first.verdict else first.found.best
-    left, best = verdict.lack_of_fit(state), search.models.as_wide_as_efforts(_with_intervals(state, other))
+    state = verdict.certain(replace(state, beside=other))
+    found, left, best = state.found, verdict.lack_of_fit(state), verdict.estimated(state)
     fitted, *others = verdict.errors(state)
     held = others[0] if others else None
     on = HELD_OUT if trials[1] else CROSS_VALIDATED if held else FITTED
@@ -103,20 +103,6 @@ def _seen(models: LikelihoodModels, nominal: LikelihoodFit, verdict: str) -> dic
     if verdict != ADEQUATE:
         return {}
     return seen_sizes(nominal, models.library.scores(nominal), models.family.tests)
-
-
-def _with_intervals(state: RigState, other: LikelihoodFit | None) -> LikelihoodFit:
-    """Return the fit of a set with its intervals, which include the differences between two estimators.
-
-    Parameters
-    ----------
-    other
-        Fit by another estimator, which counts if it is of the same set; None without one.
-    """
-    best = state.verdict.estimated(state)
-    if other is None or other.names != best.names:
-        return best
-    return as_wide_as_estimates_differ(best, with_honest_intervals(other))
 
 
 def _words_of_far(models: LikelihoodFits, nominal: LikelihoodFit) -> list[str]:
