@@ -30,6 +30,8 @@ LONGEST_MUSCLE_M = 1.0
 """Length in m that no muscle with its tendon has: the longest, sartorius, comes to about half a metre."""
 TOGETHER = ({"pulse_width_us", "amplitude_ma", "frequency_hz"}, {"charge_uc", "frequency_hz"})
 """Stimuli that one trial may hold together."""
+BEYOND = 1e100
+"""Nothing is measured that is this large in any unit; sums of its squares are numbers no more."""
 LARGEST = {"amplitude_ma": 500.0, "charge_uc": 1e4, "frequency_hz": 1e4, "emg_envelope": 10.0}
 """What no stimulator gives: of surface stimulators 150 mA is the most; a larger amplitude is in uA."""
 SHORTEST_PULSE_US = 2.0
@@ -202,7 +204,11 @@ def _check_lengths(length: np.ndarray, error: Fault) -> None:
 
 
 def _check_sizes(columns: Mapping[str, np.ndarray], error: Fault) -> None:
-    """Refuse amplitudes, charges and rates that no stimulator gives."""
+    """Refuse amplitudes, charges and rates that no stimulator gives, and what nothing measures."""
+    for name, values in columns.items():
+        if (beyond := np.abs(values) >= BEYOND).any():
+            sample = int(np.argmax(beyond))
+            raise error(f"expected a number below {BEYOND:g}, found {values[sample]:g}", name, sample)
     for name, limit in LARGEST.items():
         if name in columns and ((columns[name] < 0.0) | (columns[name] > limit)).any():
             sample = int(np.argmax((columns[name] < 0.0) | (columns[name] > limit)))

@@ -16,6 +16,7 @@ from fes_pin.diagnosis.held_out import Again
 from fes_pin.diagnosis.likelihood_models import Found, LikelihoodModels, LikelihoodSearch
 from fes_pin.diagnosis.verdict import RigState, RigVerdict
 from fes_pin.effort.search import NOT_CARRIED, has_efforts, searched
+from fes_pin.identify.correlation_time import words_of_reading
 from fes_pin.identify.likelihood_fit import LikelihoodFit, at_values, refit
 from fes_pin.infer.estimators import AnyState, Estimator
 from fes_pin.infer.scatter import as_wide_as
@@ -137,10 +138,15 @@ class ValuesOfInverseDynamics(InverseDynamics):
     """
 
     def state(self, first: RigState) -> RigState | None:
-        """Return the state of its set at its own values; None where the set does not hold all causes of the first."""
+        """Return the state of its set at its own values.
+
+        None where the set does not hold all causes of the first, or where every sample enters the likelihood.
+        """
         search, by_effort = first.search, first.search.models.by_effort
         if by_effort is None or search.was_stopped or not first.names < {*(names := by_effort.names)}:
             return None
+        if not words_of_reading(first.found.best.noise, first.found.best.model.rig, search.models.trials):
+            return None  # every sample enters the likelihood
         if names not in search.models.fits or not search.models.is_possible(search.models.fits[names]):
             return None
         assert isinstance(first.verdict, RigVerdict)

@@ -75,7 +75,7 @@ def testable_causes(study: Study, catalogue: Catalogue | None = None) -> Testabl
     """
     nominal, trials = _to_fit(study)
     effects = (catalogue or installed()).effects_for(nominal.rig)
-    with one_thread_each(), np.errstate(over="ignore", invalid="ignore"):  # what is not finite is said
+    with one_thread_each():
         try:
             fitted = rough_fit(nominal, trials)
             if not math.isfinite(fitted.sse):
@@ -84,7 +84,6 @@ def testable_causes(study: Study, catalogue: Catalogue | None = None) -> Testabl
             white = replace(first_guess(nominal, trials), std={}, time={})
             scores = library.scores(at_noise(fitted, white))
             warnings = [*_reversed(nominal, trials, fitted), *_shifted(nominal, trials, fitted)]
-            unexplained = _unexplained(fitted)
         except (ArithmeticError, np.linalg.LinAlgError) as problem:
             return f"the nominal model cannot be fitted ({problem})"
     kept = {n: max(one.kept for one in many) for n, many in best_by_effect(scores.scored).items()}
@@ -93,7 +92,7 @@ def testable_causes(study: Study, catalogue: Catalogue | None = None) -> Testabl
         absorbed=tuple(sorted(n for n, k in kept.items() if k < IDENTIFIABLE_SHARE)),
         silent=library.not_excited(),
         alike=_alike(scores, kept),
-        unexplained=unexplained,
+        unexplained=_unexplained(fitted),
         warnings=tuple(warnings),
     )
 

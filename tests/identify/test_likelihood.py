@@ -8,7 +8,7 @@ from fes_pin.identify.ahead import one_step, over_horizon
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import maximise
 from fes_pin.identify.per_trial import falls
-from fes_pin.identify.process_noise import driving_size, first_guess
+from fes_pin.identify.process_noise import driving_size, first_guess, noise_limits
 from fes_pin.infer.problem import whitened_sse
 from fes_pin.models.effects.coulomb_friction import CoulombFriction
 from fes_pin.models.effects.sensor_gain import SensorGain
@@ -68,6 +68,17 @@ def test_the_rig_and_what_is_random_are_found(fitted):
     assert fitted.noise.std["effort"] == pytest.approx(0.06, rel=0.25)
     assert fitted.noise.time["effort"] == pytest.approx(0.1, rel=0.5)
     assert fitted.noise.white["position"] == pytest.approx(4e-4, rel=0.05)
+
+
+def test_what_is_random_may_change_as_seldom_as_all_trials_together_tell():
+    """A process that one trial could not distinguish from an offset is found from five; its bound was that of one."""
+    trials = [held(k, 0.06, tau=2.0) for k in range(5)]
+    fitted = maximise(LikelihoodProblem(believed(), trials, first_guess(believed(), trials)))
+    assert fitted.noise.time["effort"] == pytest.approx(2.0, rel=0.5)
+    assert fitted.noise.std["effort"] == pytest.approx(0.06, rel=0.3)
+    slowest = [noise_limits(believed(), trials[:k])["time.effort"][1] for k in (1, 5)]
+    assert slowest == pytest.approx([0.1 * trials[0].duration, 0.5 * trials[0].duration])
+    assert noise_limits(believed(), 4 * trials)["time.effort"][1] == pytest.approx(trials[0].duration)
 
 
 def test_gains_as_they_are_lead_to_the_maximum_of_the_whole_likelihood(fitted):
