@@ -7,11 +7,11 @@ from fes_pin.diagnosis.decide.by_prediction import FEWEST, best_predicting
 from fes_pin.diagnosis.errors_ahead import squared_errors
 from fes_pin.diagnosis.likelihood_models import Found, LikelihoodModels, LikelihoodSearch
 from fes_pin.diagnosis.verdict import RigState, RigVerdict
-from fes_pin.identify.likelihood_fit import LikelihoodFit, with_white_process_noise
-from fes_pin.identify.process_noise import step_s
+from fes_pin.identify.likelihood_fit import LikelihoodFit, with_slow_process_noise, with_white_process_noise
+from fes_pin.identify.process_noise import noise_limits, slowest_of_all, step_s
 from fes_pin.infer.estimators import Estimator
 from fes_pin.infer.held_out import held_out_gain
-from fes_pin.infer.levels import NOTHING_PERCENT
+from fes_pin.infer.levels import NOTHING_PERCENT, SMALL_SHARE
 from fes_pin.infer.search import Policy
 from fes_pin.search.approach import approach
 from fes_pin.search.likelihood_fits import MEASUREMENT
@@ -67,6 +67,33 @@ class LeastSquares(RigEstimator):
         return _ended(other, attempted(chosen, None, search.seconds_left))
 
 
+class SlowProcessNoise(RigEstimator):
+    """Process noise as slow as all trials together tell, for a rig whose process noise is slower than one trial tells.
+
+    A drift of the effort that differs from trial to trial is mistaken for a slow cause otherwise, as for a spring that
+    relaxes. No further cause is searched.
+    """
+
+    prefers_smaller = True
+
+    def words(self, state: RigState) -> str:
+        """Return how slow the process noise is, in words."""
+        slowest = max(state.found.best.noise.time.values())
+        return f"{super().words(state)} that changes within {slowest:.2g} s"
+
+    def searched(self, first: RigState) -> tuple[LikelihoodSearch, Found] | None:
+        """Return a search of the same causes, and its result; None where no process noise is as slow as it may be."""
+        found, search, models = first.found, first.search, first.search.models
+        if not found.without or not _is_slow(found.best):
+            return None
+        fits = [found.nominal, found.best, *found.without.values()]
+        slow = attempted(lambda: in_parallel(with_slow_process_noise, fits), None, search.seconds_left)
+        if slow is None:
+            return None
+        again = LikelihoodSearch(models.begun_with(slow), search.progress, Policy(given=found.best.names))
+        return _ended(again, attempted(again.run, None, search.seconds_left))
+
+
 class WhiteProcessNoise(RigEstimator):
     """White process noise, for a rig in closed loop on which coloured process noise acts.
 
@@ -109,6 +136,13 @@ def _parts_and_rivals(models: LikelihoodModels, found: Found) -> list[Likelihood
     parts |= {f.names: f for many in near for f in many}
     parts.pop(found.best.names, None)
     return in_parallel(with_white_process_noise, list(parts.values()))
+
+
+def _is_slow(fitted: LikelihoodFit) -> bool:
+    """Return whether a random process has the longest time constant of one trial, and all together tell a longer."""
+    noise, most = fitted.noise, noise_limits(fitted.model, fitted.trials, fitted.noise)
+    ends = [n for n in noise.acting if noise.time[n] > (1.0 - SMALL_SHARE) * most[f"time.{n}"][1]]
+    return any(slowest_of_all(fitted.trials) > noise.time[n] for n in ends)
 
 
 def _has_coloured_noise(fitted: LikelihoodFit) -> bool:

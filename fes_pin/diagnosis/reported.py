@@ -12,7 +12,7 @@ from fes_pin.diagnosis.by_effort import InverseDynamics, ValuesOfInverseDynamics
 from fes_pin.diagnosis.decide.chosen_again import share_of
 from fes_pin.diagnosis.decide.rivals import estimates, experiment, not_identifiable, ranking, seen_sizes
 from fes_pin.diagnosis.errors_ahead import AheadErrors, free_errors, noise_that_is_small
-from fes_pin.diagnosis.estimators import WHITE_PROCESS_NOISE, LeastSquares, WhiteProcessNoise
+from fes_pin.diagnosis.estimators import WHITE_PROCESS_NOISE, LeastSquares, SlowProcessNoise, WhiteProcessNoise
 from fes_pin.diagnosis.likelihood_models import Found, LikelihoodModels, LikelihoodSearch
 from fes_pin.diagnosis.rejected import UNMOVED
 from fes_pin.diagnosis.result import Diagnosis
@@ -24,6 +24,7 @@ from fes_pin.identify.likelihood import is_simulated
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.estimators import choose
 from fes_pin.infer.result import CROSS_VALIDATED, FITTED, HELD_OUT, STOPPED, Cause, Gain, ParameterEstimate, Remainder
+from fes_pin.infer.scatter import as_wide_as_estimates_differ, with_honest_intervals
 from fes_pin.infer.verdict import ADEQUATE, Rejected, word_of
 from fes_pin.infer.why import why_of
 from fes_pin.models.describe import fitted_equation, fitted_sentence
@@ -47,14 +48,13 @@ def diagnosis_of(
 ) -> Diagnosis:
     """Return the diagnosis of a rig from a search by the likelihood that has run."""
     first, white = RigVerdict(search, trials[1]).of(found), WhiteProcessNoise()
-    estimators = (InverseDynamics(), ValuesOfInverseDynamics(), white, LeastSquares())
+    estimators = (SlowProcessNoise(), InverseDynamics(), ValuesOfInverseDynamics(), white, LeastSquares())
     chosen: RigState = choose(first, estimators, search.models.seed)
     state, said = never_worse(chosen)
     verdict = state.verdict
     assert isinstance(verdict, RigVerdict)
     other = white.fit if chosen.verdict is first.verdict else first.found.best
-    state = verdict.certain(replace(state, beside=other))
-    found, left, best = state.found, verdict.lack_of_fit(state), verdict.estimated(state)
+    found, left, best = state.found, verdict.lack_of_fit(state), _with_intervals(state, other)
     fitted, *others = verdict.errors(state)
     held = others[0] if others else None
     on = HELD_OUT if trials[1] else CROSS_VALIDATED if held else FITTED
@@ -103,6 +103,20 @@ def _seen(models: LikelihoodModels, nominal: LikelihoodFit, verdict: str) -> dic
     if verdict != ADEQUATE:
         return {}
     return seen_sizes(nominal, models.library.scores(nominal), models.family.tests)
+
+
+def _with_intervals(state: RigState, other: LikelihoodFit | None) -> LikelihoodFit:
+    """Return the fit of a set with its intervals, which include the differences between estimators.
+
+    Parameters
+    ----------
+    other
+        Fit by another estimator, which counts if it is of the same set; None without one.
+    """
+    best = state.verdict.estimated(state)
+    if other is not None and other.names == best.names:
+        best = as_wide_as_estimates_differ(best, with_honest_intervals(other))
+    return state.search.models.as_wide_as_efforts(best)
 
 
 def _words_of_far(models: LikelihoodFits, nominal: LikelihoodFit) -> list[str]:

@@ -42,7 +42,7 @@ from fes_pin.infer.held_out import Errors
 from fes_pin.infer.levels import SMALL_SHARE
 from fes_pin.infer.noise import NoiseModel
 from fes_pin.infer.result import FITTED, Gain, Remainder
-from fes_pin.infer.scatter import as_wide_as_estimates_differ, as_wide_as_trials_differ, with_honest_intervals
+from fes_pin.infer.scatter import as_wide_as_trials_differ, with_honest_intervals
 from fes_pin.infer.text import WHOLE
 from fes_pin.infer.verdict import State, Verdict, Weighed
 from fes_pin.remainder.lack_of_fit import lack_of_fit
@@ -125,12 +125,9 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
         return with_honest_intervals(fitted)
 
     def estimated(self, state: RigState) -> LikelihoodFit:
-        """Return the fit of a set with intervals that include the differences between folds and between estimators."""
+        """Return the fit of a set with intervals that include the differences between folds."""
         again = [f.best for f in state.weighed.folds if f.within]
-        best, other = as_wide_as_trials_differ(self.with_intervals(state.found.best), again), state.beside
-        if other is not None and other.names == best.names:
-            best = as_wide_as_estimates_differ(best, with_honest_intervals(other))
-        return self.models.as_wide_as_efforts(best)
+        return as_wide_as_trials_differ(self.with_intervals(state.found.best), again)
 
     def _refuted_in_free_motion(self, found: Found) -> dict[str, float]:
         """Return the gain, percent, of causes with which free simulations of a driven joint are far worse.

@@ -102,7 +102,7 @@ class LikelihoodProblem(Problem, NoisyProblem):
     @property
     def noise_limits(self) -> dict[str, tuple[float, float]]:
         """Return bounds of these parameters."""
-        return noise_limits(self.model, self.trials, self.noise.correlation_s)
+        return noise_limits(self.model, self.trials, self.noise)
 
     def evaluate(self, points: Sequence[Point]) -> list[Evaluation]:
         """Return one-step predictions of all trials at each of several points."""

@@ -1,12 +1,12 @@
 """Fits by the likelihood of one-step predictions: parameters, with process and measurement noise."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit, ended
 from fes_pin.identify.likelihood import LikelihoodProblem, is_simulated
-from fes_pin.identify.process_noise import without_memory
+from fes_pin.identify.process_noise import slowest_of_all, without_memory
 from fes_pin.infer.levels import CLAIM_LEVEL, DRIVEN_LEVEL, PARAMETER_PENALTY
 from fes_pin.infer.maximise import ROUNDS, alternate, together
 from fes_pin.infer.optimum import Optimum, minimise
@@ -129,6 +129,12 @@ def problem_on(fitted: LikelihoodFit, trials: Sequence[Trial]) -> tuple[Likeliho
     known = {id(t): u for t, u in zip(fitted.trials, fitted.unknowns, strict=True)}
     problem = LikelihoodProblem(fitted.model, trials, fitted.noise)
     return problem, [known.get(id(t), u) for t, u in zip(trials, problem.start_unknowns(), strict=True)]
+
+
+def with_slow_process_noise(fitted: LikelihoodFit) -> LikelihoodFit:
+    """Fit the same model to the same trials with process noise as slow as all trials together tell."""
+    noise = replace(fitted.noise, slowest_s=slowest_of_all(fitted.trials))
+    return maximise(LikelihoodProblem(fitted.model, fitted.trials, noise), fitted.unknowns)
 
 
 def with_white_process_noise(fitted: LikelihoodFit) -> LikelihoodFit:

@@ -28,8 +28,8 @@ FIRST_TIME_S = 0.1
 SMALLEST = 1e-6
 """Smallest process noise, as a share of the driving effort or of a reading's range: it counts as none."""
 SLOWEST = 0.1
-"""Longest time constant of a random process, as a share of all trials together: a process that changes fewer than ten
-times in them could not be distinguished from an offset. It is at most the longest trial."""
+"""Longest time constant of a random process, as a share of the longest trial: a process that changes fewer than ten
+times in a trial could not be distinguished from an offset."""
 
 
 def spread_of_start(model: Model, trial: Trial) -> dict[str, float]:
@@ -82,12 +82,17 @@ def without_memory(noise: StateSpaceNoise, trials: Sequence[Trial]) -> StateSpac
     return replace(noise, std=std, time=dict.fromkeys(noise.time, step), timed=noise.processes)
 
 
-def noise_limits(model: Model, trials: Sequence[Trial], correlation_s: float = 0.0) -> dict[str, tuple[float, float]]:
+def slowest_of_all(trials: Sequence[Trial]) -> float:
+    """Return the longest time constant that all trials together tell, s: it is at most that of the longest."""
+    return min(SLOWEST * sum(t.duration for t in trials), max(t.duration for t in trials))
+
+
+def noise_limits(model: Model, trials: Sequence[Trial], known: StateSpaceNoise) -> dict[str, tuple[float, float]]:
     """Return bounds of every parameter of the noise, by name."""
-    step, durations = max(t.dt for t in trials), [t.duration for t in trials]
-    slowest = max(min(SLOWEST * sum(durations), max(durations)), 2.0 * step)
+    step, longest = max(t.dt for t in trials), max(t.duration for t in trials)
+    slowest = max(known.slowest_s or SLOWEST * longest, 2.0 * step)
     out: dict[str, tuple[float, float]] = {}
-    for name, noise in rough_noise(model, trials, correlation_s).items():
+    for name, noise in rough_noise(model, trials, known.correlation_s).items():
         values = np.concatenate([t[name] for t in trials if name in t.columns])
         spread = max(float(np.nanmax(values) - np.nanmin(values)), 1e-9)
         out[f"white.{name}"] = (min(SMALLEST * spread, noise.std), spread)

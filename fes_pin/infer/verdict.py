@@ -160,8 +160,6 @@ class State(Generic[F, M, W]):
         The state of another estimator of the same data that this one replaces; None if no estimator was replaced.
     tied
         By candidate, that which another estimator has in its place, where neither predicts better.
-    beside
-        A fit by another estimator, which widens the intervals of the same set; None without one.
     """
 
     verdict: Verdict[F, M, W]
@@ -172,7 +170,6 @@ class State(Generic[F, M, W]):
     steps: tuple[Step, ...] = ()
     replaced: State[Any, Any, Any] | None = None
     tied: Mapping[str, str] = field(default_factory=dict)
-    beside: Any = None
 
     @property
     def search(self) -> Search[F, M]:
@@ -256,15 +253,8 @@ class Verdict(ABC, Generic[F, M, W]):
         replaced
             The state by another estimator that this one may replace.
         """
-        return self._unobjected(State(self, found, self.weigh(found), {}, frozenset(found.without), replaced=replaced))
-
-    def certain(self, state: State[F, M, W]) -> State[F, M, W]:
-        """Return the state without candidates whose size is not certain; all claims are asked after each."""
-        while (fewer := self.drop_uncertain(state)) is not None:
-            state = self._unobjected(_noted(fewer, "drop_uncertain"))
-        return state
-
-    def _unobjected(self, state: State[F, M, W]) -> State[F, M, W]:
+        weighed, settled = self.weigh(found), frozenset(found.without)
+        state = State(self, found, weighed, {}, settled, replaced=replaced)
         while True:
             for claim in CLAIMS:
                 if (changed := getattr(self, claim)(state)) is not None:

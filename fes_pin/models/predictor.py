@@ -46,6 +46,8 @@ class StateSpaceNoise(ReadOnly, Mapping[str, Noise]):
         Names of random processes whose size is fixed at a negligible value.
     timed
         Names of random processes whose time constant is fixed.
+    slowest_s
+        Longest time constant of a random process, s; 0 for that of one trial.
     """
 
     white: Mapping[str, float]
@@ -55,6 +57,7 @@ class StateSpaceNoise(ReadOnly, Mapping[str, Noise]):
     ar: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     still: tuple[str, ...] = ()
     timed: tuple[str, ...] = ()
+    slowest_s: float = 0.0
 
     @property
     def processes(self) -> tuple[str, ...]:
