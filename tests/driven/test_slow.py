@@ -3,7 +3,10 @@
 from types import SimpleNamespace
 
 import pytest
+from driven_rigs import laboratory
+from driven_rigs.no_form import draw_no_form
 
+import fes_pin as fp
 from fes_pin.diagnosis import held_out
 from fes_pin.infer.result import Gain
 
@@ -34,3 +37,13 @@ def test_a_cause_may_show_as_far_ahead_as_what_stands_for_it_lasts(short, long, 
 def test_a_gain_says_how_far_ahead_it_looked():
     assert str(Gain(28.3, 17.2, 43.6)) == "28 % [17, 44]"
     assert str(Gain(28.3, 17.2, 43.6, 1.158)) == "28 % [17, 44], 1.2 s ahead"
+
+
+def test_an_effort_that_wanders_is_no_spring_that_relaxes(tmp_path, monkeypatch):
+    """It changes too seldom for one trial to tell it from an offset; six trials tell."""
+    monkeypatch.setattr(laboratory, "LONGEST_S", 40.0)
+    found = fp.diagnose(fp.read_study(draw_no_form(("wander",), 920, tmp_path).study))
+    assert {c.name for c in found.causes} <= {"zero_by_trial"}
+    (effort,) = found.random
+    assert effort.time_constant_s > 0.2 * found.study.trials[0].duration
+    assert "changes within" in str(found.why.record()["steps"])
