@@ -76,11 +76,6 @@ class SlowProcessNoise(RigEstimator):
 
     prefers_smaller = True
 
-    def words(self, state: RigState) -> str:
-        """Return how slow the process noise is, in words."""
-        slowest = max(state.found.best.noise.time.values())
-        return f"{super().words(state)} that changes within {slowest:.2g} s"
-
     def searched(self, first: RigState) -> tuple[LikelihoodSearch, Found] | None:
         """Return a search of the same causes, and its result; None where no process noise is as slow as it may be."""
         found, search, models = first.found, first.search, first.search.models

@@ -129,13 +129,14 @@ def comparable(one: LikelihoodFit, other: LikelihoodFit) -> tuple[LikelihoodFit,
     """Return two fits of the same readings under noise of the same kind.
 
     Trials are cut into parts if those of one are: in a corrected record a controller may no longer answer. Measurement
-    noise has the longer correlation time, and process noise is white if that of one is. Free simulations have the
-    autoregressive noise that their own residuals support.
+    noise has the longer correlation time, and process noise is white if that of one is, else as slow. Free simulations
+    have the autoregressive noise that their own residuals support.
     """
     one, other = _in_parts_as(one, other), _in_parts_as(other, one)
-    correlation_s = max(one.noise.correlation_s, other.noise.correlation_s)
-    timed = bool(one.noise.timed or other.noise.timed)
-    return _as_random(one, correlation_s, timed), _as_random(other, correlation_s, timed)
+    noises = one.noise, other.noise
+    correlation_s, slowest_s = max(n.correlation_s for n in noises), max(n.slowest_s for n in noises)
+    timed = any(noise.timed for noise in noises)
+    return _as_random(one, correlation_s, slowest_s, timed), _as_random(other, correlation_s, slowest_s, timed)
 
 
 def _in_parts_as(fitted: LikelihoodFit, other: LikelihoodFit) -> LikelihoodFit:
@@ -145,9 +146,10 @@ def _in_parts_as(fitted: LikelihoodFit, other: LikelihoodFit) -> LikelihoodFit:
     return refit(fitted, in_parts(fitted.model.rig, fitted.trials))
 
 
-def _as_random(fitted: LikelihoodFit, correlation_s: float, timed: bool) -> LikelihoodFit:
-    if fitted.noise.correlation_s != correlation_s:
-        fitted = maximum_from(fitted, fitted.trials, replace(fitted.noise, correlation_s=correlation_s))
+def _as_random(fitted: LikelihoodFit, correlation_s: float, slowest_s: float, timed: bool) -> LikelihoodFit:
+    if (fitted.noise.correlation_s, fitted.noise.slowest_s) != (correlation_s, slowest_s):
+        noise = replace(fitted.noise, correlation_s=correlation_s, slowest_s=slowest_s)
+        fitted = maximum_from(fitted, fitted.trials, noise)
     if is_simulated(fitted.noise, fitted.trials):
         problem = LikelihoodProblem(fitted.model, fitted.trials, fitted.noise)
         problem.noise = problem.with_orders(fitted.values, fitted.unknowns)

@@ -109,7 +109,10 @@ def is_as_likely(one: LikelihoodFit, other: LikelihoodFit) -> bool:
     """Return whether two fits of the same data in the same form differ by less than any test sees."""
     if one is other:
         return True
-    forms = [(f.names, f.free, f.noise.correlation_s, [*f.noise.time], f.noise.timed) for f in (one, other)]
+    forms = [
+        (f.names, f.free, f.noise.correlation_s, [*f.noise.time], f.noise.timed, f.noise.slowest_s)
+        for f in (one, other)
+    ]
     orders = [{n: len(a) for n, a in f.noise.ar.items()} for f in (one, other)]
     near = abs(one.sse - other.sse) < LITTLE and forms[0] == forms[1] and orders[0] == orders[1]
     return near and one.trials == other.trials

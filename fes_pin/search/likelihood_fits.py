@@ -129,7 +129,9 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
     @property
     def estimator(self) -> str:
         """How sets are fitted, in words."""
-        return f"likelihood with white {PROCESS}" if self.fits[()].noise.timed else ESTIMATORS[self.noise]
+        known = self.fits[()].noise
+        kind = "white " if known.timed else "slow " if known.slowest_s else ""
+        return f"likelihood with {kind}{PROCESS}" if kind else ESTIMATORS[self.noise]
 
     @property
     def judged_s(self) -> float | None:
@@ -221,7 +223,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         if self._calm is not None:
             return self._calm
         known = self.fits[()].noise
-        guess = first_guess(self.model, self.trials, known.correlation_s)
+        guess = replace(first_guess(self.model, self.trials, known.correlation_s), slowest_s=known.slowest_s)
         return without_memory(guess, self.trials) if known.timed else guess
 
     def _has(self, names: Names, forms: frozenset[Hashable]) -> bool:
