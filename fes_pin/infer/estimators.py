@@ -97,25 +97,32 @@ def choose(first: AnyState, others: Sequence[Estimator], seed: int = 0) -> AnySt
         if other is None:
             continue
         compared = _compared(first, other, seed)
-        agrees = (lambda o: o.is_felt) if len(other.names) > len(first.names) else (lambda o: not o.is_worse)
-        better = any(c.is_better and all(agrees(o) for o in compared if o is not c) for c in compared)
-        smaller = estimator.prefers_smaller and len(other.names) < len(first.names)
-        if better or (smaller and compared and not any(c.is_worse for c in compared)):
-            said = "predicts better" if better else "predicts as well with fewer causes"
-            words = f"{estimator.words(other)} {said}: {'; '.join(map(str, compared))}"
-            return replace(other, steps=(*first.steps, *other.steps, Step(CHOICE, words=words)))
-        is_worse = any(c.is_worse for c in compared) and not any(c.is_better for c in compared)
-        if compared and not is_worse:
-            first = _tied(first, other, f"{estimator.words(other)}: {'; '.join(map(str, compared))}")
+        errors = f": {'; '.join(map(str, compared))}"
+        if said := _why(first, other, compared, estimator.prefers_smaller):
+            step = Step(CHOICE, words=f"{estimator.words(other)} {said}{errors}")
+            return replace(other, steps=(*first.steps, *other.steps, step))
+        if compared and (any(c.is_better for c in compared) or not any(c.is_worse for c in compared)):
+            first = _tied(first, other, f"{estimator.words(other)}{errors}")
     return first
 
 
-def _tied(first: AnyState, other: AnyState, compared: str) -> AnyState:
+def _why(first: AnyState, other: AnyState, compared: Sequence[Compared], prefers_smaller: bool) -> str:
+    """Return why the other state answers, in words; empty where the first does."""
+    has_more = len(other.names) > len(first.names)
+    agree = [c.is_felt if has_more else not c.is_worse for c in compared]
+    if any(c.is_better and all(agree[:k] + agree[k + 1 :]) for k, c in enumerate(compared)):
+        return "predicts better"
+    is_smaller = prefers_smaller and len(other.names) < len(first.names)
+    is_as_good = compared and not any(c.is_worse for c in compared)
+    return "predicts as well with fewer causes" if is_smaller and is_as_good else ""
+
+
+def _tied(first: AnyState, other: AnyState, errors: str) -> AnyState:
     """Return a state in which the cause that another has in the place of one of its own is an equivalent of that."""
     mine, theirs = sorted(first.names - other.names), sorted(other.names - first.names)
     if not len(mine) == len(theirs) == 1:
         return first
-    said = Step(CHOICE, words=f"{theirs[0]} in the place of {mine[0]} predicts neither better nor worse by {compared}")
+    said = Step(CHOICE, words=f"{theirs[0]} in the place of {mine[0]} predicts neither better nor worse by {errors}")
     return replace(first, tied={**first.tied, mine[0]: theirs[0]}, steps=(*first.steps, said))
 
 
