@@ -16,7 +16,6 @@ from fes_pin.diagnosis.held_out import Again
 from fes_pin.diagnosis.likelihood_models import Found, LikelihoodModels, LikelihoodSearch
 from fes_pin.diagnosis.verdict import RigState, RigVerdict
 from fes_pin.effort.search import NOT_CARRIED, has_efforts, searched
-from fes_pin.identify.correlation_time import words_of_reading
 from fes_pin.identify.likelihood_fit import LikelihoodFit, at_values, refit
 from fes_pin.infer.estimators import AnyState, Estimator
 from fes_pin.infer.scatter import as_wide_as
@@ -132,7 +131,7 @@ OF_SIZES = ("drop_unrepeated", "drop_of_no_model", "drop_impossible", "drop_unce
 
 
 class ValuesOfInverseDynamics(InverseDynamics):
-    """The same with its own values: where few samples enter a likelihood, as between coarse counts, efforts know more.
+    """The same with its own values: where a likelihood tells little, as of few samples, efforts know more.
 
     It adds causes to those of the likelihood and replaces none, where it predicts better in each currency.
     """
@@ -140,20 +139,19 @@ class ValuesOfInverseDynamics(InverseDynamics):
     def state(self, first: RigState) -> RigState | None:
         """Return the state of its set at its own values.
 
-        None where the set does not hold all causes of the first, or where every sample enters the likelihood.
+        None where the set does not hold all causes of the first, or where the likelihood of held-out data refutes it.
         """
         search, by_effort = first.search, first.search.models.by_effort
         if by_effort is None or search.was_stopped or not first.names < {*(names := by_effort.names)}:
             return None
-        if not words_of_reading(first.found.best.noise, first.found.best.model.rig, search.models.trials):
-            return None  # every sample enters the likelihood
         if names not in search.models.fits or not search.models.is_possible(search.models.fits[names]):
             return None
         assert isinstance(first.verdict, RigVerdict)
         verdict = ValuesByEffort(search, first.verdict.test)
         found = verdict.in_place_of(search.result(names))
         own = State(verdict, found, verdict.weigh(found), {}, frozenset(names), replaced=first)
-        return None if any(getattr(verdict, claim)(own) for claim in OF_SIZES) else own
+        is_refuted = any(e.high < 0.0 for e in own.weighed.evidence.values())
+        return None if is_refuted or any(getattr(verdict, claim)(own) for claim in OF_SIZES) else own
 
 
 def never_worse(state: RigState) -> tuple[RigState, list[str]]:

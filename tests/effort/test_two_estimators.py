@@ -14,11 +14,12 @@ from harness.voluntary import Voluntary
 import fes_pin as fp
 from fes_pin.data.errors import InputError
 from fes_pin.diagnosis import by_effort, likelihood_models
-from fes_pin.diagnosis.by_effort import ValuesOfInverseDynamics, named_by_one
+from fes_pin.diagnosis.by_effort import ValuesByEffort, ValuesOfInverseDynamics, named_by_one
 from fes_pin.diagnosis.likelihood_models import LikelihoodModels, LikelihoodSearch
 from fes_pin.diagnosis.verdict import RigVerdict
 from fes_pin.effort import search
 from fes_pin.infer.estimators import CHOICE
+from fes_pin.infer.result import Evidence
 from fes_pin.infer.search import FITTED
 from fes_pin.infer.verdict import State
 from fes_pin.models.effects import CoulombFriction, EffortOffset
@@ -82,19 +83,25 @@ def test_a_set_that_lessens_the_error_of_effort_alone_is_no_answer(tmp_path, mon
     assert "cogging is named by effort, not by motion; it is not in the answer" in found.warnings
 
 
-def test_values_of_inverse_dynamics_answer_where_the_likelihood_has_few_samples(tmp_path):
-    """A swing-up whose encoder alternates between two counts in most samples: its likelihood has a quarter of them.
+def test_values_of_inverse_dynamics_answer_where_the_likelihood_tells_little(tmp_path, monkeypatch):
+    """A swing-up that rests for most of the time.
 
     Efforts name dry friction and an offset. Their values predict better in motion and in effort, on the fitted trials.
+    They are not asked where the likelihood of held-out data refutes one of the two.
     """
     drawn = draw_swing_up(("coulomb_friction", "effort_offset"), 65220028, tmp_path)
     shown, _ = withheld(fp.read_study(drawn.study))
+    usual, asked = ValuesOfInverseDynamics.state, []
+    monkeypatch.setattr(ValuesOfInverseDynamics, "state", lambda own, first: asked.append(first) or usual(own, first))
     found = fp.diagnose(shown)
     assert {c.name for c in found.causes} == {"coulomb_friction", "effort_offset"}
     assert "effort_offset is named by effort, not by motion" in found.warnings
     for name in ("coulomb_friction.torque_nm", "effort_offset.offset"):
         low, high = found.extended.interval(name)
         assert low <= drawn.truth[name.partition(".")[0]] <= high
+    weigh, against = ValuesByEffort.weigh, {"effort_offset": Evidence(-73.0, 0.0)}
+    monkeypatch.setattr(ValuesByEffort, "weigh", lambda own, found: replace(weigh(own, found), evidence=against))
+    assert usual(ValuesOfInverseDynamics(), asked[0]) is None
 
 
 @pytest.mark.parametrize(
