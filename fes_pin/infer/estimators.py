@@ -28,7 +28,7 @@ class Estimator(ABC):
     Attributes
     ----------
     prefers_smaller
-        Whether its set answers if it is smaller, where neither predicts better.
+        Whether its set answers if it is smaller, and the larger one of the first does not predict better.
     """
 
     prefers_smaller = False
@@ -66,11 +66,6 @@ class Compared:
         return self.gain.low > NOTHING_PERCENT
 
     @property
-    def is_felt(self) -> bool:
-        """Whether the other removes more than an error of form may leave."""
-        return self.gain.percent > WHOLE * FORM_SHARE
-
-    @property
     def is_worse(self) -> bool:
         """Whether the first does."""
         return self.loss.low > NOTHING_PERCENT
@@ -84,10 +79,10 @@ def choose(first: AnyState, others: Sequence[Estimator], seed: int = 0) -> AnySt
     """Return the state of the first estimator, or of one that predicts materially better; the first such one.
 
     It predicts better where the 95 % interval of the share of the squared error that it removes is above
-    `NOTHING_PERCENT` in one currency, and it is worse in none. With more causes that share must be above `FORM_SHARE`
-    in each other currency too: a cause that lessens the error of one alone is an error of form. Noise is not
-    subtracted: each estimator has its own, and that of a wrong model is large. Data that the study itself holds out are
-    not used: gains on them would be optimistic.
+    `NOTHING_PERCENT` in one currency, and it is worse in none. Of sets of different sizes the larger predicts better
+    where that share is also above `FORM_SHARE` in each other currency: a cause that lessens the error of one alone is
+    an error of form. Noise is not subtracted: each estimator has its own, and that of a wrong model is large. Data that
+    the study itself holds out are not used: gains on them would be optimistic.
 
     Where neither predicts better, and the other has one cause in the place of another, the data do not distinguish the
     two: they are equivalents in the state of the first.
@@ -108,13 +103,19 @@ def choose(first: AnyState, others: Sequence[Estimator], seed: int = 0) -> AnySt
 
 def _why(first: AnyState, other: AnyState, compared: Sequence[Compared], prefers_smaller: bool) -> str:
     """Return why the other state answers, in words; empty where the first does."""
-    has_more = len(other.names) > len(first.names)
-    agree = [c.is_felt if has_more else not c.is_worse for c in compared]
-    if any(c.is_better and all(agree[:k] + agree[k + 1 :]) for k, c in enumerate(compared)):
-        return "predicts better"
-    is_smaller = prefers_smaller and len(other.names) < len(first.names)
-    is_as_good = compared and not any(c.is_worse for c in compared)
-    return "predicts as well with fewer causes" if is_smaller and is_as_good else ""
+    if len(other.names) > len(first.names):
+        return "predicts better" if _is_felt([c.gain for c in compared]) else ""
+    if prefers_smaller and len(other.names) < len(first.names):
+        is_needed = not compared or _is_felt([c.loss for c in compared])
+        return "" if is_needed else "has fewer causes, and what the others add is not felt in every error"
+    is_better = any(c.is_better for c in compared) and not any(c.is_worse for c in compared)
+    return "predicts better" if is_better else ""
+
+
+def _is_felt(shares: Sequence[Gain]) -> bool:
+    """Return whether a share is certain in one currency, and more than an error of form may leave in each other one."""
+    felt = [share.percent > WHOLE * FORM_SHARE for share in shares]
+    return any(share.low > NOTHING_PERCENT and all(felt[:k] + felt[k + 1 :]) for k, share in enumerate(shares))
 
 
 def _tied(first: AnyState, other: AnyState, errors: str) -> AnyState:

@@ -259,7 +259,12 @@ SURE, UNSURE = np.full(12, 1.0), np.tile([-40.0, 60.0], 6)
         (0.0 * SURE, 0.0 * SURE, "", True, True),  # neither predicts better: the smaller set
         (0.0 * SURE, 0.0 * SURE, "", False, False),
         (0.0 * SURE, 0.0 * SURE, "ab", True, False),  # it is not smaller
-        (0.0 * SURE, -50.0 * SURE, "", True, False),  # the larger set predicts effort better
+        (0.0 * SURE, -50.0 * SURE, "", True, True),  # what the larger set adds is an error of form of the effort
+        (-50.0 * SURE, 0.5 * UNSURE, "", True, True),
+        (-50.0 * SURE, -50.0 * SURE, "", True, False),  # it is felt in both
+        (-50.0 * SURE, -UNSURE, "", True, False),
+        (-UNSURE, -UNSURE, "", True, True),  # and certain in none
+        (-50.0 * SURE, 0.0 * SURE, "", False, False),
         (50.0 * SURE, 0.0 * SURE, "a", False, True),  # the same set: worse in none
         (50.0 * SURE, -50.0 * SURE, "a", False, False),
         (0.0 * SURE, 50.0 * SURE, "b", False, True),  # another cause in its place: worse in none
