@@ -61,7 +61,7 @@ class VerdictByEffort(RigVerdict):
 class InverseDynamics(Estimator):
     """Least squares of the low-passed effort, for a joint whose effort was recorded."""
 
-    prefers_smaller = True
+    prefers_smaller = is_independent = True
 
     def words(self, state: AnyState) -> str:
         """Return how it found a set, in words."""

@@ -28,10 +28,14 @@ class Estimator(ABC):
     Attributes
     ----------
     prefers_smaller
-        Whether its set answers if it is smaller, and the larger one of the first does not predict better.
+        Whether its set answers if it is smaller, where neither predicts better.
+    is_independent
+        Whether it fits other readings than the first. What the larger set of the first adds must then be felt in each
+        error too, or a smaller set answers.
     """
 
     prefers_smaller = False
+    is_independent = False
 
     def words(self, state: AnyState) -> str:
         """Return how it estimated a state, in words."""
@@ -93,7 +97,7 @@ def choose(first: AnyState, others: Sequence[Estimator], seed: int = 0) -> AnySt
             continue
         compared = _compared(first, other, seed)
         errors = f": {'; '.join(map(str, compared))}"
-        if said := _why(first, other, compared, estimator.prefers_smaller):
+        if said := _why(first, other, compared, estimator):
             step = Step(CHOICE, words=f"{estimator.words(other)} {said}{errors}")
             return replace(other, steps=(*first.steps, *other.steps, step))
         if compared and (any(c.is_better for c in compared) or not any(c.is_worse for c in compared)):
@@ -101,15 +105,18 @@ def choose(first: AnyState, others: Sequence[Estimator], seed: int = 0) -> AnySt
     return first
 
 
-def _why(first: AnyState, other: AnyState, compared: Sequence[Compared], prefers_smaller: bool) -> str:
+def _why(first: AnyState, other: AnyState, compared: Sequence[Compared], estimator: Estimator) -> str:
     """Return why the other state answers, in words; empty where the first does."""
     if len(other.names) > len(first.names):
         return "predicts better" if _is_felt([c.gain for c in compared]) else ""
-    if prefers_smaller and len(other.names) < len(first.names):
-        is_needed = not compared or _is_felt([c.loss for c in compared])
-        return "" if is_needed else "has fewer causes, and what the others add is not felt in every error"
-    is_better = any(c.is_better for c in compared) and not any(c.is_worse for c in compared)
-    return "predicts better" if is_better else ""
+    is_worse, is_preferred = any(c.is_worse for c in compared), estimator.prefers_smaller and bool(compared)
+    if any(c.is_better for c in compared) and not is_worse:
+        return "predicts better"
+    if not is_preferred or len(other.names) == len(first.names):
+        return ""
+    if estimator.is_independent and not _is_felt([c.loss for c in compared]):
+        return "has fewer causes, and what the others add is not felt in every error"
+    return "" if is_worse else "predicts as well with fewer causes"
 
 
 def _is_felt(shares: Sequence[Gain]) -> bool:

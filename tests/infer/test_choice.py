@@ -235,8 +235,8 @@ class Stated:
 
 
 class Known(Estimator):
-    def __init__(self, other, prefers_smaller):
-        self.other, self.prefers_smaller = other, prefers_smaller
+    def __init__(self, other, prefers_smaller, is_independent=True):
+        self.other, self.prefers_smaller, self.is_independent = other, prefers_smaller, is_independent
 
     def state(self, first):
         return self.other
@@ -303,6 +303,14 @@ def test_two_causes_are_equivalents_where_neither_estimator_predicts_better(moti
         return
     assert chosen.names == first.names and chosen.tied == tied
     assert ["predicts neither better nor worse" in str(s) for s in chosen.steps] == [True] * len(tied)
+
+
+@pytest.mark.parametrize(("effort", "answers"), [(0.0 * SURE, True), (-SURE, False), (-50.0 * SURE, False)])
+def test_of_the_same_readings_a_smaller_set_answers_where_it_is_worse_in_none(effort, answers):
+    hundred = np.full(12, 100.0)
+    first = Stated(frozenset("a"), {"motion": hundred, "effort": hundred})
+    other = Stated(frozenset(), {"motion": hundred, "effort": hundred - effort})
+    assert (choose(first, [Known(other, True, is_independent=False)]).errors is other.errors) is answers
 
 
 def test_a_currency_without_errors_of_both_is_not_compared():
