@@ -31,7 +31,7 @@ LONGEST_MUSCLE_M = 1.0
 TOGETHER = ({"pulse_width_us", "amplitude_ma", "frequency_hz"}, {"charge_uc", "frequency_hz"})
 """Stimuli that one trial may hold together."""
 BEYOND = 1e100
-"""Nothing is measured that is this large in any unit; sums of its squares are numbers no more."""
+"""Nothing that is measured is so large in any unit. Sums of squares of such samples overflow."""
 LARGEST = {"amplitude_ma": 500.0, "charge_uc": 1e4, "frequency_hz": 1e4, "emg_envelope": 10.0}
 """What no stimulator gives: of surface stimulators 150 mA is the most; a larger amplitude is in uA."""
 SHORTEST_PULSE_US = 2.0

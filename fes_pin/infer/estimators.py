@@ -30,8 +30,8 @@ class Estimator(ABC):
     prefers_smaller
         Whether its set answers if it is smaller, where neither predicts better.
     is_independent
-        Whether it fits other readings than the first. What the larger set of the first adds must then be felt in each
-        error too, or a smaller set answers.
+        Whether it fits other readings than the first. A larger set of the first must then lessen each error materially
+        too, or a smaller set answers.
     """
 
     prefers_smaller = False
@@ -115,7 +115,7 @@ def _why(first: AnyState, other: AnyState, compared: Sequence[Compared], estimat
     if not is_preferred or len(other.names) == len(first.names):
         return ""
     if estimator.is_independent and not _is_felt([c.loss for c in compared]):
-        return "has fewer causes, and what the others add is not felt in every error"
+        return "has fewer causes, and the further ones do not lessen every error materially"
     return "" if is_worse else "predicts as well with fewer causes"
 
 
