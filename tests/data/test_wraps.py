@@ -43,6 +43,22 @@ def free(name, q, time, **more):
     return fp.Trial(name, "motion", {"position": q, **more}, time)
 
 
+@pytest.mark.parametrize("seed", range(10))
+def test_a_joint_that_rests_where_its_angle_wraps_is_unwrapped(seed):
+    """A joint is swung up to the seam of its angle and held there, where noise or a count flips each second sample."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(0.0, 8.0, 0.002)
+    q = np.pi * np.minimum(time / 2.0, 1.0) ** 2 * (3.0 - 2.0 * np.minimum(time / 2.0, 1.0)) * rng.choice([-1.0, 1.0])
+    q += 1e-3 * rng.standard_normal(len(q))
+    if seed % 2:
+        q = np.rint(q * 4096 / TURN) * TURN / 4096
+    found = unwrapped("position", time, wrapped(q, TURN, -np.pi))
+    jumps = np.abs(np.diff(wrapped(q, TURN, -np.pi))) > 1.0
+    assert jumps.mean() > 0.2
+    assert found is not None
+    assert np.ptp(found.values - q) < 1e-9
+
+
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_reading_that_wraps_is_unwrapped(seed):
     """In rad, in degrees, or in counts of an encoder; with noise, printed digits and missing samples."""

@@ -83,7 +83,7 @@ def unwrapped(name: str, time: np.ndarray, values: np.ndarray, velocity: np.ndar
     x, t = values[known], time[known]
     steps, times = np.diff(x), np.diff(t)
     is_jump = np.abs(steps) > 0.5 * np.ptp(x)
-    if not is_jump.any() or is_jump.mean() > COARSE or not (times > 0.0).all():
+    if not is_jump.any() or not (times > 0.0).all():
         return None
     before = _expected(steps, times, is_jump)
     limit = _usual_bend(steps, times, is_jump, x)
