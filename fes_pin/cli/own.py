@@ -112,6 +112,7 @@ def new_study(
     """
     from fes_pin.data.direction import LEFT_OUT
     from fes_pin.data.new_body_study import new_body_study
+    from fes_pin.data.new_recording import rig_held
     from fes_pin.data.new_study import new_study as make
     from fes_pin.data.new_study import with_kind
     from fes_pin.data.new_view import offsets_of
@@ -131,6 +132,10 @@ def new_study(
         return
     catalogue, columns, settings = catalogue_with(library), pairs("--column", column), pairs("--set", setting)
     form = _form(names, header_row, first_row, transposed, sheet)
+    held = None if rig or believed else rig_held(files, known_rigs(catalogue.schemas()).values(), form)
+    if held is not None:
+        rig = held.name
+        typer.echo(f"the files hold a stimulus and a reading of rig {rig}; --rig names another")
     schema = _schema(rig, catalogue, believed, (columns, resample, fill, form))
     if resample == 0.0:
         raise InputError("expected a rate above 0 Hz", column="--resample")

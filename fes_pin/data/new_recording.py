@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from fes_pin.data.channels import CHARGE, WIDTH
 from fes_pin.data.errors import InputError, listed
 from fes_pin.data.recorded.form import TextForm
 from fes_pin.data.recorded.formats import is_text, read_recording
@@ -25,7 +26,7 @@ from fes_pin.data.recorded.parts import Ends, end_at_once, ends_of
 from fes_pin.data.recorded.sheets import is_spreadsheet, sheets_of
 from fes_pin.data.recorded.sniff import sniffed
 from fes_pin.data.recorded.text import read_text_recording
-from fes_pin.data.schema import MEANT, RigSchema, without_unit
+from fes_pin.data.schema import IMPOSED, MEANT, RigSchema, without_unit
 from fes_pin.data.table import Table
 from fes_pin.data.units import known_unit, may_be, quantities_of, split_header, words_of
 
@@ -34,6 +35,10 @@ WANTED = frozenset(
     | {"command", "commanded", "cmd", "reference", "ref"}
 )
 """Words for what a controller wants, which is no reading."""
+READINGS = ("position", "velocity", "angle_rad", "force_n", "torque_nm", "length_m")
+"""Columns that are read: an effort may be a command, and a stimulus is one."""
+PULSES = (WIDTH.column, CHARGE.column, "stim")
+"""Columns of pulses that nothing but a stimulator gives."""
 OTHERS = frozenset(
     {"acc", "accel", "acceleration", "temp", "temperature", "temperatur", "efficiency", "power", "constant"}
 )
@@ -221,6 +226,20 @@ def propose(
     return as_seen(recording, form, {**recording.units, **units}, schema, revolute, header.rate_hz, header.said)
 
 
+def rig_held(paths: Sequence[Path], schemas: Iterable[RigSchema], stated: Mapping[str, Any]) -> RigSchema | None:
+    """The rig without a URDF, of fewest numbers, whose stimulus and reading every file holds; None where there is none.
+
+    A stimulus is known from a pulse width, a charge or a trigger: a current may be that of a motor.
+    """
+    for schema in sorted((s for s in schemas if s.owner is not None and not s.files), key=lambda s: len(s.constants)):
+        free = {c for kind, c in schema.outputs.items() if kind != IMPOSED}
+        with suppress(InputError):  # which is raised where the file is read for its rig
+            found = [propose(path, schema, None, stated).candidates for path in paths]
+            if all(any(c.get(n) for n in PULSES) and any(c.get(n) for n in free) for c in found):
+                return schema
+    return None
+
+
 def as_seen(
     recording: Table,
     form: TextForm | None,
@@ -271,8 +290,8 @@ def _rising(names: tuple[str, ...], recording: Table) -> tuple[str, ...]:
 
 
 def _readings(column: str, names: tuple[str, ...]) -> tuple[str, ...]:
-    """Columns of a motion without those that say what was wanted of it, where others say what it was."""
-    if column not in ("position", "velocity"):
+    """Columns of a reading without those that say what was wanted of it, where others say what it was."""
+    if column not in READINGS:
         return names
     words = {n: words_of(n) for n in names}
     return tuple(n for n, found in words.items() if not (WANTED & found or {"set", "point"} <= found)) or names

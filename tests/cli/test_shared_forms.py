@@ -67,7 +67,7 @@ def test_two_loggers(monkeypatch, capsys, shared):
 def test_a_force_is_no_pulse_width_of_a_stimulation_log(shared):
     found = propose(shared / "cases/fes_amplitude_events.csv", known_rigs()["muscle"], None)
     assert found.candidates["pulse_width_us"] == ("Microseconds",)
-    assert set(found.candidates["force_n"]) == {"CurrentKG", "TargetKG"}
+    assert found.candidates["force_n"] == ("CurrentKG",)
     assert found.recording.columns["UnixTimestamp"][0] == 0.0 and "since 1970" in found.recording.said[0]
 
 

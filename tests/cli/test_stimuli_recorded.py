@@ -64,6 +64,27 @@ def test_a_log_of_amplitudes_is_a_study_of_amplitudes(header, tmp_path):
     assert trial.time[0] == 0.0
 
 
+@pytest.mark.parametrize("header", HEADERS)
+def test_a_log_of_a_stimulator_and_a_force_is_one_of_a_muscle(header, tmp_path):
+    """Nobody said a rig; what a person wanted of the force is no reading of it."""
+    path = logged(tmp_path, np.random.default_rng(1), header)
+    lines = path.read_text().splitlines()
+    path.write_text("\n".join([f"{lines[0]};TargetKG", *(f"{line};9.55" for line in lines[1:])]))
+    words = ("--set", "threshold_ma=6", "--set", "saturation_ma=18")
+    code, said = ran("new-study", path, *words)
+    assert code == 0, said
+    assert "the files hold a stimulus and a reading of rig muscle; --rig names another" in said
+    assert fp.read_study(tmp_path).rig == "muscle"
+
+
+def test_a_motor_current_and_a_force_are_no_stimulated_muscle(tmp_path):
+    path = tmp_path / "motor.csv"
+    path.write_text("t [s];current [mA];force [N]\n" + "\n".join(f"{0.01 * k};{k % 7};{k % 5}" for k in range(99)))
+    code, said = ran("new-study", path)
+    assert code == 2
+    assert "--urdf: expected --urdf FILE" in said
+
+
 def test_a_log_in_which_both_vary_asks_for_a_threshold_of_the_charge(tmp_path):
     path = logged(tmp_path, np.random.default_rng(2), HEADERS[0], width_varies=True)
     code, said = ran("new-study", path, "--rig", "muscle", "--column", "time_s=UnixTimestamp:s")
@@ -109,13 +130,10 @@ def test_the_amplitude_of_an_events_log_is_the_input(shared, tmp_path):
     file = tmp_path / "fes_amplitude_events.csv"
     code, said = ran("new-study", file, "--rig", "muscle")
     assert code == 2
-    assert "force_n=NAME:UNIT (CurrentKG or TargetKG)" in said
     assert "threshold_ma" in said
-    words = ("--column", "force_n=CurrentKG", "--column", "time_s=UnixTimestamp:s")
-    code, said = ran(
-        "new-study", file, "--rig", "muscle", *words, "--set", "threshold_ma=5", "--set", "saturation_ma=20"
-    )
+    code, said = ran("new-study", file, "--set", "threshold_ma=5", "--set", "saturation_ma=20")
     assert code == 0, said
+    assert "force_n          is CurrentKG, in kgf" in said
     (trial,) = fp.read_study(tmp_path).trials
     assert 8.0 <= trial["amplitude_ma"].max() < 20.0
     assert 50.0 < trial["force_n"].max() < 200.0
