@@ -4,7 +4,8 @@
     scripts/generate/dataset_registry.py --download   also checksums of the upstream files, from their repositories
 
 Upstream files are those that are in the registry already, and their checksums stay; the files of a new data set are
-listed there by hand. Data sets that are read as published stay as they are. `--download` needs the network, and pooch.
+listed there by hand. Data sets that are read as published, or by a command, stay as they are. `--download` needs the
+network, and pooch.
 """
 
 from __future__ import annotations
@@ -86,7 +87,7 @@ def main() -> None:
     data = Path(os.environ.get("FES_PIN_DATA", ROOT.parent / "shared")) / "data"
     before = json.loads(REGISTRY.read_text()) if REGISTRY.exists() else {}
     made = {n: entry(n, data / n, before.get(n, {}).get("upstream", {})) for n in sorted(WANTED)}
-    made |= {n: one for n, one in before.items() if one.get("published")}
+    made |= {n: one for n, one in before.items() if n not in WANTED}
     if asked.download:
         for one in made.values():
             one["upstream"] = downloaded(one)

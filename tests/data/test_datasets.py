@@ -3,6 +3,8 @@
 import functools
 import hashlib
 import json
+import re
+import shlex
 import sys
 import threading
 from dataclasses import replace
@@ -12,6 +14,7 @@ import numpy as np
 import pytest
 
 from fes_pin.cli import main
+from fes_pin.cli.main import app
 from fes_pin.data import conversions, datasets
 from fes_pin.data.datasets import DATASETS, download_all, fetch
 from fes_pin.data.errors import InputError
@@ -225,11 +228,24 @@ def test_the_command(server, here, monkeypatch, capsys):
     assert code == 2 and printed.out == "" and printed.err.count("\n") == 1
 
 
+def test_commands_that_make_studies_of_recordings_have_options_that_exist(capsys):
+    with pytest.raises(SystemExit):
+        app(["new-study", "--help"])
+    known = set(re.findall(r"--[a-z-]+", capsys.readouterr().out))
+    commands = [w.group(1) for one in DATASETS.values() if (w := re.match("`fes-pin new-study (.*)`", one.by_hand))]
+    assert len(commands) >= 11
+    for command in commands:
+        assert {word for word in shlex.split(command) if word.startswith("--")} <= known
+
+
 @pytest.mark.shared
 def test_the_registry_is_what_the_descriptions_say(shared):
     for name, one in DATASETS.items():
         if one.published:  # described by its study
             assert one.upstream and all(one.upstream.values())
+            continue
+        if not (shared / "data" / name).exists():
+            assert one.by_hand and len(one.commit) == 40 and not one.upstream
             continue
         text = (shared / "data" / name / "SOURCE.md").read_text()
         assert one.repository in text and one.commit[:7] in text and text.startswith(f"# {one.what}")

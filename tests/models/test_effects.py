@@ -257,3 +257,10 @@ def test_a_threshold_may_shift_by_the_widest_pulse():
     """A shift of 417 us was hidden where 400 us were the bound."""
     assert effects.ThresholdShift().limits({"pulse_width_us": np.array([0.0, 957.0])}) == {"shift_us": (-957.0, 957.0)}
     assert effects.ThresholdShift().limits({"time": np.zeros(2)}) == {}
+
+
+def test_a_reading_that_turns_has_no_curved_characteristic():
+    """A wheel of which the speed was recorded was named with a curvature of 2.6e-4 per rad, over 300 rad."""
+    cause = effects.SensorNonlinearity(curvature=2.6e-4)
+    assert cause.smallest({"position": np.linspace(0.0, 300.0, 50)})["curvature"] > cause.curvature
+    assert cause.smallest({"position": np.linspace(-1.5, 1.5, 50)}) == {}

@@ -1,8 +1,11 @@
 """Curvature of the sensor's characteristic."""
 
 from dataclasses import dataclass
+from math import pi
 
-from fes_pin.models.stage import FromAPlace, Scalar, Signals, Stage, counted_from, parameter, refinement
+import numpy as np
+
+from fes_pin.models.stage import FromAPlace, Measured, Scalar, Signals, Stage, counted_from, parameter, refinement
 
 
 @dataclass(frozen=True)
@@ -32,6 +35,11 @@ class SensorNonlinearity(FromAPlace):
     )
 
     name, stage, signal, rigs = "sensor_nonlinearity", Stage.SENSOR, "reading", ("ankle", "joint")
+
+    def smallest(self, measured: Measured) -> dict[str, float]:
+        """No size where the reading passes more than a turn: the characteristic of an angle repeats each turn."""
+        turns = "position" in measured and np.ptp(measured["position"]) > 2.0 * pi
+        return {"curvature": self.parameters()["curvature"].upper} if turns else {}
 
     def apply(self, value: Scalar, s: Signals) -> Scalar:
         x = value - counted_from(s, self.place)
