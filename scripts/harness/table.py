@@ -249,12 +249,22 @@ def never_worse(rows: Sequence[Row]) -> list[str]:
         middle = median(ratio for ratio, _ in some)
         share = f"at most {WORSE_ERROR} in {interval(good, len(some))}"
         lines.append(f"{name}: median {middle:.3g}, {share}; largest {most:.3g} ({where.key})")
+    odd = [row for row in rows if worst.get(row.key, 0.0) > WORSE_ERROR]
     if worst:
-        good = sum(ratio <= WORSE_ERROR for ratio in worst.values())
+        good, lucky = len(worst) - len(odd), sum(not row.error and not _beaten(row) for row in odd)
         lines.append(
             f"every error at most {WORSE_ERROR} times: {interval(good, len(worst))}; largest {max(worst.values()):.3g}"
         )
-    return [*lines, *(_of_truth(row, worst[row.key]) for row in rows if worst.get(row.key, 0.0) > WORSE_ERROR)]
+        lines.append(
+            f"the same, or at most {WORSE_ERROR} times that of the true model: {interval(good + lucky, len(worst))}"
+        )
+    return [*lines, *(_of_truth(row, worst[row.key]) for row in odd)]
+
+
+def _beaten(row: Row) -> bool:
+    """Whether an error of a model is larger than another's and than the true model's, where that is known."""
+    larger = {n[0] for n, ratio in ratios_of(row.against).items() if ratio > WORSE_ERROR}
+    return any(n not in row.true or _percent(row.against[n][0]) > WORSE_ERROR * _percent(row.true[n]) for n in larger)
 
 
 def _of_truth(row: Row, worst: float) -> str:

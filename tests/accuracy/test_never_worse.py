@@ -129,7 +129,17 @@ def test_ratios_are_counted():
     assert "largest 2 (a)" in text[1]
     assert text[2].startswith("free, unseen, ours over believed: median inf, at most 1.02 in 1 of 2")
     assert text[4].startswith("every error at most 1.02 times: 1 of 4") and text[4].endswith("largest inf")
-    assert [line.split(":")[0].strip() for line in text[5:]] == ["a", "c", "d"]
+    assert text[5].startswith("the same, or at most 1.02 times that of the true model: 1 of 4")
+    assert [line.split(":")[0].strip() for line in text[6:]] == ["a", "c", "d"]
+
+
+def test_a_model_as_good_as_the_true_one_is_counted_apart():
+    """A regression may predict better than the model that made the data: its errors happened to cancel the noise."""
+    errors = {"free, unseen": (2.0, 4.0, 1.0), "effort, unseen": (1.0, 2.0, 2.0)}
+    rows = [row(name, against=errors, true={"free, unseen": true}) for name, true in (("a", 2.0), ("b", 1.9))]
+    text = never_worse([*rows, row("c", against=errors)])
+    (counted,) = [line for line in text if line.startswith("the same, or")]
+    assert "1 of 3" in counted
 
 
 def test_what_is_worse_is_printed_with_what_the_true_model_is():
