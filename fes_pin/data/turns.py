@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fes_pin.data.recorded.wraps import ANGLES, unwrapped
+from fes_pin.data.recorded.wraps import ANGLES, middle, unwrapped
 from fes_pin.data.trial import Trial, derived_trial
 from fes_pin.data.urdf import is_revolute
 
@@ -32,7 +32,7 @@ def with_whole_turns(trials: Sequence[Trial], files: Mapping[str, Path]) -> tupl
     }
     out = list(trials)
     for (k, name), one in found.items():
-        others = [float(np.median(t[name])) for j, t in enumerate(trials) if name in t and (j, name) not in found]
+        others = [middle(t[name]) for j, t in enumerate(trials) if name in t and (j, name) not in found]
         trial = out[k]
         moved = one.near(float(np.median(others)) if others else 0.0)
         if name == "position" and "position0" in trial.conditions:

@@ -10,6 +10,7 @@ import fes_pin as fp
 from fes_pin.cli import main
 from fes_pin.data import templates
 from fes_pin.data.recorded.wraps import unwrapped
+from fes_pin.data.turns import with_whole_turns
 
 TURN = 2.0 * np.pi
 SEEDS = range(40)
@@ -57,6 +58,20 @@ def test_a_joint_that_rests_where_its_angle_wraps_is_unwrapped(seed):
     assert jumps.mean() > 0.2
     assert found is not None
     assert np.ptp(found.values - q) < 1e-9
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_trials_that_are_swung_up_begin_where_they_hang(side, tmp_path):
+    """All are swung up from 0 to half a turn, some to the other side, and held there for most of the time."""
+    time = np.arange(0.0, 8.0, 0.002)
+    up = np.pi * np.minimum(time / 2.0, 1.0) ** 2 * (3.0 - 2.0 * np.minimum(time / 2.0, 1.0))
+    rng = np.random.default_rng(3)
+    motions = [turn * up + 1e-3 * rng.standard_normal(len(up)) for turn in (side, side, -side)]
+    motions.append(0.95 * side * up)  # which does not wrap
+    trials = [free(f"{k}", wrapped(q, TURN, -np.pi), time) for k, q in enumerate(motions)]
+    read = with_whole_turns(trials, joint(tmp_path, trials).files)
+    for one, q in zip(read, motions, strict=True):
+        assert np.abs(one["position"] - q).max() < 1e-9
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -45,10 +45,15 @@ class Continuous(NamedTuple):
     said: str
 
     def near(self, other: float) -> np.ndarray:
-        """Return the reading, moved by whole periods next to another one; one that turns round stays."""
+        """Return the reading, moved by whole periods next to an angle; one that turns round stays."""
         if np.nanmax(self.values) - np.nanmin(self.values) > LONG * self.period:
             return self.values
-        return self.values - self.period * round((float(np.nanmedian(self.values)) - other) / self.period)
+        return self.values - self.period * round((middle(self.values) - other) / self.period)
+
+
+def middle(values: np.ndarray) -> float:
+    """Return the angle from which a motion is nowhere farther than half its range."""
+    return 0.5 * float(np.nanmin(values) + np.nanmax(values))
 
 
 def table_without_wraps(table: Table, revolute: bool | None) -> Table:
