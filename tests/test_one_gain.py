@@ -71,7 +71,7 @@ def test_one_cause_by_two_measures_says_which(tmp_path):
 def test_a_cause_is_named_by_a_measure_that_is_stated():
     """Once an external force was named with a gain of -0.003 %, and it was not told by what it was judged."""
     named = cause(evidence=Evidence(60.0, 60.0))
-    assert is_supported(named.evidence, named.gain_held_out)
+    assert is_supported(named.evidence, named.gain_held_out, alone=True)
     assert named.judged.low > 0.0
     assert named.record()["judged_by"]["measure"] == "twice the log-likelihood"
     assert named.record()["judged_by"]["low"] == pytest.approx(60.0 - 2.0 * 1.959964 * 60.0**0.5, rel=1e-5)
@@ -82,7 +82,7 @@ def test_a_cause_is_named_by_a_measure_that_is_stated():
 def test_no_cause_is_named_by_errors_that_do_not_fall():
     by_errors = cause()
     assert by_errors.judged is by_errors.gain_held_out
-    assert not is_supported(None, by_errors.gain_held_out)
+    assert not is_supported(None, by_errors.gain_held_out, alone=True)
 
 
 def test_what_is_fitted_alone_is_no_held_out_gain():

@@ -168,13 +168,13 @@ def marginal_cost(fitted: Optimum, scales: Mapping[str, float]) -> float:
     return fitted.sse + float(np.linalg.slogdet(np.eye(len(widths)) + scaled)[1])
 
 
-def is_supported(evidence: Evidence | None, gain: Gain) -> bool:
+def is_supported(evidence: Evidence | None, gain: Gain, alone: bool) -> bool:
     """Return whether held-out trials support a cause.
 
-    Where the model has no lack of fit, their likelihood must support it, and then it may have no gain: if one trial of
-    many reaches a stop, the others do not predict it, and beside a large cause a small one removes little. Elsewhere
-    their errors must support it. A significantly negative gain is never accepted. A cause that is not judged by errors
-    needs the likelihood alone.
+    Where the model has no lack of fit, their likelihood must support it, else their errors. In a set of several causes
+    both must, since several flexible forms together fit nearly anything. A cause alone may have no gain: if one trial
+    of many reaches a stop, the others do not predict it. A significantly negative gain is never accepted. A cause that
+    is not judged by errors needs the likelihood alone.
 
     Parameters
     ----------
@@ -182,9 +182,11 @@ def is_supported(evidence: Evidence | None, gain: Gain) -> bool:
         Evidence of the likelihood; None where the model has a lack of fit, so that a likelihood says little.
     gain
         Gain in errors of prediction; `NO_GAIN` of a cause that is not judged by them.
+    alone
+        Whether the set has no other cause.
     """
     likely = evidence is None or evidence.low > 0.0
-    return likely and (gain.is_none or gain.is_material or (evidence is not None and gain.high > 0.0))
+    return likely and (gain.is_none or gain.is_material or (evidence is not None and alone and gain.high > 0.0))
 
 
 def within(errors: np.ndarray, most: float) -> np.ndarray:

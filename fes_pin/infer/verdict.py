@@ -294,7 +294,7 @@ class Verdict(ABC, Generic[F, M, W]):
         Where no data could be held out, the fitted data judge.
         """
         known, gains = self.evidence(state), state.weighed.gains
-        weak = [n for n, e in known.items() if not is_supported(e, gains[n])]
+        weak = [n for n, e in known.items() if not is_supported(e, gains[n], alone=len(known) == 1)]
         return self._without_weakest(state, weak)
 
     def drop_not_carried(self, state: State[F, M, W]) -> State[F, M, W] | None:

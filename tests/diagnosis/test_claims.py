@@ -35,13 +35,16 @@ def test_evidence_scatters_by_twice_the_root_of_its_squares():
 def test_held_out_trials_speak_by_likelihood_only_where_noise_is_all_that_is_left():
     sure, unsure = Evidence(100.0, 100.0), Evidence(10.0, 100.0)
     harmful, harmless, useless = Gain(50.0, -5.0, 90.0), Gain(50.0, 5.0, 90.0), Gain(-1.0, -5.0, 90.0)
-    assert is_supported(sure, harmful) and is_supported(sure, harmless) and is_supported(sure, useless)
-    assert not is_supported(unsure, harmless) and not is_supported(unsure, useless)
-    assert is_supported(None, harmless) and not is_supported(None, harmful)
+    assert is_supported(sure, harmful, alone=True) and not is_supported(sure, harmful, alone=False)
+    assert is_supported(sure, harmless, alone=False)
+    assert not is_supported(unsure, harmless, alone=True)
+    assert is_supported(sure, useless, alone=True) and not is_supported(unsure, useless, alone=True)
+    assert is_supported(None, harmless, alone=True) and not is_supported(None, harmful, alone=True)
+    assert is_supported(None, harmless, alone=False)
 
 
 def test_no_cause_is_named_that_is_sure_to_do_harm():
     """Over the horizon, a reading of an upright pendulum that was told early made errors larger by 8 to 32 %."""
     sure = Evidence(100.0, 100.0)
-    assert is_supported(sure, Gain(-20.0, -32.0, 1.0))
-    assert not is_supported(sure, Gain(-20.0, -32.0, -8.0))
+    assert is_supported(sure, Gain(-20.0, -32.0, 1.0), alone=True)
+    assert not is_supported(sure, Gain(-20.0, -32.0, -8.0), alone=True)
