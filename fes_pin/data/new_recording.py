@@ -212,31 +212,40 @@ def propose(
     InputError
         The file cannot be read, or holds no numbers.
     """
+    recording, form, units, header = _read(path, stated, chosen)
+    return as_seen(recording, form, units, schema, revolute, header.rate_hz, header.said)
+
+
+def _read(
+    path: Path, stated: Mapping[str, Any], chosen: Collection[str] = ()
+) -> tuple[Table, TextForm | None, Mapping[str, str], Header]:
+    """The columns of numbers of a file, the form of a text, the units that are stated apart, and its header."""
     if is_text(path):
         form, header = sniffed(path, stated)
         recording = _numbers(path, form)
         units = {name: header.units[k] for k, name in enumerate(recording.names) if k in header.units}
-    else:
-        form, header = None, Header()
-        sheet = str(stated.get("sheet", ""))
-        names, rate_hz, said = by_length(path, chosen, sheet) if is_nested(path) else (None, None, ())
-        recording = read_recording(path, TextForm(sheet=sheet), names)
-        header = Header(rate_hz=rate_hz, said=said)
-        units = {}
-    return as_seen(recording, form, {**recording.units, **units}, schema, revolute, header.rate_hz, header.said)
+        return recording, form, {**recording.units, **units}, header
+    sheet = str(stated.get("sheet", ""))
+    names, rate_hz, said = by_length(path, chosen, sheet) if is_nested(path) else (None, None, ())
+    recording = read_recording(path, TextForm(sheet=sheet), names)
+    return recording, None, recording.units, Header(rate_hz=rate_hz, said=said)
 
 
 def rig_held(paths: Sequence[Path], schemas: Iterable[RigSchema], stated: Mapping[str, Any]) -> RigSchema | None:
-    """The rig without a URDF, of fewest numbers, whose stimulus and reading every file holds; None where there is none.
+    """Return the rig without a URDF, of fewest numbers, whose stimulus and reading every file holds; None without one.
 
-    A stimulus is known from a pulse width, a charge or a trigger: a current may be that of a motor.
+    A stimulus is known from a pulse width, a charge or a trigger: a current may be that of a motor. A file that cannot
+    be read holds none here: the error is raised where the file is read for its rig.
     """
+    try:
+        read = [_read(path, stated)[:3] for path in paths]
+    except InputError:
+        return None
     for schema in sorted((s for s in schemas if s.owner is not None and not s.files), key=lambda s: len(s.constants)):
         free = {c for kind, c in schema.outputs.items() if kind != IMPOSED}
-        with suppress(InputError):  # which is raised where the file is read for its rig
-            found = [propose(path, schema, None, stated).candidates for path in paths]
-            if all(any(c.get(n) for n in PULSES) and any(c.get(n) for n in free) for c in found):
-                return schema
+        found = [as_seen(*one, schema, None).candidates for one in read]
+        if all(any(c.get(n) for n in PULSES) and any(c.get(n) for n in free) for c in found):
+            return schema
     return None
 
 
@@ -246,7 +255,7 @@ def as_seen(
     stated: Mapping[str, str],
     schema: RigSchema,
     revolute: bool | None,
-    rate_hz: float | None,
+    rate_hz: float | None = None,
     said: tuple[str, ...] = (),
 ) -> Proposal:
     """What columns of numbers seem to hold for a rig, by their names and the units that are stated apart from these."""

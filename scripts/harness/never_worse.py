@@ -161,10 +161,7 @@ def errors_of_truth(
     """Errors E of the true model, percent, by measure; none where its values do not state a model of the library."""
     from fes_pin.models.effects import effect_named  # noqa: PLC0415
 
-    try:
-        if not all(name in truth and _has_one_value(effect_named(name)) for name in hidden):
-            return {}
-    except fp.InputError:  # it is in no library
+    if not all(name in truth and _has_one_value(effect_named(name)) for name in hidden):
         return {}
     true = Regressed(tuple(hidden), {}, {n: {"value": value} for n, value in truth.items()})
     return {n: errors[0] for n, errors in errors_against(study, true, unseen).items()}

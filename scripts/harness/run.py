@@ -181,7 +181,7 @@ def answered(
         known["unseen"] = unseen_percent(found, truth)
         if withholds:
             known["against"] = never_worse.errors_against(study, found, unseen)
-            if is_worse(known["against"]):
+            if is_worse(known["against"]) and not item.outside:
                 known["true"] = never_worse.errors_of_truth(study, item.hidden, truth.parameters, unseen)
     return judged(item, truth, json.loads(found.to_json()), cpu_s=round(seconds, 2), **known)
 

@@ -251,12 +251,12 @@ def never_worse(rows: Sequence[Row]) -> list[str]:
         lines.append(f"{name}: median {middle:.3g}, {share}; largest {most:.3g} ({where.key})")
     odd = [row for row in rows if worst.get(row.key, 0.0) > WORSE_ERROR]
     if worst:
-        good, lucky = len(worst) - len(odd), sum(not row.error and not _beaten(row) for row in odd)
+        good, as_true = len(worst) - len(odd), sum(not row.error and not _beaten(row) for row in odd)
         lines.append(
             f"every error at most {WORSE_ERROR} times: {interval(good, len(worst))}; largest {max(worst.values()):.3g}"
         )
         lines.append(
-            f"the same, or at most {WORSE_ERROR} times that of the true model: {interval(good + lucky, len(worst))}"
+            f"the same, or at most {WORSE_ERROR} times that of the true model: {interval(good + as_true, len(worst))}"
         )
     return [*lines, *(_of_truth(row, worst[row.key]) for row in odd)]
 

@@ -76,6 +76,13 @@ def test_studies_of_a_folder_have_the_answers_beside_them(tmp_path, asked):
     assert answered(str(tmp_path), item).kind == "outside"
 
 
+def test_a_cause_of_no_library_has_no_true_model(asked, monkeypatch):
+    item = next(item for item in generator_of("driven").plan(3) if item.outside)
+    monkeypatch.setattr(runs.never_worse, "errors_against", lambda *_: {"free, unseen": (2.0, 4.0, 1.0)})
+    row = answered("driven", item, withholds=True)
+    assert row.error is None and row.against and not row.true
+
+
 def test_nothing_is_named_where_nothing_is_hidden(monkeypatch):
     monkeypatch.setattr(stimuli, "DURATION_S", 4.0)
     found = answered("free", Item("muscle-none-null-d0-white-5", 5))

@@ -115,10 +115,6 @@ def test_nothing_is_measured_where_no_effort_was_recorded():
     assert errors_against(study, SimpleNamespace(), ()) == {}
 
 
-def test_a_cause_of_no_library_has_no_true_model():
-    assert errors_of_truth(SimpleNamespace(), ("damping_drift",), {"damping_drift": 1.0}, ()) == {}
-
-
 def test_ratios_are_counted():
     inf = float("inf")
     rows = [

@@ -67,8 +67,10 @@ def test_trials_that_are_swung_up_begin_where_they_hang(side, tmp_path):
     up = np.pi * np.minimum(time / 2.0, 1.0) ** 2 * (3.0 - 2.0 * np.minimum(time / 2.0, 1.0))
     rng = np.random.default_rng(3)
     motions = [turn * up + 1e-3 * rng.standard_normal(len(up)) for turn in (side, side, -side)]
-    motions.append(0.95 * side * up)  # which does not wrap
-    trials = [free(f"{k}", wrapped(q, TURN, -np.pi), time) for k, q in enumerate(motions)]
+    motions.append(0.95 * side * up)  # which does not wrap, and has a spike
+    motions[-1][100] = 1e5
+    trials = [free(f"{k}", wrapped(q, TURN, -np.pi), time) for k, q in enumerate(motions[:-1])]
+    trials.append(free("3", motions[-1], time))
     read = with_whole_turns(trials, joint(tmp_path, trials).files)
     for one, q in zip(read, motions, strict=True):
         assert np.abs(one["position"] - q).max() < 1e-9

@@ -21,8 +21,8 @@ ANGLES = ("position", "angle_rad")
 FEWEST = 10
 """Samples of a reading that is looked at, at least."""
 USUAL, TIMES = 0.99, 3.0
-"""Share of second differences that are usual, and their multiple that one at a jump may reach: Gaussian noise leaves
-the threefold of its 99 % once in 1e14 samples."""
+"""Share of angles and of second differences that are usual, and the multiple of these that one at a jump may reach:
+Gaussian noise leaves the threefold of its 99 % once in 1e14 samples."""
 COARSE = 0.125
 """Largest second difference at a jump, as a share of the period: a motion that bends more is not told from a jump."""
 SHORTEST_COUNTER = 256
@@ -52,8 +52,8 @@ class Continuous(NamedTuple):
 
 
 def middle(values: np.ndarray) -> float:
-    """Return the angle from which a motion is nowhere farther than half its range."""
-    return 0.5 * float(np.nanmin(values) + np.nanmax(values))
+    """Return the middle of the range of a motion, shape (n,), that spikes are not part of: see `USUAL`."""
+    return float(np.nanquantile(values, (1.0 - USUAL, USUAL)).mean())
 
 
 def table_without_wraps(table: Table, revolute: bool | None) -> Table:

@@ -1,10 +1,10 @@
 """Curvature of the sensor's characteristic."""
 
 from dataclasses import dataclass
-from math import pi
 
 import numpy as np
 
+from fes_pin.models.maths import TURN
 from fes_pin.models.stage import FromAPlace, Measured, Scalar, Signals, Stage, counted_from, parameter, refinement
 
 
@@ -15,7 +15,8 @@ class SensorNonlinearity(FromAPlace):
         y + curvature x^2 (1 + skew x),   x = y - y_rest
 
     On a joint y_rest is where a trial begins (`place` 0), where no effort need hold the joint (1), or the zero of its
-    URDF (2), whichever fits.
+    URDF (2), whichever fits. The characteristic of an angle repeats itself each turn: none is found where the reading
+    passes more than 2 pi, nor where a slide's passes more than 2 pi m.
 
     Tell-tale: large excursions are read wrongly to one side, small ones and rest rightly.
     Source: the second-order term of a potentiometer's characteristic, loaded or off its axis, and the third.
@@ -37,8 +38,8 @@ class SensorNonlinearity(FromAPlace):
     name, stage, signal, rigs = "sensor_nonlinearity", Stage.SENSOR, "reading", ("ankle", "joint")
 
     def smallest(self, measured: Measured) -> dict[str, float]:
-        """No size where the reading passes more than a turn: the characteristic of an angle repeats each turn."""
-        turns = "position" in measured and np.ptp(measured["position"]) > 2.0 * pi
+        """No size where the reading passes more than a turn."""
+        turns = "position" in measured and np.ptp(measured["position"]) > TURN
         return {"curvature": self.parameters()["curvature"].upper} if turns else {}
 
     def apply(self, value: Scalar, s: Signals) -> Scalar:
