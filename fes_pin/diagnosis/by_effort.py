@@ -11,7 +11,7 @@ import numpy as np
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.along_motion import effort_percent
+from fes_pin.diagnosis.errors_ahead import squared_errors
 from fes_pin.diagnosis.held_out import Again
 from fes_pin.diagnosis.likelihood_models import Found, LikelihoodModels, LikelihoodSearch
 from fes_pin.diagnosis.verdict import RigState, RigVerdict
@@ -20,7 +20,6 @@ from fes_pin.identify.likelihood_fit import LikelihoodFit, at_values, refit
 from fes_pin.infer.estimators import AnyState, Estimator
 from fes_pin.infer.scatter import as_wide_as
 from fes_pin.infer.search import BEAM, FITTED, Policy
-from fes_pin.infer.text import percent
 from fes_pin.infer.verdict import State
 from fes_pin.models.rigs.joint import Joint
 
@@ -148,34 +147,38 @@ class ValuesOfInverseDynamics(InverseDynamics):
             return None
         assert isinstance(first.verdict, RigVerdict)
         verdict = ValuesByEffort(search, first.verdict.test)
-        found = verdict.in_place_of(search.result(names))
-        own = State(verdict, found, verdict.weigh(found), {}, frozenset(names), replaced=first)
-        is_refuted = any(e.high < 0.0 for e in own.weighed.evidence.values())
-        return None if is_refuted or any(getattr(verdict, claim)(own) for claim in OF_SIZES) else own
+        return _unless_refuted(first, verdict, verdict.in_place_of(search.result(names)))
 
 
-def never_worse(state: RigState) -> tuple[RigState, list[str]]:
-    """Return a state with a warning, and with other values where its own predict efforts worse than the beliefs do.
+class ValuesOfTheSameSet(InverseDynamics):
+    """The set of the likelihood with the values of inverse dynamics.
 
-    They are those of inverse dynamics then, of the same set.
+    Friction that a model describes roughly near rest is process noise to a filter, which then tells other values from
+    little of the data. Inverse dynamics weighs the rows near rest less.
     """
-    models, found, first = state.search.models, state.found, state.verdict
-    by_effort, best = models.by_effort, state.found.best
-    if by_effort is None or not by_effort.knows(best.names):
-        return state, []
-    trials, band = models.trials, by_effort.models.rows.band
-    now, believed = (effort_percent(one, trials, band) for one in (best.model, models.model))
-    if now is None or believed is None or now <= believed:
-        return state, []
-    assert isinstance(first, RigVerdict)
-    verdict = ValuesByEffort(state.search, first.test)
-    again = verdict.in_place_of(found)
-    then = effort_percent(again.best.model, trials, band)
-    if then is None or then >= now:
-        return state, []
-    words = f"the likelihood's values predict the effort with E {percent(now)}, the believed ones {percent(believed)}; "
-    words += f"those of least squares of the effort are given: {percent(then)}"
-    return replace(state, verdict=verdict, found=again, weighed=verdict.weigh(again)), [words]
+
+    def state(self, first: RigState) -> RigState | None:
+        """Return the state; None where these values do not predict the fitted trials better over the horizon."""
+        search, by_effort, best = first.search, first.search.models.by_effort, first.found.best
+        if by_effort is None or search.was_stopped or not by_effort.knows(best.names):
+            return None
+        assert isinstance(first.verdict, RigVerdict)
+        verdict = ValuesByEffort(search, first.verdict.test)
+        found, horizon, trials = verdict.in_place_of(first.found), search.models.judged_s, search.models.trials
+        then, now = (squared_errors([(f, best, trials)], horizon) for f in (found.best, best))
+        return _unless_refuted(first, verdict, found) if then.error_percent() < now.error_percent() else None
+
+
+def _unless_refuted(first: RigState, verdict: ValuesByEffort, found: Found) -> RigState | None:
+    """Return the state of a set at the values of inverse dynamics.
+
+    None where the likelihood of held-out data refutes a cause, or a size is uncertain or impossible.
+    """
+    names, weighed = found.best.names, verdict.weigh(found)
+    rejected = {n: one for n, one in first.rejected.items() if n not in names}
+    own = State(verdict, found, weighed, rejected, frozenset(names), replaced=first, tied=first.tied)
+    is_refuted = any(e.high < 0.0 for e in weighed.evidence.values())
+    return None if is_refuted or any(getattr(verdict, claim)(own) for claim in OF_SIZES) else own
 
 
 def named_by_one(first: RigState, answer: RigState) -> list[str]:

@@ -21,6 +21,7 @@ from fes_pin.diagnosis.logged import (
     ASKED_OF_READINGS,
     LogFaults,
     comparable,
+    likeliest,
     with_tests,
     with_warnings,
 )
@@ -154,7 +155,7 @@ class _Work:
             fault = None if self.stops else estimate(faults, answer)
             if fault is not None:
                 again = partial(self._logged, study)
-                answer, test = fault.decided(answer, again, lambda one: one.extended, comparable)
+                answer, test = fault.decided(answer, again, likeliest, comparable)
                 tests.append(test)
         timed = faults.with_timing(answer) if logged else answer
         return with_warnings(with_tests(timed, tests), tests, study.trials)

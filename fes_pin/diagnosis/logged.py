@@ -60,7 +60,7 @@ class LogFaults(EffortNoise):
 
         It is None too where no time is left to estimate it.
         """
-        fitted, noise, bare = answer.extended, answer.log.effort_noise, None
+        fitted, noise, bare = likeliest(answer), answer.log.effort_noise, None
         if noise:
             bare = self.in_time(lambda: maximum_from(fitted, self.prepared(self.trials)), None)
             if bare is None:
@@ -87,7 +87,7 @@ class LogFaults(EffortNoise):
 
         That of the nominal model counts if the answer has a lack of fit, or a higher criterion.
         """
-        nominal, extended = answer.nominal, answer.extended
+        nominal, extended = answer.nominal, likeliest(answer)
         row_s = min(t.dt for t in extended.trials)
         as_logged = round(row_s / min(t.dt for t in self.trials)) == 1
         late = lateness_of(extended, row_s, as_logged)
@@ -118,6 +118,11 @@ class LogFaults(EffortNoise):
 ASKED_OF_READINGS: tuple[Callable[[LogFaults, Diagnosis], Fault | None], ...] = (LogFaults.low_pass,)
 ASKED_OF_EFFORTS = (LogFaults.effort_noise, LogFaults.lateness)
 """Faults in the order in which they are estimated, of logs without and with efforts in closed loop."""
+
+
+def likeliest(answer: Diagnosis) -> LikelihoodFit:
+    """Return the maximum of the likelihood of the set of an answer."""
+    return answer.likeliest or answer.extended
 
 
 def with_timing_of(log: Log, timed: Log) -> Log:

@@ -8,7 +8,7 @@ import numpy as np
 
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.by_effort import InverseDynamics, ValuesOfInverseDynamics, named_by_one, never_worse
+from fes_pin.diagnosis.by_effort import InverseDynamics, ValuesOfInverseDynamics, ValuesOfTheSameSet, named_by_one
 from fes_pin.diagnosis.decide.chosen_again import share_of
 from fes_pin.diagnosis.decide.rivals import estimates, experiment, not_identifiable, ranking, seen_sizes
 from fes_pin.diagnosis.errors_ahead import AheadErrors, free_errors, noise_that_is_small
@@ -50,10 +50,10 @@ def diagnosis_of(
     first, white = RigVerdict(search, trials[1]).of(found), WhiteProcessNoise()
     estimators = (SlowProcessNoise(), InverseDynamics(), ValuesOfInverseDynamics(), white, LeastSquares())
     chosen: RigState = choose(first, estimators, search.models.seed)
-    state, said = never_worse(chosen)
+    state: RigState = choose(chosen, [ValuesOfTheSameSet()], search.models.seed)
     verdict = state.verdict
     assert isinstance(verdict, RigVerdict)
-    other = white.fit if chosen.verdict is first.verdict else first.found.best
+    other = white.fit if state.replaced is None else state.replaced.found.best
     found, left, best = state.found, verdict.lack_of_fit(state), _with_intervals(state, other)
     fitted, *others = verdict.errors(state)
     held = others[0] if others else None
@@ -61,7 +61,7 @@ def diagnosis_of(
     fits = verdict.gains_fitted(found) if state.weighed.folds else state.weighed.gains
     causes = [_cause(verdict, state, e, best, (fits[e.name], on)) for e in best.model.effects if not e.is_fault]
     causes.sort(key=lambda c: -c.gain_held_out.percent)
-    said += [*named_by_one(first, state), *words_of_reading(best.noise, best.model.rig, trials[0])]
+    said = [*named_by_one(first, state), *words_of_reading(best.noise, best.model.rig, trials[0])]
     said += _words_of_far(search.models, found.nominal)
     said += words_of_bounds(state.rejected, found.best, search.models.model)
     reached = [e for e in (fitted[1].free, held and held[1].free) if e is not None]
@@ -84,6 +84,7 @@ def diagnosis_of(
         seen=_seen(search.models, found.nominal, word),
         random=state.weighed.random,
         is_driven=search.models.judged_s is not None,
+        likeliest=state.search.models.fits.get(best.names),
         reason=left.reason if not left.unexplained or state.weighed.is_moved else UNMOVED,
         why=why_of(state),
         ahead=AheadErrors(search.models.horizon_s, *fitted, *(held or (None, None))),

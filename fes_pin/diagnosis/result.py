@@ -56,6 +56,9 @@ class Diagnosis(ModelResult):
     is_driven
         Whether a controller answers the reading, or imposes the motion: then errors are judged over the horizon, else
         those of free simulations.
+    likeliest
+        The maximum of the likelihood of the same set, under which faults of the log are tested; None where `extended`
+        is that.
     """
 
     nominal: LikelihoodFit
@@ -70,6 +73,7 @@ class Diagnosis(ModelResult):
     ahead: AheadErrors | None = None
     log: Log = field(default_factory=Log)
     is_driven: bool = False
+    likeliest: LikelihoodFit | None = None
 
     @property
     def is_falling(self) -> bool:
