@@ -48,9 +48,9 @@ def diagnosis_of(
 ) -> Diagnosis:
     """Return the diagnosis of a rig from a search by the likelihood that has run."""
     first, white = RigVerdict(search, trials[1]).of(found), WhiteProcessNoise()
-    estimators = (SlowProcessNoise(), InverseDynamics(), ValuesOfInverseDynamics(), white, LeastSquares())
-    chosen: RigState = choose(first, estimators, search.models.seed)
-    state: RigState = choose(chosen, [ValuesOfTheSameSet()], search.models.seed)
+    by_effort = (InverseDynamics(), ValuesOfInverseDynamics())
+    estimators = (SlowProcessNoise(), *by_effort, white, LeastSquares(), ValuesOfTheSameSet())
+    state: RigState = choose(first, estimators, search.models.seed)
     verdict = state.verdict
     assert isinstance(verdict, RigVerdict)
     other = white.fit if state.replaced is None else state.replaced.found.best

@@ -80,12 +80,12 @@ class Compared:
 
 
 def choose(first: AnyState, others: Sequence[Estimator], seed: int = 0) -> AnyState:
-    """Return the state of the first estimator, or of one that predicts materially better; the first such one.
+    """Return the state of the first estimator, or of one that predicts materially better.
 
-    It predicts better where the 95 % interval of the share of the squared error that it removes is above
-    `NOTHING_PERCENT` in one currency, and it is worse in none. Of sets of different sizes the larger predicts better
-    where that share is also above `FORM_SHARE` in each other currency: a cause that lessens the error of one alone is
-    an error of form. Noise is not subtracted: each estimator has its own, and that of a wrong model is large. Data that
+    Each estimator is compared with the answer so far. It predicts better where the 95 % interval of the share of the
+    squared error that it removes is above `NOTHING_PERCENT` in one currency, and it is worse in none. Of sets of
+    different sizes the larger predicts better where that interval also reaches beyond `FORM_SHARE` in each other
+    currency: a cause that lessens the error of one alone is an error of form. Noise is not subtracted: each estimator has its own, and that of a wrong model is large. Data that
     the study itself holds out are not used: gains on them would be optimistic.
 
     Where neither predicts better, and the other has one cause in the place of another, the data do not distinguish the
@@ -99,8 +99,8 @@ def choose(first: AnyState, others: Sequence[Estimator], seed: int = 0) -> AnySt
         errors = f": {'; '.join(map(str, compared))}"
         if said := _why(first, other, compared, estimator):
             step = Step(CHOICE, words=f"{estimator.words(other)} {said}{errors}")
-            return replace(other, steps=(*first.steps, *other.steps, step))
-        if compared and (any(c.is_better for c in compared) or not any(c.is_worse for c in compared)):
+            first = replace(other, steps=(*first.steps, *other.steps, step))
+        elif compared and (any(c.is_better for c in compared) or not any(c.is_worse for c in compared)):
             first = _tied(first, other, f"{estimator.words(other)}{errors}")
     return first
 
@@ -120,8 +120,8 @@ def _why(first: AnyState, other: AnyState, compared: Sequence[Compared], estimat
 
 
 def _is_felt(shares: Sequence[Gain]) -> bool:
-    """Return whether a share is certain in one currency, and more than an error of form may leave in each other one."""
-    felt = [share.percent > WHOLE * FORM_SHARE for share in shares]
+    """Return whether a share is certain in one currency, and may be more than an error of form in each other one."""
+    felt = [share.high > WHOLE * FORM_SHARE for share in shares]
     return any(share.low > NOTHING_PERCENT and all(felt[:k] + felt[k + 1 :]) for k, share in enumerate(shares))
 
 
