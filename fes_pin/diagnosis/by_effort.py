@@ -16,7 +16,7 @@ from fes_pin.diagnosis.held_out import Again
 from fes_pin.diagnosis.likelihood_models import Found, LikelihoodModels, LikelihoodSearch
 from fes_pin.diagnosis.verdict import RigState, RigVerdict
 from fes_pin.effort.search import NOT_CARRIED, has_efforts, searched
-from fes_pin.identify.likelihood_fit import LikelihoodFit, at_values, refit
+from fes_pin.identify.likelihood_fit import LikelihoodFit, at_values
 from fes_pin.infer.estimators import AnyState, Estimator
 from fes_pin.infer.scatter import as_wide_as
 from fes_pin.infer.search import BEAM, FITTED, Policy
@@ -99,7 +99,8 @@ class ValuesByEffort(VerdictByEffort):
 
     def __init__(self, search: LikelihoodSearch, test: Sequence[Trial]) -> None:
         super().__init__(search, test)
-        self.refitted = Again(lambda fitted, trials: self.at_efforts(refit(fitted, trials)))
+        known = self.refitted
+        self.refitted = Again(lambda fitted, trials: self.at_efforts(*known([(fitted, trials)])))
 
     def at_efforts(self, fitted: LikelihoodFit) -> LikelihoodFit:
         """Return a fit at the values of inverse dynamics of its trials.

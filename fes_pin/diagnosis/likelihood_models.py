@@ -1,13 +1,14 @@
 """Sets of causes of one study for the search of `infer`: fits by the likelihood, and the rules that judge them."""
 
 import math
+from functools import cached_property
 
 from fes_pin.diagnosis.errors_ahead import are_large, random_parts
-from fes_pin.diagnosis.held_out import Fold, Found, gains_of
+from fes_pin.diagnosis.held_out import Again, Fold, Found, as_random_as_in_all, gains_of
 from fes_pin.effort.search import FoundByEffort
 from fes_pin.identify.afar import is_rounding
 from fes_pin.identify.likelihood import is_simulated
-from fes_pin.identify.likelihood_fit import LikelihoodFit
+from fes_pin.identify.likelihood_fit import LikelihoodFit, refit
 from fes_pin.infer.distributions import chi2_tail
 from fes_pin.infer.fits import Names
 from fes_pin.infer.levels import FORM_GAIN, NOTHING_PERCENT
@@ -36,6 +37,16 @@ class LikelihoodModels(LikelihoodFits):
 
     by_effort: FoundByEffort | None = None
     refusal = ""
+
+    @cached_property
+    def refitted(self) -> Again:
+        """Fits to other trials, with the noise of these."""
+        return Again(refit)
+
+    @cached_property
+    def as_random(self) -> Again:
+        """Fits to other trials, with the noise of all."""
+        return Again(as_random_as_in_all)
 
     def as_wide_as_efforts(self, fitted: LikelihoodFit) -> LikelihoodFit:
         """Return a fit with intervals that include the estimates of inverse dynamics that differ significantly."""

@@ -58,8 +58,11 @@ def diagnosis_of(
     fitted, *others = verdict.errors(state)
     held = others[0] if others else None
     on = HELD_OUT if trials[1] else CROSS_VALIDATED if held else FITTED
-    fits = verdict.gains_fitted(found) if state.weighed.folds else state.weighed.gains
-    causes = [_cause(verdict, state, e, best, (fits[e.name], on)) for e in best.model.effects if not e.is_fault]
+    causes = [
+        _cause(verdict, state, e, best, (state.weighed.fitted[e.name], on))
+        for e in best.model.effects
+        if not e.is_fault
+    ]
     causes.sort(key=lambda c: -c.gain_held_out.percent)
     said = [*named_by_one(first, state), *words_of_reading(best.noise, best.model.rig, trials[0])]
     said += _words_of_far(search.models, found.nominal)

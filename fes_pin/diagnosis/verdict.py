@@ -6,78 +6,29 @@ on held-out trials. For a rig in closed loop these are errors over a horizon: er
 simulations.
 """
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.decide.chosen_again import ChosenAgain, is_chosen, share_of
-from fes_pin.diagnosis.errors_ahead import (
-    Ahead,
-    Pairs,
-    RandomPart,
-    are_large,
-    errors_ahead,
-    free_errors,
-    noise_that_is_small,
-    random_parts,
-    squared_errors,
-)
-from fes_pin.diagnosis.held_out import (
-    Again,
-    Fold,
-    as_random_as_in_all,
-    evidence_of,
-    folds_that_tell,
-    gains_of,
-    make_folds,
-)
+from fes_pin.diagnosis.errors_ahead import Ahead, Pairs, errors_ahead, squared_errors
+from fes_pin.diagnosis.held_out import Fold, folds_that_tell, make_folds
 from fes_pin.diagnosis.likelihood_models import Found, LikelihoodModels, LikelihoodSearch
-from fes_pin.diagnosis.rejected import is_moved_by_what_is_recorded, no_noise, with_rejected_causes
+from fes_pin.diagnosis.rejected import with_rejected_causes
+from fes_pin.diagnosis.weighed import RigWeighed
 from fes_pin.identify.error_measures import FREE
-from fes_pin.identify.likelihood_fit import LikelihoodFit, refit
+from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.per_trial import falls
 from fes_pin.infer.held_out import Errors
-from fes_pin.infer.levels import SMALL_SHARE
-from fes_pin.infer.noise import NoiseModel
-from fes_pin.infer.result import FITTED, Gain, Remainder
+from fes_pin.infer.result import Remainder
 from fes_pin.infer.scatter import as_wide_as_trials_differ, with_honest_intervals
-from fes_pin.infer.text import WHOLE
-from fes_pin.infer.verdict import State, Verdict, Weighed
-from fes_pin.remainder.lack_of_fit import lack_of_fit
-from fes_pin.remainder.unrepeated import Voluntary, over_voluntary, voluntary_effort
+from fes_pin.infer.verdict import State, Verdict
 
-WORSE = 2.0
-"""Ratio of errors of free simulations from which a cause is refuted: those of two right models differ by less."""
 LATER_S = 1.0
 """Later horizon by which two estimators are compared, s: a slow cause, as a spring, shows there."""
 EFFORT = "the low-passed effort"
 """What inverse dynamics predicts."""
-
-
-@dataclass(frozen=True)
-class RigWeighed(Weighed):
-    """Evidence of trials on a set of causes.
-
-    Attributes
-    ----------
-    folds
-        Trials that are held out, and fits without them; none where none can be.
-    random
-        Process noise in the fit of the set.
-    no_noise
-        Why the error of a simulation cannot be measurement noise; None where it may be.
-    voluntary
-        Effort that the set leaves, and that differs between equal cycles of an imposed motion; None without such.
-    """
-
-    folds: Sequence[Fold] = ()
-    random: tuple[RandomPart, ...] = ()
-    no_noise: str | None = None
-    voluntary: Voluntary | None = None
-
-
 RigState = State[LikelihoodFit, LikelihoodModels, RigWeighed]
 
 
@@ -98,27 +49,12 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
     def __init__(self, search: LikelihoodSearch, test: Sequence[Trial]) -> None:
         super().__init__(search)
         self.models, self.test = search.models, tuple(test)
-        self.refitted, self._alike = Again(refit), Again(as_random_as_in_all)
+        self.refitted = self.models.refitted
         self._chosen: dict[int, tuple[Found, list[LikelihoodFit]]] = {}
 
     def weigh(self, found: Found) -> RigWeighed:
         """Return the evidence of held-out trials and of the tests of lack of fit on a set."""
-        folds = make_folds(found, self.models.trials, self.test, self.refitted)
-        gains = gains_of(folds, found.without, self.models.judged_s, self.models.seed)
-        own = voluntary_effort(found.best)
-        return RigWeighed(
-            gains=gains if folds else self.gains_fitted(found),
-            evidence=evidence_of(folds, found, self._alike),
-            lack_of_fit=lack_of_fit(found.best),
-            is_random=are_large(random := random_parts(found.best)),
-            is_moved=is_moved_by_what_is_recorded(found.best),
-            carried=self._refuted_in_free_motion(found),
-            folds=folds,
-            random=random,
-            no_noise=no_noise(found.best),
-            voluntary=own,
-            over_unrepeated={} if own is None else over_voluntary(own, found.best),
-        )
+        return RigWeighed(self.models, found, self.test, self.refitted)
 
     def with_intervals(self, fitted: LikelihoodFit) -> LikelihoodFit:
         """Return a fit of a set with the intervals of its estimator."""
@@ -128,31 +64,6 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
         """Return the fit of a set with intervals that include the differences between folds."""
         again = [f.best for f in state.weighed.folds if f.within]
         return as_wide_as_trials_differ(self.with_intervals(state.found.best), again)
-
-    def _refuted_in_free_motion(self, found: Found) -> dict[str, float]:
-        """Return the gain, percent, of causes with which free simulations of a driven joint are far worse.
-
-        Predictions over a horizon begin again at the readings. A stop that the joint passes by little costs them
-        little, and keeps a free simulation on its other side. In closed loop, where free simulations may drift, they
-        are asked only of a set that follows the trials without the cause.
-        """
-        if self.models.by_effort is None or self.models.judged_s is None or not found.without:
-            return {}
-        noise = noise_that_is_small(found.best)
-        error = {n: self._free_percent(f, noise) for n, f in {"": found.best, **found.without}.items()}
-        far = (n for n in found.without if error[n] < WHOLE * SMALL_SHARE and error[""] > WORSE * error[n])
-        return {n: 100.0 * (1.0 - error[""] / error[n]) for n in far}
-
-    def _free_percent(self, fitted: LikelihoodFit, noise: NoiseModel) -> float:
-        """Return E of free simulations of the fitted trials, percent; infinite where they are not finite."""
-        found = free_errors(fitted.model, self.models.trials, noise, fitted).error_percent()
-        return found if math.isfinite(found) else math.inf
-
-    def gains_fitted(self, found: Found) -> dict[str, Gain]:
-        """Return the gain of each cause on the fitted trials, by fits to all of them."""
-        whole = Fold(found.nominal, found.best, found.without, self.models.trials)
-        gains = gains_of([whole], found.without, self.models.judged_s, self.models.seed)
-        return {n: replace(one, on=FITTED) for n, one in gains.items()}
 
     def errors_chosen(self, state: RigState) -> tuple[float, float] | None:
         """See `Verdict.errors_chosen`; None without trials that are held out."""
@@ -213,10 +124,9 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
         best, by_effort = state.found.best, self.models.by_effort
         if currency == EFFORT and by_effort is not None:
             return by_effort.errors(best.names) if by_effort.knows(best.names) else None
-        train, folds, floor = self.models.trials, state.weighed.folds, unit.found.best
+        train, floor = self.models.trials, unit.found.best
         held = folds_that_tell(floor) if len(train) > 1 else []  # the same of both sets
-        if [[*f.out] for f in folds] != held:
-            folds = make_folds(replace(state.found, nominal=best, without={}), train, (), self.refitted, held)
+        folds = make_folds(replace(state.found, nominal=best, without={}), train, (), self.refitted, held)
         pairs = [(f.best, floor, f.test) for f in folds]  # what folds choose again is the same of both
         return squared_errors(pairs or [(best, floor, train)], self.ahead[currency])
 

@@ -85,8 +85,9 @@ def choose(first: AnyState, others: Sequence[Estimator], seed: int = 0) -> AnySt
     Each estimator is compared with the answer so far. It predicts better where the 95 % interval of the share of the
     squared error that it removes is above `NOTHING_PERCENT` in one currency, and it is worse in none. Of sets of
     different sizes the larger predicts better where that interval also reaches beyond `FORM_SHARE` in each other
-    currency: a cause that lessens the error of one alone is an error of form. Noise is not subtracted: each estimator has its own, and that of a wrong model is large. Data that
-    the study itself holds out are not used: gains on them would be optimistic.
+    currency: a cause that lessens the error of one alone is an error of form. Noise is not subtracted: each estimator
+    has its own, and that of a wrong model is large. Data that the study itself holds out are not used: gains on them
+    would be optimistic.
 
     Where neither predicts better, and the other has one cause in the place of another, the data do not distinguish the
     two: they are equivalents in the state of the first.

@@ -181,6 +181,11 @@ class State(Generic[F, M, W]):
         """The candidates of the set."""
         return frozenset(self.found.without)
 
+    @property
+    def claimed(self) -> list[str]:
+        """Those that are claims."""
+        return list(filter(self.search.sets.is_claimed, self.found.without))
+
 
 class Verdict(ABC, Generic[F, M, W]):
     """The claims, in the order of `CLAIMS`, and the decisions that they use.
@@ -275,18 +280,20 @@ class Verdict(ABC, Generic[F, M, W]):
 
     def drop_unmoved(self, state: State[F, M, W]) -> State[F, M, W] | None:
         """Reject the weakest candidate of a set by which the recorded inputs do not move the system."""
-        return self._without_weakest(state, [] if state.weighed.is_moved else list(state.weighed.gains))
+        return self._without_weakest(state, [] if state.weighed.is_moved else state.claimed)
 
     def drop_insignificant(self, state: State[F, M, W]) -> State[F, M, W] | None:
         """Reject the weakest of the candidates that are not significant at the level of a claim."""
         found, sets = state.found, state.search.sets
-        weak = [n for n in state.weighed.gains if not found.p_values[n] < sets.level(found.best)]
+        weak = [n for n in state.claimed if not found.p_values[n] < sets.level(found.best)]
         return self._without_weakest(state, weak)
 
     def drop_errors_of_form(self, state: State[F, M, W]) -> State[F, M, W] | None:
         """Reject the weakest of the candidates that gain no more than an error of form, if process noise is large."""
+        if not state.weighed.is_random:
+            return None
         least, gains = WHOLE * FORM_SHARE, state.weighed.gains
-        return self._without_weakest(state, [n for n in gains if state.weighed.is_random and gains[n].low < least])
+        return self._without_weakest(state, [n for n in gains if gains[n].low < least])
 
     def drop_unsupported(self, state: State[F, M, W]) -> State[F, M, W] | None:
         """Reject the weakest of the candidates that held-out data do not support; see `infer.held_out.is_supported`.
@@ -304,7 +311,7 @@ class Verdict(ABC, Generic[F, M, W]):
     def drop_unrepeated(self, state: State[F, M, W]) -> State[F, M, W] | None:
         """Reject the weakest of the candidates that explain no more than equal repeats differ by in the mean."""
         over = state.weighed.over_unrepeated
-        weak = [n for n in state.weighed.gains if n in over and not over[n] > CONFIDENCE_95]
+        weak = [n for n in state.claimed if n in over and not over[n] > CONFIDENCE_95]
         return self._without_weakest(state, weak)
 
     def drop_that_predict_no_better(self, state: State[F, M, W]) -> State[F, M, W] | None:
@@ -312,10 +319,10 @@ class Verdict(ABC, Generic[F, M, W]):
 
         This is asked where there is a lack of fit.
         """
-        if not (state.weighed.gains and self.lack_of_fit(state).unexplained):
+        if not (state.claimed and self.lack_of_fit(state).unexplained):
             return None
         nominal, chosen = self.errors_chosen(state) or (1.0, 0.0)
-        return None if chosen < nominal else self._without_weakest(state, list(state.weighed.gains))
+        return None if chosen < nominal else self._without_weakest(state, state.claimed)
 
     def settle(self, state: State[F, M, W]) -> State[F, M, W] | None:
         """Search the rivals of a set from which candidates were rejected."""
@@ -330,18 +337,18 @@ class Verdict(ABC, Generic[F, M, W]):
 
     def drop_of_no_model(self, state: State[F, M, W]) -> State[F, M, W] | None:
         """Reject the weakest candidate of a model that is none: see `Sets.is_a_model`."""
-        is_none = bool(state.weighed.gains) and not state.search.sets.is_a_model(state.found.best)
-        return self._without_weakest(state, list(state.weighed.gains) if is_none else [])
+        is_none = bool(state.claimed) and not state.search.sets.is_a_model(state.found.best)
+        return self._without_weakest(state, state.claimed if is_none else [])
 
     def drop_impossible(self, state: State[F, M, W]) -> State[F, M, W] | None:
         """Reject the weakest candidate of a set with a size that is not physically possible."""
-        is_none = bool(state.weighed.gains) and not state.search.sets.is_possible(state.found.best)
-        return self._without_weakest(state, list(state.weighed.gains) if is_none else [])
+        is_none = bool(state.claimed) and not state.search.sets.is_possible(state.found.best)
+        return self._without_weakest(state, state.claimed if is_none else [])
 
     def drop_uncertain(self, state: State[F, M, W]) -> State[F, M, W] | None:
         """Reject the weakest of the candidates whose size is not certain, by the intervals of the answer."""
         sets, best = state.search.sets, self.estimated(state)
-        return self._without_weakest(state, [n for n in state.weighed.gains if not sets.is_certain(best, n)])
+        return self._without_weakest(state, [n for n in state.claimed if not sets.is_certain(best, n)])
 
     def _without_weakest(self, state: State[F, M, W], some: Sequence[str]) -> State[F, M, W] | None:
         """Return the state without the weakest of some candidates; None if there are none."""

@@ -7,7 +7,7 @@ from diagnosis.hidden import study_of
 
 from fes_pin.data.trial import derived_trial
 from fes_pin.diagnosis.likelihood_models import LikelihoodModels, LikelihoodSearch
-from fes_pin.diagnosis.verdict import RigVerdict, RigWeighed
+from fes_pin.diagnosis.verdict import RigVerdict
 from fes_pin.identify.ahead import free_residuals
 from fes_pin.identify.error_measures import FREE
 from fes_pin.infer.result import Remainder
@@ -44,11 +44,12 @@ def by_hand(folds):
 @pytest.mark.parametrize("own", [True, False])
 @pytest.mark.parametrize("replaced", [True, False])
 def test_a_lack_of_fit_by_either_estimator_stays(own, replaced):
-    verdict = RigVerdict(SimpleNamespace(models=SimpleNamespace(library=SimpleNamespace(effects=()))), ())
+    models = SimpleNamespace(library=SimpleNamespace(effects=()), refitted=None)
+    verdict = RigVerdict(SimpleNamespace(models=models), ())
 
     def state(unexplained, before=None):
         left = Remainder(unexplained, 1e-6 if unexplained else 0.5, "rate" if unexplained else None)
-        weighed = RigWeighed({}, {}, left, folds=(), random=(), no_noise=None)
+        weighed = SimpleNamespace(lack_of_fit=left, random=(), no_noise=None, voluntary=None)
         return State(verdict, SimpleNamespace(without={}), weighed, {}, frozenset(), replaced=before)
 
     assert verdict.lack_of_fit(state(own, state(replaced))).unexplained is (own or replaced)

@@ -13,9 +13,9 @@ from fes_pin.data.study import read_study
 from fes_pin.diagnosis.diagnosis import diagnose_joint
 from fes_pin.diagnosis.errors_ahead import Ahead, RandomPart, are_large
 from fes_pin.diagnosis.rejected import with_rejected_causes
-from fes_pin.diagnosis.verdict import RigVerdict, RigWeighed
+from fes_pin.diagnosis.verdict import RigVerdict
 from fes_pin.infer.result import Evidence, Gain, Remainder
-from fes_pin.infer.verdict import Rejected, State
+from fes_pin.infer.verdict import Rejected, State, Weighed
 
 NOTHING = Remainder(False, 0.5, None)
 LITTLE = (RandomPart("effort", 0.1, 0.1, 0.01),)
@@ -27,7 +27,7 @@ class Judged(RigVerdict):
     held_out = 1.0, 0.5
 
     def weigh(self, found):
-        return RigWeighed({}, {}, NOTHING)
+        return Weighed({}, {}, NOTHING)
 
     def errors(self, state):
         return [tuple(Ahead(e, e, e) for e in (1.0, 0.1)), tuple(Ahead(e, e, e) for e in self.held_out)]
@@ -35,15 +35,19 @@ class Judged(RigVerdict):
 
 def unsupported(evidence, low, random, held_out=Judged.held_out):
     """What is refused of a friction with the low end of its gain."""
-    verdict = Judged(SimpleNamespace(models=SimpleNamespace(judged_s=None, library=SimpleNamespace(effects=()))), ())
+    sets = SimpleNamespace(is_claimed=lambda name: True)
+    models = SimpleNamespace(judged_s=None, library=SimpleNamespace(effects=()), refitted=None)
+    verdict = Judged(SimpleNamespace(models=models), ())
     verdict.held_out = held_out
     gains = {"coulomb_friction": Gain(low + 1.0, low, low + 2.0)}
     fit = SimpleNamespace(sse=0.0)
     found = SimpleNamespace(
         without=dict.fromkeys(gains, fit), p_values=dict.fromkeys(gains, 0.0), nominal=fit, best=fit
     )
-    verdict.search = SimpleNamespace(result=lambda names: SimpleNamespace(without={}))
-    weighed = RigWeighed(gains, evidence, NOTHING, is_random=are_large(random), folds=(None,), random=random)
+    verdict.search = SimpleNamespace(result=lambda names: SimpleNamespace(without={}), sets=sets)
+    known = {"gains": gains, "evidence": evidence, "lack_of_fit": NOTHING, "is_random": are_large(random)}
+    own = {"over_unrepeated": {}, "folds": (None,), "random": random, "no_noise": None, "voluntary": None}
+    weighed = SimpleNamespace(**known, **own, is_robust=False)
     state = State(verdict, found, weighed, {}, frozenset(gains))
     claims = verdict.drop_errors_of_form, verdict.drop_unsupported, verdict.drop_that_predict_no_better
     return [claim.__name__ for claim in claims if claim(state) is not None]
