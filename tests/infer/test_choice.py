@@ -256,6 +256,7 @@ SURE, UNSURE = np.full(12, 1.0), np.tile([-40.0, 60.0], 6)
         (0.0 * SURE, 50.0 * SURE, "ab", False, False),  # an error of form of the effort
         (0.1 * UNSURE, 50.0 * SURE, "ab", False, False),  # as above: 1 % that is not sure is no sixteenth
         (0.5 * UNSURE, 50.0 * SURE, "ab", False, True),  # 5 % may be one
+        (-UNSURE, 50.0 * SURE, "ab", False, False),  # it does not lessen the error
         (SURE, 50.0 * SURE, "ab", False, True),  # sure in both
         (0.0 * SURE, 0.0 * SURE, "", True, True),  # neither predicts better: the smaller set
         (0.0 * SURE, 0.0 * SURE, "", False, False),
