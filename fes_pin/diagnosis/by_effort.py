@@ -29,7 +29,9 @@ def begun_by_effort(models: LikelihoodModels, trials: Sequence[Trial], thorough:
 
     Of sets of one cause those of largest score are fitted then. A thorough search begins with none, and fits all.
     """
-    rig = models.model.rig
+    rig, few = models.model.rig, Policy(fitted=BEAM, fitted_first=FITTED)
+    if models.proposed is not None:
+        return few
     if models.model.effects or not isinstance(rig, Joint) or not has_efforts(rig, trials):
         return Policy()
     try:
@@ -43,7 +45,7 @@ def begun_by_effort(models: LikelihoodModels, trials: Sequence[Trial], thorough:
     if thorough:
         return Policy()
     models.proposed = models.by_effort.model()
-    return Policy(fitted=BEAM, fitted_first=FITTED)
+    return few
 
 
 class VerdictByEffort(RigVerdict):
@@ -88,9 +90,10 @@ class InverseDynamics(Estimator):
             return None
         assert isinstance(first.verdict, RigVerdict)
         names, verdict = min(possible, key=lambda f: f.criterion).names, VerdictByEffort(search, first.verdict.test)
-        found = search.result(names)
-        own = State(verdict, found, verdict.weigh(found), {}, frozenset(names), replaced=first)
-        state = verdict.significant(own)
+        found = search.result(search.backward(names))
+        state = State(verdict, found, verdict.weigh(found), {}, frozenset(found.without), replaced=first)
+        while (fewer := verdict.drop_unrepeated(state)) is not None:
+            state = fewer
         return None if state.names == first.names else state
 
 
@@ -146,9 +149,7 @@ class ValuesOfInverseDynamics(InverseDynamics):
             return None
         if names not in search.models.fits or not search.models.is_possible(search.models.fits[names]):
             return None
-        assert isinstance(first.verdict, RigVerdict)
-        verdict = ValuesByEffort(search, first.verdict.test)
-        return _unless_refuted(first, verdict, verdict.in_place_of(search.result(names)))
+        return _at_own_values(first, search.result(names))
 
 
 class ValuesOfTheSameSet(InverseDynamics):
@@ -159,27 +160,32 @@ class ValuesOfTheSameSet(InverseDynamics):
     """
 
     def state(self, first: RigState) -> RigState | None:
-        """Return the state; None where these values do not predict the fitted trials better over the horizon."""
-        search, by_effort, best = first.search, first.search.models.by_effort, first.found.best
-        if by_effort is None or search.was_stopped or not by_effort.knows(best.names):
+        """Return the state; None where a cause of the set has no column, or as `_at_own_values` says."""
+        by_effort = first.search.models.by_effort
+        if by_effort is None or first.search.was_stopped or not by_effort.knows(first.found.best.names):
             return None
-        assert isinstance(first.verdict, RigVerdict)
-        verdict = ValuesByEffort(search, first.verdict.test)
-        found, horizon, trials = verdict.in_place_of(first.found), search.models.judged_s, search.models.trials
-        then, now = (squared_errors([(f, best, trials)], horizon) for f in (found.best, best))
-        return _unless_refuted(first, verdict, found) if then.error_percent() < now.error_percent() else None
+        return _at_own_values(first, first.found)
 
 
-def _unless_refuted(first: RigState, verdict: ValuesByEffort, found: Found) -> RigState | None:
+def _at_own_values(first: RigState, found: Found) -> RigState | None:
     """Return the state of a set at the values of inverse dynamics.
 
-    None where the likelihood of held-out data refutes a cause, or a size is uncertain or impossible.
+    None where these do not predict the fitted trials better over the horizon than the first state, where the likelihood
+    of held-out data refutes a cause, or where a size is uncertain or impossible.
     """
-    names, weighed = found.best.names, verdict.weigh(found)
+    assert isinstance(first.verdict, RigVerdict)
+    models, best = first.search.models, first.found.best
+    verdict = ValuesByEffort(first.search, first.verdict.test)
+    found = verdict.in_place_of(found)
+    then, now = (squared_errors([(f, best, models.trials)], models.judged_s) for f in (found.best, best))
+    if not then.error_percent() < now.error_percent():
+        return None
+    names = found.best.names
     rejected = {n: one for n, one in first.rejected.items() if n not in names}
-    own = State(verdict, found, weighed, rejected, frozenset(names), replaced=first, tied=first.tied)
-    is_refuted = any(e.high < 0.0 for e in weighed.evidence.values())
-    return None if is_refuted or any(getattr(verdict, claim)(own) for claim in OF_SIZES) else own
+    own = State(verdict, found, verdict.weigh(found), rejected, frozenset(names), replaced=first, tied=first.tied)
+    if any(getattr(verdict, claim)(own) for claim in OF_SIZES):
+        return None
+    return None if any(e.high < 0.0 for e in own.weighed.evidence.values()) else own
 
 
 def named_by_one(first: RigState, answer: RigState) -> list[str]:

@@ -42,8 +42,8 @@ from fes_pin.workers import attempted
 
 Ran = tuple[LikelihoodSearch, Found, Made | None]
 """A search, its result, and the trial that was restated, if any."""
-Ask = Callable[[Model], Ran]
-"""Search of causes in a model."""
+Ask = Callable[[Model, Model | None], Ran]
+"""Search of causes in a model, which begins with another that has some of them; with None it begins with none."""
 ZERO, SCALE = "zero_by_trial", "scale_by_trial"
 
 
@@ -133,7 +133,7 @@ def _further(ran: Ran, ask: Ask, kinds: Sequence[type[Effect]], tests: list[Corr
     kind = _likeliest(ran, kinds)
     if kind is None:
         return None
-    search, found, again = other = ask(_begun(ran, kind))
+    search, found, again = other = ask(begun := _begun(ran, kind), _with_causes(begun, ran[1].best.model))
     best, fault = found.best, ByTrial(kind.of_each_trial())
     one = fault.common(best)
     gain = max(one.sse - best.sse, 0.0) / excess_scatter(as_parameters(best, fault.effect), one)
@@ -161,6 +161,13 @@ def _begun(ran: Ran, kind: type[Effect]) -> Model:
     if kept < IDENTIFIABLE_SHARE:
         model = Model(replace(rig, fitted=rig.fitted_parameters()[1:]), model.effects)
     return model + kind.of_each_trial()
+
+
+def _with_causes(model: Model, found: Model) -> Model:
+    """Return a model with the causes of another that it lacks."""
+    return Model(
+        model.rig, (*model.effects, *(e for e in found.effects if e.name not in {m.name for m in model.effects}))
+    )
 
 
 def _likeliest(ran: Ran, kinds: Sequence[type[Effect]]) -> type[Effect] | None:

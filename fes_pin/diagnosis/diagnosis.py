@@ -176,7 +176,7 @@ class _Work:
         ran: list[LikelihoodSearch] = []
         self.tests = []
 
-        def asked_of(model: Model) -> Ran:
+        def asked_of(model: Model, begun: Model | None = None) -> Ran:
             known = [e for e in effects if e.name not in {one.name for one in model.effects}]
 
             def run(trials: Sequence[Trial]) -> tuple[LikelihoodSearch, Found]:
@@ -184,6 +184,7 @@ class _Work:
                 parts = trials if model.effects else in_parts(model.rig, trials, answered)
                 models = LikelihoodModels(model, parts, *own)
                 models.take_nominal(self.nominal)
+                models.proposed = begun
                 ran.append(LikelihoodSearch(models, self.tell, begun_by_effort(models, trials, self.thorough)))
                 return ran[-1], ran[-1].run()
 
@@ -202,7 +203,7 @@ class _Work:
 
     def _judged(self, study: Study, nominal: Model, ask: Ask, train: list[Trial], test: list[Trial]) -> Diagnosis:
         with time_limit(self.end - time.perf_counter()):
-            first = ask(nominal)
+            first = ask(nominal, None)
             kinds = self.catalogue.effects_for(nominal.rig) if len(train) > 1 else ()
             (search, found, again), faults = with_faults(first, ask, kinds, self.tests)
         self.tell(0.88, "held-out gain")

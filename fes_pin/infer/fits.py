@@ -8,7 +8,7 @@ from typing import Generic, Protocol, TypeVar
 
 from fes_pin.infer.family import Family
 from fes_pin.infer.keys import Key
-from fes_pin.infer.levels import CLAIM_LEVEL, MOST_CAUSES, SEPARABLE
+from fes_pin.infer.levels import CLAIM_LEVEL, FORM_SHARE, MOST_CAUSES, SEPARABLE
 from fes_pin.infer.optimize import WORTH
 
 Names = tuple[str, ...]
@@ -272,6 +272,9 @@ class FittedSets(Sets[F], Generic[F, S]):
     def extend(self, base: Names, most: int | None = None) -> None:
         """Fit a set with each further candidate, or with the `most` of largest score.
 
+        Of these a candidate of less than `FORM_SHARE` of the largest score is left out: an error in the form of another
+        may score as much.
+
         Of several fits of a set the one of lowest criterion is kept.
         A fitted set is started again where candidates of the base have another form than in that set.
         """
@@ -281,7 +284,9 @@ class FittedSets(Sets[F], Generic[F, S]):
             return
         self._begun.add(extended)
         known = self.candidates(fitted)
-        chosen = sorted(known, key=lambda n: (-known[n].gain, n))[:most]
+        chosen = sorted(known, key=lambda n: (-known[n].gain, n))
+        if most is not None:
+            chosen = [n for n in chosen[:most] if not known[n].gain < FORM_SHARE * known[chosen[0]].gain]
         starts = {tuple(sorted((*base, n))): known[n].start for n in chosen}
         wanted = {k: s for k, s in starts.items() if self.is_within(k)}
         missing = {k: s for k, s in wanted.items() if (k, forms) not in self._begun and not self._has(k, forms)}

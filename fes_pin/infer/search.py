@@ -98,9 +98,9 @@ class Search(Generic[F, M]):
             self.sets.nominal()
         self._kept: Names = ()
         try:
-            self._kept = self._backward(self.sets.first())
+            self._kept = self.backward(self.sets.first())
             given = self.policy.given
-            return self.settle(self._backward(self._found_forward() if given is None else given))
+            return self.settle(self.backward(self._found_forward() if given is None else given))
         except OutOfTime:
             self.was_stopped = True
             with time_limit(math.inf):
@@ -229,8 +229,8 @@ class Search(Generic[F, M]):
             fits[names] = better
         self._formed.add(names)
 
-    def _backward(self, names: Names) -> Names:
-        """Drop candidates that are not significant given the others."""
+    def backward(self, names: Names) -> Names:
+        """Return a fitted set without the candidates that are not significant given the others."""
         while names:
             less = {n: self.sets.without(names, n) for n in names}
             p_values = {n: self.sets.p_value(self.sets.fits[names], less[n]) for n in names}
@@ -273,7 +273,7 @@ class Search(Generic[F, M]):
         if set(names) & set(rejected):
             return False
         self._reform(names)
-        return self._kept_in_mind(names, self._backward(names) == names)
+        return self._kept_in_mind(names, self.backward(names) == names)
 
     def result(self, names: Names) -> SearchResult[F]:
         """Return the result for a set from the fitted sets, without a search for further rivals."""

@@ -268,16 +268,6 @@ class Verdict(ABC, Generic[F, M, W]):
             else:
                 return state
 
-    def significant(self, state: State[F, M, W]) -> State[F, M, W]:
-        """Return the state without candidates that are not significant, or that chance explains between equal repeats.
-
-        No other claim is asked.
-        """
-        for claim in ("drop_unrepeated", "drop_insignificant"):
-            while (fewer := getattr(self, claim)(state)) is not None:
-                state = _noted(fewer, claim)
-        return state
-
     def drop_unmoved(self, state: State[F, M, W]) -> State[F, M, W] | None:
         """Reject the weakest candidate of a set by which the recorded inputs do not move the system."""
         return self._without_weakest(state, [] if state.weighed.is_moved else state.claimed)

@@ -182,16 +182,17 @@ def test_a_candidate_at_two_sites_is_two_candidates():
     assert all(len(state.found.rivals[n]) > 0 for n in state.names)
 
 
-def test_candidates_that_are_not_significant_are_rejected_with_the_reason():
+def test_candidates_that_are_not_significant_are_left_out():
     columns, runs = drawn(2, 0.0)
     state = first_state(columns, runs)
     search = state.search
     search.sets.extend(("friction@knee",))
     both = search.result(("friction@knee", "x0"))
     begun = replace(state, found=both, weighed=state.verdict.weigh(both))
-    kept = state.verdict.significant(begun)
-    assert kept.names == {"friction@knee"} and state.verdict.significant(kept) is kept
-    assert kept.rejected["x0"].claim == "drop_insignificant" and "not significant" in str(kept.steps[-1])
+    kept = state.verdict.drop_insignificant(begun)
+    assert kept.names == {"friction@knee"} and state.verdict.drop_insignificant(kept) is None
+    assert {*kept.rejected} == {"x0"}
+    assert search.backward(("friction@knee", "x0")) == ("friction@knee",)
 
 
 def test_an_estimator_that_does_not_apply_or_has_no_common_currency_is_passed_over():
