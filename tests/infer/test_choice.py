@@ -285,6 +285,17 @@ def test_the_other_answers_by_every_currency(motion, effort, names, prefers_smal
     assert bool(chosen.steps) is (answers or bool(chosen.tied))
 
 
+def test_each_estimator_is_compared_with_the_answer_so_far():
+    """The second lessens the errors of the first set by half, those of the first estimator by a quarter."""
+    errors = (np.full(12, size) for size in (100.0, 50.0, 25.0, 75.0))
+    first, same, larger, worse = (
+        Stated(frozenset(names), {"motion": e}) for e, names in zip(errors, ("a", "a", "ab", "abc"), strict=True)
+    )
+    chosen = choose(first, [Known(one, False) for one in (same, larger, worse)])
+    assert chosen.names == {"a", "b"} and len(chosen.steps) == 2
+    assert "E of motion 10 % -> 5 %" in str(chosen.steps[0]) and "E of motion 5 % -> 2.5 %" in str(chosen.steps[1])
+
+
 @pytest.mark.parametrize(
     ("motion", "effort", "names", "tied"),
     [
