@@ -14,9 +14,10 @@ from harness.voluntary import Voluntary
 import fes_pin as fp
 from fes_pin.data.errors import InputError
 from fes_pin.diagnosis import by_effort, likelihood_models
-from fes_pin.diagnosis.by_effort import ValuesByEffort, ValuesOfInverseDynamics, named_by_one
+from fes_pin.diagnosis.by_effort import ValuesOfInverseDynamics, named_by_one
 from fes_pin.diagnosis.likelihood_models import LikelihoodModels, LikelihoodSearch
 from fes_pin.diagnosis.verdict import RigVerdict
+from fes_pin.diagnosis.weighed import RigWeighed
 from fes_pin.effort import search
 from fes_pin.infer.estimators import CHOICE
 from fes_pin.infer.result import Evidence
@@ -100,8 +101,7 @@ def test_values_of_inverse_dynamics_answer_where_the_likelihood_tells_little(tmp
     for name in ("coulomb_friction.torque_nm", "effort_offset.offset"):
         low, high = found.extended.interval(name)
         assert low <= drawn.truth[name.partition(".")[0]] <= high
-    weigh, against = ValuesByEffort.weigh, {"effort_offset": Evidence(-73.0, 0.0)}
-    monkeypatch.setattr(ValuesByEffort, "weigh", lambda own, found: replace(weigh(own, found), evidence=against))
+    monkeypatch.setattr(RigWeighed, "evidence", {"effort_offset": Evidence(-73.0, 0.0)})
     assert usual(ValuesOfInverseDynamics(), asked[0]) is None
 
 
@@ -116,10 +116,9 @@ def test_a_set_has_the_values_of_inverse_dynamics_where_they_predict_the_motion_
     assert {c.name for c in found.causes} == {"coulomb_friction", "effort_offset"}
     assert "least squares of the low-passed effort predicts better" in str(found.why.steps[-1])
     by_motion = Model(found.model.rig, found.model.effects).with_parameters(found.likeliest.values)
-    ahead = [
-        errors_against(shown, SimpleNamespace(model=m), unseen)["0.3 s, unseen"][0] for m in (found.model, by_motion)
-    ]
-    assert 10.0 * ahead[0] < ahead[1]
+    both = [errors_against(shown, SimpleNamespace(model=one), unseen) for one in (found.model, by_motion)]
+    own, theirs = (one["0.3 s, unseen"][0] for one in both)
+    assert 10.0 * own < theirs
     for name, truth in (("coulomb_friction.torque_nm", "coulomb_friction"), ("effort_offset.offset", "effort_offset")):
         assert found.extended.values[name] == pytest.approx(drawn.truth[truth], rel=0.15)
         assert abs(found.likeliest.values[name] / drawn.truth[truth] - 1.0) > 0.2
