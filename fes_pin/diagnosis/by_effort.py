@@ -98,12 +98,29 @@ class InverseDynamics(Estimator):
 
 
 class ValuesByEffort(VerdictByEffort):
-    """The verdict on a set with the values of inverse dynamics, of all trials or of those that are not held out."""
+    """The verdict on a set with the values of inverse dynamics, of all trials or of those that are not held out.
+
+    Sets are compared at their maxima of the likelihood.
+    """
 
     def __init__(self, search: LikelihoodSearch, test: Sequence[Trial]) -> None:
         super().__init__(search, test)
-        known = self.refitted
+        known, self._known = self.refitted, dict[frozenset[str], Found]()
         self.refitted = Again(lambda fitted, trials: self.at_efforts(*known([(fitted, trials)])))
+
+    def _likeliest(self, state: RigState) -> RigState:
+        """Return a state with the maximum of the likelihood of its set."""
+        if state.names not in self._known:
+            self._known[state.names] = self.search.result(tuple(sorted(state.names)))
+        return replace(state, found=self._known[state.names])
+
+    def alike(self, state: RigState, name: str) -> tuple[str, ...]:
+        """Return a cause and its equivalents."""
+        return super().alike(self._likeliest(state), name)
+
+    def chosen(self, state: RigState) -> list[LikelihoodFit]:
+        """See `RigVerdict.chosen`."""
+        return super().chosen(self._likeliest(state))
 
     def at_efforts(self, fitted: LikelihoodFit) -> LikelihoodFit:
         """Return a fit at the values of inverse dynamics of its trials.

@@ -57,8 +57,8 @@ class Diagnosis(ModelResult):
         Whether a controller answers the reading, or imposes the motion: then errors are judged over the horizon, else
         those of free simulations.
     likeliest
-        The maximum of the likelihood of the same set, under which faults of the log are tested; None where `extended`
-        is that.
+        The maximum of the likelihood of the same set, with which sets and faults of the log are compared; None where
+        `extended` is that.
     """
 
     nominal: LikelihoodFit

@@ -259,23 +259,3 @@ def test_an_inertia_that_moves_between_bands_is_no_answer(tmp_path, monkeypatch)
     found = fp.diagnose(arm(tmp_path, friction=0.1))
     assert f"efforts name no cause: {search.NOT_CARRIED}" in found.warnings
     assert [c.name for c in found.causes] == ["coulomb_friction"]
-
-
-def test_values_that_predict_efforts_worse_than_the_beliefs_are_replaced(tmp_path, monkeypatch):
-    """The likelihood's values are taken for worse here; those of inverse dynamics answer, with wide intervals."""
-    errors, asked = by_effort.effort_percent, []
-
-    def worse(model, trials, band):
-        asked.append(model)
-        return errors(model, trials, band) + 1e3 * (len(asked) == 1)
-
-    joint = arm(tmp_path, friction=0.1)
-    own = fp.diagnose(joint)
-    monkeypatch.setattr(by_effort, "effort_percent", worse)
-    other = fp.diagnose(joint)
-    assert [c.name for c in other.causes] == [c.name for c in own.causes] == ["coulomb_friction"]
-    assert any("those of least squares of the effort are given" in w for w in other.warnings)
-    assert not any("least squares of the effort" in w for w in own.warnings)
-    for name in other.extended.free:
-        low, high = other.extended.interval(name)
-        assert low <= own.extended.values[name] <= high
