@@ -108,6 +108,10 @@ class ValuesByEffort(VerdictByEffort):
         known, self._known = self.refitted, dict[frozenset[str], Found]()
         self.refitted = Again(lambda fitted, trials: self.at_efforts(*known([(fitted, trials)])))
 
+    def of_search(self, search: LikelihoodSearch) -> RigVerdict:
+        """See `RigVerdict.of_search`; with the values of the likelihood."""
+        return VerdictByEffort(search, self.test)
+
     def _likeliest(self, state: RigState) -> RigState:
         """Return a state with the maximum of the likelihood of its set."""
         if state.names not in self._known:

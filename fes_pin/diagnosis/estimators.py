@@ -40,7 +40,7 @@ class RigEstimator(Estimator):
         if first.search.was_stopped or (found := self.searched(first)) is None:
             return None
         assert isinstance(first.verdict, RigVerdict)
-        return RigVerdict(found[0], first.verdict.test).of(found[1], replaced=first)
+        return first.verdict.of_search(found[0]).of(found[1], replaced=first)
 
 
 class LeastSquares(RigEstimator):

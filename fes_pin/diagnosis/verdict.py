@@ -52,6 +52,10 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
         self.refitted = self.models.refitted
         self._chosen: dict[int, tuple[Found, list[LikelihoodFit]]] = {}
 
+    def of_search(self, search: LikelihoodSearch) -> "RigVerdict":
+        """Return the same verdict on another search of the same trials."""
+        return type(self)(search, self.test)
+
     def weigh(self, found: Found) -> RigWeighed:
         """Return the evidence of held-out trials and of the tests of lack of fit on a set."""
         return RigWeighed(self.models, found, self.test, self.refitted)

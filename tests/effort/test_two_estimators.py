@@ -194,7 +194,10 @@ def test_a_thorough_search_has_no_set_to_begin_with(tmp_path, monkeypatch):
 
 
 def test_the_search_that_begins_there_fits_few_sets_and_the_nominal_model_once(tmp_path, monkeypatch):
-    """The candidates of largest score are fitted, instead of all: the set itself is a proposal."""
+    """The candidates of largest score are fitted, instead of all: the set itself is a proposal.
+
+    Those of less than a sixteenth of the largest score are not.
+    """
     once, begun = [], []
     nominal, begin = likelihood_fits.with_new_noise, LikelihoodFits.begin
 
@@ -211,7 +214,7 @@ def test_the_search_that_begins_there_fits_few_sets_and_the_nominal_model_once(t
     found = fp.diagnose(arm(tmp_path, friction=0.1, drag=0.05))
     assert {c.name for c in found.causes} == {"coulomb_friction", "quadratic_damping"}
     assert len(once) == 1
-    assert max(count for _, count in begun) == FITTED
+    assert max(count for _, count in begun) < FITTED
 
 
 @pytest.mark.parametrize(
