@@ -84,10 +84,10 @@ def choose(first: AnyState, others: Sequence[Estimator], seed: int = 0) -> AnySt
 
     Each estimator is compared with the answer so far. It predicts better where the 95 % interval of the share of the
     squared error that it removes is above `NOTHING_PERCENT` in one currency, and it is worse in none. Of sets of
-    different sizes the larger predicts better where it also lessens each other error, by what may be more than
-    `FORM_SHARE`: a cause that lessens the error of one alone is an error of form. Noise is not subtracted: each
-    estimator has its own, and that of a wrong model is large. Data that the study itself holds out are not used: gains
-    on them would be optimistic.
+    different sizes the larger predicts better where that share is also above `FORM_SHARE` in each other currency: a
+    cause that lessens the error of one alone is an error of form. Noise is not subtracted: each estimator has its own,
+    and that of a wrong model is large. Data that the study itself holds out are not used: gains on them would be
+    optimistic.
 
     Where neither predicts better, and the other has one cause in the place of another, the data do not distinguish the
     two: they are equivalents in the state of the first.
@@ -121,8 +121,8 @@ def _why(first: AnyState, other: AnyState, compared: Sequence[Compared], estimat
 
 
 def _is_felt(shares: Sequence[Gain]) -> bool:
-    """Return whether a share is certain in one currency, positive in all, and in none certainly an error of form."""
-    felt = [share.percent > 0.0 and share.high > WHOLE * FORM_SHARE for share in shares]
+    """Return whether a share is certain in one currency, and more than an error of form may leave in each other one."""
+    felt = [share.percent > WHOLE * FORM_SHARE for share in shares]
     return any(share.low > NOTHING_PERCENT and all(felt[:k] + felt[k + 1 :]) for k, share in enumerate(shares))
 
 
