@@ -6,18 +6,18 @@ from dataclasses import replace
 from functools import cached_property
 
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.errors_ahead import RandomPart, are_large, free_errors, noise_that_is_small, random_parts
+from fes_pin.diagnosis.errors_ahead import are_large, free_errors, noise_that_is_small, random_parts
 from fes_pin.diagnosis.held_out import Again, Fold, evidence_of, gains_of, make_folds
 from fes_pin.diagnosis.likelihood_models import Found, LikelihoodModels
 from fes_pin.diagnosis.rejected import is_moved_by_what_is_recorded, no_noise
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.levels import SMALL_SHARE
 from fes_pin.infer.noise import NoiseModel
-from fes_pin.infer.result import FITTED, Evidence, Gain, Remainder
+from fes_pin.infer.result import FITTED, Gain
 from fes_pin.infer.text import WHOLE
 from fes_pin.infer.verdict import Weighed
 from fes_pin.remainder.lack_of_fit import lack_of_fit
-from fes_pin.remainder.unrepeated import Voluntary, over_voluntary, voluntary_effort
+from fes_pin.remainder.unrepeated import over_voluntary, voluntary_effort
 
 WORSE = 2.0
 """Ratio of errors of free simulations from which a cause is refuted: those of two right models differ by less."""
@@ -34,6 +34,19 @@ class RigWeighed(Weighed):
         Trials that the study itself holds out.
     refitted
         Fits to other trials.
+
+    Attributes
+    ----------
+    folds
+        Trials that are held out, and fits without them; none where none can be.
+    fitted
+        Gain of each cause on the fitted trials, by fits to all of them.
+    random
+        Process noise in the fit of the set.
+    no_noise
+        Why the error of a simulation cannot be measurement noise; None where it may be.
+    voluntary
+        Effort that the set leaves, and that differs between equal cycles of an imposed motion; None without such.
     """
 
     def __init__(self, models: LikelihoodModels, found: Found, test: Sequence[Trial], refitted: Again) -> None:
@@ -43,10 +56,14 @@ class RigWeighed(Weighed):
         self._test: Sequence[Trial]
         self._refitted: Again
 
-    @cached_property
-    def folds(self) -> Sequence[Fold]:
-        """Trials that are held out, and fits without them; none where none can be."""
-        return make_folds(self._found, self._models.trials, self._test, self._refitted)
+    folds = cached_property(lambda own: make_folds(own._found, own._models.trials, own._test, own._refitted))
+    evidence = cached_property(lambda own: evidence_of(own.folds, own._found, own._models.as_random))
+    lack_of_fit = cached_property(lambda own: lack_of_fit(own._found.best))
+    random = cached_property(lambda own: random_parts(own._found.best))
+    is_random = property(lambda own: are_large(own.random))
+    is_moved = cached_property(lambda own: is_moved_by_what_is_recorded(own._found.best))
+    no_noise = cached_property(lambda own: no_noise(own._found.best))
+    voluntary = cached_property(lambda own: voluntary_effort(own._found.best))
 
     @cached_property
     def gains(self) -> Mapping[str, Gain]:
@@ -56,46 +73,11 @@ class RigWeighed(Weighed):
 
     @cached_property
     def fitted(self) -> dict[str, Gain]:
-        """Gain of each cause on the fitted trials, by fits to all of them."""
+        """Gain of each cause on the fitted trials."""
         models, found = self._models, self._found
         whole = Fold(found.nominal, found.best, found.without, models.trials)
         gains = gains_of([whole], found.without, models.judged_s, models.seed)
         return {n: replace(one, on=FITTED) for n, one in gains.items()}
-
-    @cached_property
-    def evidence(self) -> Mapping[str, Evidence]:
-        """See `Weighed`."""
-        return evidence_of(self.folds, self._found, self._models.as_random)
-
-    @cached_property
-    def lack_of_fit(self) -> Remainder:
-        """See `Weighed`."""
-        return lack_of_fit(self._found.best)
-
-    @cached_property
-    def random(self) -> tuple[RandomPart, ...]:
-        """Process noise in the fit of the set."""
-        return random_parts(self._found.best)
-
-    @property
-    def is_random(self) -> bool:
-        """See `Weighed`."""
-        return are_large(self.random)
-
-    @cached_property
-    def is_moved(self) -> bool:
-        """See `Weighed`."""
-        return is_moved_by_what_is_recorded(self._found.best)
-
-    @cached_property
-    def no_noise(self) -> str | None:
-        """Why the error of a simulation cannot be measurement noise; None where it may be."""
-        return no_noise(self._found.best)
-
-    @cached_property
-    def voluntary(self) -> Voluntary | None:
-        """Effort that the set leaves, and that differs between equal cycles of an imposed motion; None without such."""
-        return voluntary_effort(self._found.best)
 
     @cached_property
     def over_unrepeated(self) -> Mapping[str, float]:
