@@ -11,6 +11,7 @@ from fes_pin.diagnosis.held_out import Again, Fold, evidence_of, gains_of, make_
 from fes_pin.diagnosis.likelihood_models import Found, LikelihoodModels
 from fes_pin.diagnosis.rejected import is_moved_by_what_is_recorded, no_noise
 from fes_pin.identify.likelihood_fit import LikelihoodFit
+from fes_pin.identify.per_trial import falls
 from fes_pin.infer.levels import SMALL_SHARE
 from fes_pin.infer.noise import NoiseModel
 from fes_pin.infer.result import FITTED, Gain
@@ -90,10 +91,10 @@ class RigWeighed(Weighed):
 
         Predictions over a horizon begin again at the readings. A stop that the joint passes by little costs them
         little, and keeps a free simulation on its other side. In closed loop, where free simulations may drift, they
-        are asked only of a set that follows the trials without the cause.
+        are asked only of a set that follows the trials without the cause, and of no rig that falls by itself.
         """
         models, found = self._models, self._found
-        if models.by_effort is None or models.judged_s is None or not found.without:
+        if models.by_effort is None or models.judged_s is None or falls(found.best.model, models.trials):
             return {}
         noise = noise_that_is_small(found.best)
         error = {n: self._free_percent(f, noise) for n, f in {"": found.best, **found.without}.items()}
