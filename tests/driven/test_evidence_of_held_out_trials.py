@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 from driven_rigs.draw import draw
 from driven_rigs.laboratory import draw_laboratory
+from harness.generators import generator_of
+from harness.never_worse import withheld
 from scipy.signal import lfilter
 
 from fes_pin.data.study import read_study
@@ -105,3 +107,14 @@ def test_a_stop_that_one_of_two_trials_reaches_is_named(tmp_path):
     found = diagnose_joint(read_study(draw_laboratory(("joint_stop",), 1601016, tmp_path).study))
     assert [c.name for c in found.causes] == ["joint_stop"], str(found)
     assert not found.remainder.unexplained
+
+
+def test_free_motion_refutes_no_cause_of_a_rig_that_falls_by_itself(tmp_path):
+    """A pendulum about its unstable rest: a free simulation falls to either side, whichever model is right."""
+    item = next(one for one in generator_of("driven").plan(73020000) if one.key == "plain-73020056")
+    shown, _ = withheld(generator_of("driven").make(item, tmp_path)[0])
+    found = diagnose_joint(shown)
+    assert item.hidden == ("coulomb_friction", "parallel_stiffness") and found.is_falling
+    friction, other = found.causes
+    assert friction.name == "coulomb_friction"
+    assert "parallel_stiffness" in {other.name, *other.equivalents}
