@@ -27,7 +27,8 @@ from fes_pin.models.rigs.joint import Joint
 def begun_by_effort(models: LikelihoodModels, trials: Sequence[Trial], thorough: bool = False) -> Policy:
     """Search by inverse dynamics where it applies, and return the options of a search that begins there.
 
-    Of sets of one cause those of largest score are fitted then. A thorough search begins with none, and fits all.
+    Of sets of one cause those of largest score are fitted then. So they are where another set is proposed already. A
+    thorough search begins with none, and fits all.
     """
     rig, few = models.model.rig, Policy(fitted=BEAM, fitted_first=FITTED)
     if models.proposed is not None:
@@ -105,8 +106,14 @@ class ValuesByEffort(VerdictByEffort):
 
     def __init__(self, search: LikelihoodSearch, test: Sequence[Trial]) -> None:
         super().__init__(search, test)
-        known, self._known = self.refitted, dict[frozenset[str], Found]()
-        self.refitted = Again(lambda fitted, trials: self.at_efforts(*known([(fitted, trials)])))
+        by_motion, self._by_names = self.refitted, dict[frozenset[str], Found]()
+        self.refitted = Again(lambda fitted, trials: self.at_efforts(*by_motion([(fitted, trials)])))
+
+    @property
+    def estimator(self) -> str:
+        """See `Verdict.estimator`."""
+        by_effort = self.models.by_effort
+        return f"{super().estimator}, values by {by_effort.models.estimator}" if by_effort else super().estimator
 
     def of_search(self, search: LikelihoodSearch) -> RigVerdict:
         """See `RigVerdict.of_search`; with the values of the likelihood."""
@@ -114,9 +121,9 @@ class ValuesByEffort(VerdictByEffort):
 
     def _likeliest(self, state: RigState) -> RigState:
         """Return a state with the maximum of the likelihood of its set."""
-        if state.names not in self._known:
-            self._known[state.names] = self.search.result(tuple(sorted(state.names)))
-        return replace(state, found=self._known[state.names])
+        if state.names not in self._by_names:
+            self._by_names[state.names] = self.search.result(tuple(sorted(state.names)))
+        return replace(state, found=self._by_names[state.names])
 
     def alike(self, state: RigState, name: str) -> tuple[str, ...]:
         """Return a cause and its equivalents."""

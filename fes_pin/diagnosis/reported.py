@@ -58,7 +58,6 @@ def diagnosis_of(
     fitted, *others = verdict.errors(state)
     held = others[0] if others else None
     on = HELD_OUT if trials[1] else CROSS_VALIDATED if held else FITTED
-    likeliest = state.search.models.fits.get(best.names, best)
     causes = [
         _cause(verdict, state, e, best, (state.weighed.fitted[e.name], on))
         for e in best.model.effects
@@ -82,13 +81,13 @@ def diagnosis_of(
         extended_error=(fitted[1].free, held[1].free if held else None),
         ceiling_percent=min([_ceiling(found.best), *reached]),
         next_experiment=experiment(best, found.rivals, causes, study),
-        ranking=ranking(likeliest, found.rivals),
+        ranking=ranking(state.likeliest, found.rivals),
         held_out_by=on,
         warnings=(*said, *[WHITE_PROCESS_NOISE] * bool(best.noise.timed)),
         seen=_seen(search.models, found.nominal, word),
         random=state.weighed.random,
         is_driven=search.models.judged_s is not None,
-        likeliest=likeliest,
+        likeliest=state.likeliest,
         reason=left.reason if not left.unexplained or state.weighed.is_moved else UNMOVED,
         why=why_of(state),
         ahead=AheadErrors(search.models.horizon_s, *fitted, *(held or (None, None))),

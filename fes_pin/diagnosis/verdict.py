@@ -19,7 +19,6 @@ from fes_pin.diagnosis.rejected import with_rejected_causes
 from fes_pin.diagnosis.weighed import RigWeighed
 from fes_pin.identify.error_measures import FREE
 from fes_pin.identify.likelihood_fit import LikelihoodFit
-from fes_pin.identify.per_trial import falls
 from fes_pin.infer.held_out import Errors
 from fes_pin.infer.result import Remainder
 from fes_pin.infer.scatter import as_wide_as_trials_differ, with_honest_intervals
@@ -163,8 +162,7 @@ class RigVerdict(Verdict[LikelihoodFit, LikelihoodModels, RigWeighed]):
         return out
 
     def _ahead(self, state: RigState, pairs: Pairs) -> Ahead:
-        is_falling = self.models.answered and falls(state.found.best.model, self.models.trials)
-        return errors_ahead(pairs, self.models.horizon_s, is_falling)
+        return errors_ahead(pairs, self.models.horizon_s, self.models.answered and state.weighed.falls)
 
     def _judged(self, error: Ahead) -> float:
         """Return the error that judges causes: over the horizon in closed loop, else of free simulations."""

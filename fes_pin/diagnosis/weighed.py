@@ -44,6 +44,8 @@ class RigWeighed(Weighed):
         Gain of each cause on the fitted trials, by fits to all of them.
     random
         Process noise in the fit of the set.
+    falls
+        Whether the rig falls by itself, so that free simulations of any model diverge.
     no_noise
         Why the error of a simulation cannot be measurement noise; None where it may be.
     voluntary
@@ -51,6 +53,7 @@ class RigWeighed(Weighed):
     """
 
     def __init__(self, models: LikelihoodModels, found: Found, test: Sequence[Trial], refitted: Again) -> None:
+        # a frozen base class, whose fields are found when they are asked for
         self.__dict__.update(_models=models, _found=found, _test=test, _refitted=refitted)
         self._models: LikelihoodModels
         self._found: Found
@@ -63,6 +66,7 @@ class RigWeighed(Weighed):
     random = cached_property(lambda own: random_parts(own._found.best))
     is_random = property(lambda own: are_large(own.random))
     is_moved = cached_property(lambda own: is_moved_by_what_is_recorded(own._found.best))
+    falls = cached_property(lambda own: falls(own._found.best.model, own._models.trials))
     no_noise = cached_property(lambda own: no_noise(own._found.best))
     voluntary = cached_property(lambda own: voluntary_effort(own._found.best))
 
@@ -94,7 +98,7 @@ class RigWeighed(Weighed):
         are asked only of a set that follows the trials without the cause, and of no rig that falls by itself.
         """
         models, found = self._models, self._found
-        if models.by_effort is None or models.judged_s is None or falls(found.best.model, models.trials):
+        if models.by_effort is None or models.judged_s is None or not found.without or self.falls:
             return {}
         noise = noise_that_is_small(found.best)
         error = {n: self._free_percent(f, noise) for n, f in {"": found.best, **found.without}.items()}

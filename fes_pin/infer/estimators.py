@@ -39,7 +39,7 @@ class Estimator(ABC):
 
     def words(self, state: AnyState) -> str:
         """Return how it estimated a state, in words."""
-        return str(state.search.sets.estimator)
+        return str(state.verdict.estimator)
 
     @abstractmethod
     def state(self, first: AnyState) -> AnyState | None:

@@ -183,8 +183,13 @@ class State(Generic[F, M, W]):
 
     @property
     def claimed(self) -> list[str]:
-        """Those that are claims."""
+        """The candidates of the set that are claims."""
         return list(filter(self.search.sets.is_claimed, self.found.without))
+
+    @property
+    def likeliest(self) -> F:
+        """The fit of the set with which others are compared; the answer may have the values of another estimator."""
+        return self.search.sets.fits.get(tuple(sorted(self.names)), self.found.best)
 
 
 class Verdict(ABC, Generic[F, M, W]):
@@ -198,6 +203,11 @@ class Verdict(ABC, Generic[F, M, W]):
 
     def __init__(self, search: Search[F, M]) -> None:
         self.search = search
+
+    @property
+    def estimator(self) -> str:
+        """How the values of the answer are estimated, in words."""
+        return self.search.sets.estimator
 
     @abstractmethod
     def weigh(self, found: SearchResult[F]) -> W:

@@ -118,7 +118,7 @@ class Why:
 
 def why_of(state: State[Any, Any, Any]) -> Why:
     """Return how the state of a verdict was reached, and why its other candidates are not named."""
-    sets, best, named = state.search.sets, state.found.best, state.names
+    sets, best, named = state.search.sets, state.likeliest, state.names
     nearest: dict[str, Names] = {}
     rejected = set(state.rejected)
     for names in sorted(sets.fits, key=lambda k: (bool(rejected & {*k}), not named < {*k}, sets.fits[k].criterion)):
@@ -126,7 +126,7 @@ def why_of(state: State[Any, Any, Any]) -> Why:
             nearest.setdefault(one, names)
     tried = {n: _tried(sets, best, names, named < set(names)) for n, names in sorted(nearest.items())}
     further = sets.extension_p_value(best)
-    return Why(sets.estimator, sets.level(best), state.steps, Held(state.rejected), Held(tried), further)
+    return Why(state.verdict.estimator, sets.level(best), state.steps, Held(state.rejected), Held(tried), further)
 
 
 def _tried(sets: Sets[Any], best: Fitted, names: Names, extends: bool) -> Tried:

@@ -115,6 +115,8 @@ def test_a_set_has_the_values_of_inverse_dynamics_where_they_predict_the_motion_
     found = fp.diagnose(shown)
     assert {c.name for c in found.causes} == {"coulomb_friction", "effort_offset"}
     assert "least squares of the low-passed effort predicts better" in str(found.why.steps[-1])
+    assert found.why.estimator.endswith("values by least squares of the low-passed effort")
+    assert all(one.shortfall > -1e-6 for many in found.ranking.values() for one in many)
     by_motion = Model(found.model.rig, found.model.effects).with_parameters(found.likeliest.values)
     both = [errors_against(shown, SimpleNamespace(model=one), unseen) for one in (found.model, by_motion)]
     own, theirs = (one["0.3 s, unseen"][0] for one in both)

@@ -283,7 +283,7 @@ def test_the_other_answers_by_every_currency(motion, effort, names, prefers_smal
 
 
 def test_each_estimator_is_compared_with_the_answer_so_far():
-    """The second lessens the errors of the first set by half, those of the first estimator by a quarter."""
+    """The same set with half of its error, a larger one with half of that, and one that is worse than both."""
     errors = (np.full(12, size) for size in (100.0, 50.0, 25.0, 75.0))
     first, same, larger, worse = (
         Stated(frozenset(names), {"motion": e}) for e, names in zip(errors, ("a", "a", "ab", "abc"), strict=True)
